@@ -1,0 +1,30 @@
+# The core: no ROS, no PCL. Everything a scan passes through until it is in the map.
+add_library(bki_mapping_core
+  src/core/class_table.cpp
+  src/core/map_query.cpp
+  src/core/parameters.cpp
+  src/core/semantic_map.cpp
+  src/inference/beam_evidence.cpp
+  src/inference/beam_field.cpp
+  src/inference/beam_rtree.cpp
+  src/inference/beam_table.cpp
+  src/inference/block_walk.cpp
+  src/inference/downsample.cpp
+  src/inference/map_updater.cpp
+  src/inference/occlusion.cpp
+  src/inference/parallel_for.cpp
+  src/inference/point_evidence.cpp
+  src/free_space/beam_lines.cpp
+  src/free_space/even_samples.cpp
+  src/free_space/no_free_space.cpp
+  src/free_space/random_samples.cpp
+  src/free_space/registry.cpp
+  src/mapping/observation.cpp
+  src/mapping/semantic_mapper.cpp
+)
+target_include_directories(bki_mapping_core PUBLIC
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+target_link_libraries(bki_mapping_core PUBLIC Eigen3::Eigen Threads::Threads PRIVATE Boost::headers)
+# Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
+target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math -O3)
+bki_mapping_warnings(bki_mapping_core)

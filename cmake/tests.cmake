@@ -1,0 +1,22 @@
+# Unit tests of the core; rostests are added in ros.cmake.
+if(NOT BUILD_TESTING AND NOT CATKIN_ENABLE_TESTING)
+  return()
+endif()
+find_package(GTest REQUIRED)
+
+add_library(bki_mapping_reference STATIC test/reference/reference.cpp)
+target_include_directories(bki_mapping_reference PUBLIC test)
+target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_core)
+target_compile_options(bki_mapping_reference PRIVATE -O2)
+bki_mapping_warnings(bki_mapping_reference)
+
+function(bki_mapping_unit_test name)
+  add_executable(${name} test/${name}.cpp)
+  target_link_libraries(${name} PRIVATE bki_mapping_reference GTest::gtest GTest::gtest_main ${ARGN})
+  target_compile_definitions(${name} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  bki_mapping_warnings(${name})
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+endfunction()
+
+bki_mapping_unit_test(brute_force_test)

@@ -1,0 +1,54 @@
+/// @file Every setting of the mapper with its default; parameters.h gives them names.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace bki_mapping {
+
+enum class KernelType { kSparse, kCounting };
+struct KernelConfig {
+  KernelType type = KernelType::kSparse;
+  double length = 0.3;  ///< support radius l [m]
+  double scale = 0.1;   ///< sigma0, the kernel's value at distance 0
+};
+
+enum class BeamWeight { kUniform, kLinear, kBilinear };
+enum class FreeSpaceExtent { kMapped, kObserved };
+enum class BeamIndexType { kTable, kRtree };
+struct FreeSpaceConfig {
+  std::string mode = "line";                            ///< a name of the registry in free_space/registry.h
+  double gap = 1.0;                                     ///< mode even: distance between samples of a beam [m]
+  int samples_per_beam = 1;                             ///< modes uniform and linear
+  std::int64_t seed = 1;                                ///< modes uniform and linear
+  BeamWeight weight = BeamWeight::kBilinear;            ///< mode line
+  FreeSpaceExtent extent = FreeSpaceExtent::kObserved;  ///< mode line
+  BeamIndexType beam_index = BeamIndexType::kTable;     ///< mode line, and occlusion
+};
+
+struct SensorModelConfig {
+  double min_range = 0.0;              ///< hits nearer than this are dropped [m]
+  double max_range = -1.0;             ///< hits farther than this are no hits [m]; -1: no limit
+  bool clear_beyond_max_range = true;  ///< such hits clear as beams cut at max_range
+};
+
+enum class OcclusionExtent { kNone, kMapped, kAll };
+enum class UnlabelledPoints { kOccupied, kIgnore };
+enum class UnknownLabels { kIgnore, kUnlabelled };
+enum class LabelValues { kRaw, kId };
+
+struct MapperConfig {
+  double resolution = 0.3;             ///< edge of a voxel [m]
+  double prior = 0.001;                ///< alpha0, concentration of each class before any scan
+  double downsample_resolution = 0.1;  ///< edge of a down-sampling cell [m]; 0: off
+  int threads = 0;                     ///< 0: all cores
+  KernelConfig kernel;
+  FreeSpaceConfig free_space;
+  SensorModelConfig sensor_model;
+  OcclusionExtent occlusion = OcclusionExtent::kNone;
+  UnlabelledPoints unlabelled_points = UnlabelledPoints::kOccupied;
+  UnknownLabels unknown_labels = UnknownLabels::kIgnore;
+  LabelValues label_values = LabelValues::kRaw;
+};
+
+}  // namespace bki_mapping

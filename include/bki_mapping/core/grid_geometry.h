@@ -1,0 +1,65 @@
+/// @file The only conversions between points [m, map frame], voxels and blocks.
+#pragma once
+
+#include <cmath>
+
+#include "bki_mapping/core/types.h"
+
+namespace bki_mapping {
+
+/// A grid of cubic voxels of edge `resolution` [m]; voxel (0,0,0) spans [0, resolution) on each axis.
+/// Blocks hold 8 x 8 x 8 voxels.
+class GridGeometry {
+ public:
+  /// Largest magnitude of a voxel coordinate that points may have; farther points are refused.
+  static constexpr double kMaxCoordinate = 1 << 28;
+
+  /// @param resolution edge of a voxel [m], > 0.
+  explicit GridGeometry(double resolution) : resolution_(resolution) {}
+
+  double resolution() const { return resolution_; }
+  double blockSize() const { return resolution_ * kBlockEdge; }  ///< [m]
+
+  /// True for finite points whose voxel has a valid index.
+  bool contains(const Eigen::Vector3d& point) const {
+    return (point.array().abs() < kMaxCoordinate * resolution_).all();  // false for NaN
+  }
+  VoxelIndex voxelAt(const Eigen::Vector3d& point) const {
+    return {{cell(point.x()), cell(point.y()), cell(point.z())}};
+  }
+  Eigen::Vector3d voxelCentre(const VoxelIndex& v) const {
+    return Eigen::Vector3d(v.x + 0.5, v.y + 0.5, v.z + 0.5) * resolution_;
+  }
+  /// The corner of the block with the smallest coordinates [m].
+  Eigen::Vector3d blockOrigin(const BlockIndex& b) const {
+    return Eigen::Vector3d(b.x, b.y, b.z) * blockSize();
+  }
+  Eigen::Vector3d blockCentre(const BlockIndex& b) const {
+    return Eigen::Vector3d(b.x + 0.5, b.y + 0.5, b.z + 0.5) * blockSize();
+  }
+
+  static BlockIndex blockOf(const VoxelIndex& v) {
+    return {{floorDivide(v.x), floorDivide(v.y), floorDivide(v.z)}};
+  }
+  /// Place of a voxel in its block's planes, x fastest: x + 8 y + 64 z of its offsets.
+  static int offsetInBlock(const VoxelIndex& v) {
+    const int m = kBlockEdge - 1;
+    return (v.x & m) + kBlockEdge * ((v.y & m) + kBlockEdge * (v.z & m));
+  }
+  static VoxelIndex voxelOf(const BlockIndex& b, int offset) {
+    return {{b.x * kBlockEdge + offset % kBlockEdge, b.y * kBlockEdge + offset / kBlockEdge % kBlockEdge,
+             b.z * kBlockEdge + offset / (kBlockEdge * kBlockEdge)}};
+  }
+
+ private:
+  std::int32_t cell(double metres) const {
+    return static_cast<std::int32_t>(std::floor(metres / resolution_));
+  }
+  static std::int32_t floorDivide(std::int32_t i) {
+    return i >= 0 ? i / kBlockEdge : -((-i + kBlockEdge - 1) / kBlockEdge);
+  }
+
+  double resolution_;
+};
+
+}  // namespace bki_mapping

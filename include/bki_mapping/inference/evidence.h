@@ -1,0 +1,31 @@
+/// @file What a scan says, in a form that the updater can spread over blocks.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "bki_mapping/core/semantic_map.h"
+#include "bki_mapping/inference/index_numbering.h"
+
+namespace bki_mapping {
+
+/// Working memory of one thread.
+struct EvidenceScratch {
+  alignas(64) std::array<float, kBlockVoxels> sums{};
+  std::vector<std::uint32_t> beams;
+};
+
+/// Answers two questions: which blocks do you touch, and add yourself to this block.
+class Evidence {
+ public:
+  virtual ~Evidence() = default;
+
+  /// Names the blocks to which addTo may add; naming too many is allowed. `map` already has the blocks of the
+  /// evidence that stands before this one in the update.
+  virtual void collectBlocks(const SemanticMap& map, IndexNumbering& touched) const = 0;
+
+  /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
+  virtual void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const = 0;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,39 @@
+/// @file From a raw scan to hits and beams.
+#pragma once
+
+#include <cstddef>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/config.h"
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/inference/beams.h"
+#include "bki_mapping/inference/downsample.h"
+
+namespace bki_mapping {
+
+/// What became of a scan's points; `points` is the sum of those that follow.
+struct PointCounts {
+  std::size_t points = 0;
+  std::size_t used = 0;           ///< became hits
+  std::size_t not_finite = 0;     ///< NaN or infinite
+  std::size_t at_sensor = 0;      ///< within 1 mm of the sensor
+  std::size_t too_near = 0;       ///< nearer than sensor_model/min_range
+  std::size_t beyond_max = 0;     ///< farther than sensor_model/max_range
+  std::size_t outside_map = 0;    ///< too far from the map's origin for an index
+  std::size_t unknown_label = 0;  ///< not in the class table, and unknown_labels is ignore
+  std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
+  /// Labels not in the class table, whatever became of them (not part of the sum).
+  std::size_t labels_not_in_table = 0;
+};
+
+/// A scan after filtering and down-sampling.
+struct Observation {
+  LabelledPoints hits;
+  Beams beams;  ///< to each hit, then to the points where beams beyond max_range are cut
+  PointCounts counts;
+};
+
+/// @throws std::invalid_argument if the scan's labels are not as many as its points.
+Observation observe(const Scan& scan, const ClassTable& classes, const MapperConfig& config);
+
+}  // namespace bki_mapping

@@ -1,0 +1,54 @@
+/// @file The mapper: scans in, a map out.
+#pragma once
+
+#include <memory>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/config.h"
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/core/semantic_map.h"
+#include "bki_mapping/free_space/free_space_model.h"
+#include "bki_mapping/mapping/observation.h"
+
+namespace bki_mapping {
+
+/// What one scan did, and how long its phases took.
+struct ScanStats {
+  PointCounts counts;
+  std::size_t hits = 0;        ///< after down-sampling
+  std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
+  std::size_t blocks = 0;      ///< blocks touched
+  double observe_ms = 0.0;     ///< filtering, down-sampling
+  double evidence_ms = 0.0;    ///< sampling, binning, indexing
+  double collect_ms = 0.0;     ///< naming and allocating blocks
+  double update_ms = 0.0;      ///< adding to the blocks
+  double totalMs() const { return observe_ms + evidence_ms + collect_ms + update_ms; }
+};
+
+/// Owns a map and adds scans to it. Not for several threads at once; each call may use several inside.
+class SemanticMapper {
+ public:
+  /// @throws std::invalid_argument if a setting is not allowed, or needs an unlabelled class that the table
+  /// lacks.
+  SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes);
+
+  /// Adds one scan to the map. Bad points are left out and counted.
+  /// @throws std::invalid_argument if the scan's labels are not as many as its points, or its origin is not a
+  /// point that the map can hold; the map is then as it was.
+  ScanStats integrate(const Scan& scan);
+
+  /// Forgets all scans.
+  void reset() { map_.clear(); }
+
+  const SemanticMap& map() const { return map_; }
+  const ClassTable& classes() const { return *classes_; }
+  const MapperConfig& config() const { return config_; }
+
+ private:
+  MapperConfig config_;
+  std::shared_ptr<const ClassTable> classes_;
+  std::unique_ptr<FreeSpaceModel> free_space_;
+  SemanticMap map_;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,45 @@
+#include "bki_mapping/core/class_table.h"
+
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+namespace bki_mapping {
+
+ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
+    : name_(std::move(name)), classes_(std::move(classes)) {
+  std::string faults;
+  const auto fault = [&](const std::string& text) { faults += (faults.empty() ? "" : "; ") + text; };
+  if (classes_.empty()) fault("it has no class");
+  if (classes_.size() > kMaxClasses) fault("it has more than 254 classes");
+
+  place_of_id_.fill(-1);
+  std::set<std::string> names;
+  for (std::size_t place = 0; place < classes_.size(); ++place) {
+    const SemanticClass& c = classes_[place];
+    if (c.id >= kMaxClasses) fault("id " + std::to_string(c.id) + " is above 253");
+    if (place_of_id_[c.id] >= 0) fault("id " + std::to_string(c.id) + " is given twice");
+    place_of_id_[c.id] = static_cast<std::int16_t>(place);
+    if (!names.insert(c.name).second) fault("name '" + c.name + "' is given twice");
+    if (c.unlabelled && unlabelled_) fault("more than one class is flagged unlabelled");
+    if (c.unlabelled) unlabelled_ = c.id;
+    for (const std::uint32_t raw : c.raw) {
+      if (!class_of_raw_.emplace(raw, c.id).second) {
+        fault("raw label " + std::to_string(raw) + " is given twice");
+      }
+    }
+  }
+  if (!faults.empty()) throw std::invalid_argument("class table '" + name_ + "' is wrong: " + faults);
+}
+
+const SemanticClass* ClassTable::find(ClassId id) const {
+  return place_of_id_[id] < 0 ? nullptr : &classes_[static_cast<std::size_t>(place_of_id_[id])];
+}
+
+std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
+  const auto found = class_of_raw_.find(raw);
+  if (found == class_of_raw_.end()) return std::nullopt;
+  return found->second;
+}
+
+}  // namespace bki_mapping

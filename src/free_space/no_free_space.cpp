@@ -1,0 +1,17 @@
+#include "bki_mapping/free_space/modes.h"
+
+namespace bki_mapping {
+namespace {
+
+/// Maps hits alone: nothing is ever free.
+class NoFreeSpace : public FreeSpaceModel {
+  FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t) const override { return {}; }
+};
+
+}  // namespace
+
+std::unique_ptr<FreeSpaceModel> makeNoFreeSpace(const MapperConfig&) {
+  return std::make_unique<NoFreeSpace>();
+}
+
+}  // namespace bki_mapping

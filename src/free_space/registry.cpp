@@ -1,0 +1,42 @@
+#include "bki_mapping/free_space/registry.h"
+
+#include <map>
+#include <stdexcept>
+
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/free_space/modes.h"
+
+namespace bki_mapping {
+namespace {
+
+using Maker = std::unique_ptr<FreeSpaceModel> (*)(const MapperConfig&);
+
+const std::map<std::string, Maker>& registry() {
+  static const std::map<std::string, Maker> makers = {
+      {"none", makeNoFreeSpace},        // hits alone
+      {"even", makeEvenSamples},        // a sample every gap
+      {"uniform", makeUniformSamples},  // random samples, evenly along the beam
+      {"linear", makeLinearSamples},    // random samples, evenly over the plane
+      {"line", makeBeamLines},          // whole beams
+  };
+  return makers;
+}
+
+}  // namespace
+
+std::vector<std::string> freeSpaceModes() {
+  std::vector<std::string> names;
+  for (const auto& entry : registry()) names.push_back(entry.first);
+  return names;
+}
+
+std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const MapperConfig& config) {
+  const auto found = registry().find(config.free_space.mode);
+  if (found != registry().end()) return found->second(config);
+  std::string known;
+  for (const std::string& name : freeSpaceModes()) known += (known.empty() ? "" : ", ") + name;
+  throw std::invalid_argument("free_space/mode '" + config.free_space.mode + "' is unknown; known modes: " +
+                              known + nearestWord(config.free_space.mode, freeSpaceModes()));
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,57 @@
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "bki_mapping/inference/beam_index.h"
+
+namespace bki_mapping {
+namespace {
+
+namespace bg = boost::geometry;
+using Point = bg::model::point<float, 3, bg::cs::cartesian>;
+using Box = bg::model::box<Point>;
+using Value = std::pair<Point, std::uint32_t>;
+
+/// An R-tree of unit direction vectors, which have neither seam nor pole: the paper's retrieval, and the
+/// reference for BeamTable.
+class BeamRtree : public BeamIndex {
+ public:
+  explicit BeamRtree(const std::vector<Eigen::Vector3f>& directions) {
+    std::vector<Value> values;
+    values.reserve(directions.size());
+    for (const Eigen::Vector3f& u : directions) {
+      values.emplace_back(Point(u.x(), u.y(), u.z()), static_cast<std::uint32_t>(values.size()));
+    }
+    tree_ = Tree(values);  // packed
+  }
+
+  void query(const Eigen::Vector3f& centre, float radius, std::vector<std::uint32_t>& beams) const override {
+    beams.clear();
+    const float distance = centre.norm();
+    // Directions within the angle delta = asin(radius / distance) lie within the chord 2 sin(delta / 2).
+    float half = 2.0f;
+    if (distance > radius) half = 2.0f * std::sin(0.5f * std::asin(radius / distance)) + 1e-5f;
+    const Eigen::Vector3f q =
+        distance > radius ? Eigen::Vector3f(centre / distance) : Eigen::Vector3f::Zero();
+    const Box box(Point(q.x() - half, q.y() - half, q.z() - half),
+                  Point(q.x() + half, q.y() + half, q.z() + half));
+    for (auto found = tree_.qbegin(bg::index::intersects(box)); found != tree_.qend(); ++found) {
+      beams.push_back(found->second);
+    }
+  }
+
+ private:
+  using Tree = bg::index::rtree<Value, bg::index::linear<16>>;
+  Tree tree_;
+};
+
+}  // namespace
+
+std::unique_ptr<BeamIndex> makeBeamIndex(BeamIndexType type, const std::vector<Eigen::Vector3f>& directions) {
+  if (type == BeamIndexType::kRtree) return std::make_unique<BeamRtree>(directions);
+  return std::make_unique<BeamTable>(directions);
+}
+
+}  // namespace bki_mapping

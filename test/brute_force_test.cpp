@@ -1,0 +1,139 @@
+// The law: every mode and kernel equals the brute-force sum at every voxel, inside blocks and outside.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "reference/reference.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+/// The voxels that span all hits, the sensor and a margin of 1.2 m.
+std::pair<VoxelIndex, VoxelIndex> bounds(const Scan& scan, const GridGeometry& geometry) {
+  Eigen::Vector3d low = scan.origin, high = scan.origin;
+  for (const auto& point : scan.points) {
+    low = low.cwiseMin(scan.origin + point.cast<double>());
+    high = high.cwiseMax(scan.origin + point.cast<double>());
+  }
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(1.2);
+  return {geometry.voxelAt(low - margin), geometry.voxelAt(high + margin)};
+}
+
+float evidenceAt(const SemanticMap& map, const VoxelIndex& voxel, ClassId label) {
+  const Block* block = map.find(GridGeometry::blockOf(voxel));
+  const float* plane = block ? block->evidence(label) : nullptr;
+  return plane ? plane[GridGeometry::offsetInBlock(voxel)] : 0.0f;
+}
+
+void expectEqualsBruteForce(const Scan& scan, const MapperConfig& config, const std::string& what) {
+  const auto classes = reference::smallTable();
+  SemanticMapper mapper(config, classes);
+  mapper.integrate(scan);
+  const reference::ScanReference brute(scan, *classes, config);
+  const auto [low, high] = bounds(scan, mapper.map().geometry());
+  double free_seen = 0.0;
+  std::size_t faults = 0, inside = 0;
+  for (VoxelIndex v = low; v.z <= high.z; ++v.z) {
+    for (v.y = low.y; v.y <= high.y; ++v.y) {
+      for (v.x = low.x; v.x <= high.x; ++v.x) {
+        for (const int label : {0, 1, 2, 3, 255}) {
+          const auto id = static_cast<ClassId>(label);
+          const reference::Value truth = brute.evidence(v, id);
+          const double got = evidenceAt(mapper.map(), v, id);
+          const double tolerance = 2e-5 * config.kernel.scale + 2e-5 * truth.sum + truth.slack;
+          if (std::abs(got - truth.sum) > tolerance && ++faults < 5) {
+            ADD_FAILURE() << what << ": voxel " << v.x << ' ' << v.y << ' ' << v.z << " class " << label
+                          << " has evidence " << got << ", but the brute-force sum is " << truth.sum;
+          }
+          if (id == kFreeClass) free_seen += truth.sum;
+        }
+      }
+    }
+  }
+  EXPECT_EQ(faults, 0u) << what;
+  for (const auto& entry : mapper.map().entries()) {
+    const VoxelIndex first = GridGeometry::voxelOf(entry.index, 0);
+    inside += first.x + kBlockEdge > low.x && first.x <= high.x && first.y + kBlockEdge > low.y &&
+              first.y <= high.y && first.z + kBlockEdge > low.z && first.z <= high.z;
+  }
+  EXPECT_EQ(inside, mapper.map().size()) << what << ": blocks lie outside the scene";
+  EXPECT_EQ(free_seen > 0.0, config.free_space.mode != "none") << what;
+}
+
+MapperConfig withMode(const std::string& mode) {
+  MapperConfig config;
+  config.free_space.mode = mode;
+  config.free_space.gap = 0.4;
+  config.free_space.samples_per_beam = 3;
+  config.threads = 2;
+  return config;
+}
+
+class EveryScene : public testing::TestWithParam<std::size_t> {
+ protected:
+  reference::Scene scene_ = reference::nastyScenes(60)[GetParam()];
+};
+
+TEST_P(EveryScene, SampleModesEqualBruteForce) {
+  for (const std::string mode : {"none", "even", "uniform", "linear"}) {
+    for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+      MapperConfig config = withMode(mode);
+      config.kernel.type = kernel;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", " + mode);
+    }
+  }
+}
+
+TEST_P(EveryScene, LinesEqualBruteForce) {
+  for (const BeamWeight weight : {BeamWeight::kUniform, BeamWeight::kLinear, BeamWeight::kBilinear}) {
+    for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
+      MapperConfig config = withMode("line");
+      config.free_space.weight = weight;
+      config.free_space.extent = extent;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", line");
+      config.free_space.beam_index = BeamIndexType::kRtree;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", line by R-tree");
+    }
+  }
+}
+
+TEST_P(EveryScene, CountingLinesEqualBruteForce) {
+  MapperConfig config = withMode("line");
+  config.kernel.type = KernelType::kCounting;
+  config.free_space.weight = BeamWeight::kUniform;
+  for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
+    config.free_space.extent = extent;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", counting line");
+  }
+}
+
+TEST_P(EveryScene, OtherSizesEqualBruteForce) {
+  MapperConfig config = withMode("line");
+  config.resolution = 0.25;
+  config.kernel.length = 0.6;
+  config.kernel.scale = 3.0;
+  config.downsample_resolution = 0.0;
+  expectEqualsBruteForce(scene_.scan, config, scene_.name + ", long kernel");
+  config.kernel.length = 0.15;
+  expectEqualsBruteForce(scene_.scan, config, scene_.name + ", short kernel");
+}
+
+TEST_P(EveryScene, RangeLimitsEqualBruteForce) {
+  MapperConfig config = withMode("line");
+  config.sensor_model.min_range = 0.2;
+  config.sensor_model.max_range = 2.0;
+  expectEqualsBruteForce(scene_.scan, config, scene_.name + ", cut");
+  config.sensor_model.clear_beyond_max_range = false;
+  config.unlabelled_points = UnlabelledPoints::kIgnore;
+  if (scene_.name != "seam" && scene_.name != "poles" && scene_.name != "cluster") {
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", not cut");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Nasty, EveryScene, testing::Range<std::size_t>(0, reference::nastyScenes(1).size()));
+
+}  // namespace
+}  // namespace bki_mapping

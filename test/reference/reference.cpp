@@ -1,0 +1,207 @@
+#include "reference/reference.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bki_mapping/inference/counter_random.h"
+
+namespace bki_mapping::reference {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+/// Comparisons nearer than this are left open: single precision cannot tell.
+constexpr double kClose = 2e-5;
+
+}  // namespace
+
+double sparseKernel(double d, double length, double scale) {
+  const double r = d / length;
+  if (r >= 1.0) return 0.0;
+  return scale * ((2.0 + std::cos(2.0 * kPi * r)) / 3.0 * (1.0 - r) + std::sin(2.0 * kPi * r) / (2.0 * kPi));
+}
+
+std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<Point>& points, double cell) {
+  if (cell == 0.0) return points;
+  using Key = std::tuple<int, int, int>;
+  std::map<Key, std::vector<Point>> cells;
+  std::vector<Key> order;
+  for (const Point& point : points) {
+    const Eigen::Vector3d g = (origin + point.p) / cell;
+    const Key key(static_cast<int>(std::floor(g.x())), static_cast<int>(std::floor(g.y())),
+                  static_cast<int>(std::floor(g.z())));
+    if (cells[key].empty()) order.push_back(key);
+    cells[key].push_back(point);
+  }
+  std::vector<Point> result;
+  for (const Key& key : order) {
+    Point merged{Eigen::Vector3d::Zero(), 0};
+    std::map<int, int> votes;
+    for (const Point& point : cells[key]) {
+      merged.p += point.p / static_cast<double>(cells[key].size());
+      ++votes[point.label];
+    }
+    int most = 0;
+    for (const auto& [label, count] : votes) {
+      if (count > most) {
+        most = count;
+        merged.label = label;
+      }
+    }
+    result.push_back(merged);
+  }
+  return result;
+}
+
+ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config)
+    : config_(config), geometry_(config.resolution), origin_(scan.origin) {
+  const double max_range = config.sensor_model.max_range;
+  std::vector<Point> raw, cut;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d p = scan.points[i].cast<double>();
+    const double range = p.norm();
+    if (!p.allFinite() || range < 1e-3 || range < config.sensor_model.min_range) continue;
+    if (max_range > 0.0 && range > max_range) {
+      if (config.sensor_model.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
+      continue;
+    }
+    auto id = classes.classOfRaw(scan.labels[i]);
+    if (!id && config.unknown_labels == UnknownLabels::kUnlabelled) id = classes.unlabelled();
+    if (!id || (id == classes.unlabelled() && config.unlabelled_points == UnlabelledPoints::kIgnore))
+      continue;
+    raw.push_back({p, *id});
+  }
+  hits_ = downsample(origin_, raw, config.downsample_resolution);
+  for (const Point& hit : hits_) beams_.push_back(hit.p);
+  for (const Point& end : downsample(origin_, cut, config.downsample_resolution)) beams_.push_back(end.p);
+  drawSamples(scan.stamp);
+}
+
+void ScanReference::drawSamples(std::uint64_t stamp) {
+  const FreeSpaceConfig& c = config_.free_space;
+  std::vector<Point> all;
+  for (std::size_t b = 0; b < beams_.size(); ++b) {
+    const double length = beams_[b].norm();
+    const auto sample = [&](double distance) { all.push_back({beams_[b] / length * distance, 255}); };
+    if (c.mode == "even") {
+      for (int n = 1; n * c.gap < length; ++n) sample(n * c.gap);
+    } else if (c.mode == "uniform" || c.mode == "linear") {
+      for (int n = 0; n < c.samples_per_beam; ++n) {
+        const double u =
+            counterRandom(static_cast<std::uint64_t>(c.seed), stamp, b, static_cast<std::uint64_t>(n));
+        sample(length * (c.mode == "linear" ? std::sqrt(u) : u));
+      }
+    }
+  }
+  samples_ = downsample(origin_, all, config_.downsample_resolution);
+}
+
+Eigen::Vector3d ScanReference::relativeCentre(const VoxelIndex& voxel) const {
+  return Eigen::Vector3d(voxel.x + 0.5, voxel.y + 0.5, voxel.z + 0.5) * config_.resolution - origin_;
+}
+
+Value ScanReference::pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel,
+                                   int label) const {
+  const Eigen::Vector3d centre = relativeCentre(voxel);
+  Value value;
+  for (const Point& point : points) {
+    if (point.label != label) continue;
+    if (config_.kernel.type == KernelType::kSparse) {
+      value.sum += sparseKernel((point.p - centre).norm(), config_.kernel.length, config_.kernel.scale);
+      continue;
+    }
+    // The voxel holds the point if the offset from its centre is in [-half, half) on each axis.
+    const Eigen::Array3d offset = (point.p - centre).array() / config_.resolution;
+    const double outside = offset.abs().maxCoeff() - 0.5;
+    if (outside < -kClose) value.sum += 1.0;
+    if (std::abs(outside) <= kClose) value.slack += 1.0;
+  }
+  return value;
+}
+
+bool ScanReference::reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho,
+                            double& k) const {
+  const double length = beam.norm();
+  const Eigen::Vector3d u = beam / length;
+  rho = centre.dot(u) / length;
+  if (config_.kernel.type == KernelType::kSparse) {
+    const double d = (centre - centre.dot(u) * u).norm();
+    k = sparseKernel(d, config_.kernel.length, config_.kernel.scale);
+    return d < config_.kernel.length;
+  }
+  // The half-line crosses the cube if some piece of it is inside all three slabs.
+  double enter = 0.0, leave = 1e300;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (centre[axis] - config_.resolution / 2) / u[axis];
+    const double b = (centre[axis] + config_.resolution / 2) / u[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  k = 1.0;
+  return enter <= leave;
+}
+
+bool ScanReference::blockIsHit(const BlockIndex& block) const {
+  const auto key = std::make_tuple(block.x, block.y, block.z);
+  const auto known = hit_blocks_.find(key);
+  if (known != hit_blocks_.end()) return known->second;
+  bool hit = false;
+  for (int offset = 0; offset < kBlockVoxels && !hit; ++offset) {
+    const Eigen::Vector3d centre = relativeCentre(GridGeometry::voxelOf(block, offset));
+    for (const Point& point : hits_) {
+      const Eigen::Vector3d d = point.p - centre;
+      hit = config_.kernel.type == KernelType::kSparse ? d.norm() < config_.kernel.length
+                                                       : d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      if (hit) break;
+    }
+  }
+  return hit_blocks_[key] = hit;
+}
+
+Value ScanReference::lineEvidence(const VoxelIndex& voxel) const {
+  Value value;
+  if (config_.free_space.extent == FreeSpaceExtent::kMapped && !blockIsHit(GridGeometry::blockOf(voxel))) {
+    return value;
+  }
+  const Eigen::Vector3d centre = relativeCentre(voxel);
+  for (const Eigen::Vector3d& beam : beams_) {
+    double rho = 0.0, k = 0.0;
+    if (!reaches(beam, centre, rho, k)) continue;
+    const bool close = std::min(std::abs(rho), std::abs(1.0 - rho)) < kClose;
+    if (close) value.slack += k;
+    if (close || rho <= 0.0 || rho >= 1.0) continue;
+    switch (config_.free_space.weight) {
+      case BeamWeight::kUniform:
+        value.sum += k;
+        break;
+      case BeamWeight::kLinear:
+        value.sum += rho * k;
+        break;
+      case BeamWeight::kBilinear:
+        value.sum += std::min(rho, 1.0 - rho) * k;
+        break;
+    }
+  }
+  return value;
+}
+
+Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
+  if (label != kFreeClass) return pointEvidence(hits_, voxel, label);
+  return config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
+}
+
+int ScanReference::occluded(const VoxelIndex& voxel, double range) const {
+  const Eigen::Vector3d centre = relativeCentre(voxel);
+  bool behind = false, close = false;
+  for (const Eigen::Vector3d& beam : beams_) {
+    double rho = 0.0, k = 0.0;
+    if (!reaches(beam, centre, rho, k)) continue;
+    if (k < 1e-9) close = true;
+    if (std::min(std::abs(rho), std::abs(1.0 - rho)) < kClose) close = true;
+    if (std::abs(rho * beam.norm() - range) < kClose) close = true;
+    if (rho > 0.0 && rho < 1.0) return close ? -2 : 0;
+    if (rho >= 1.0 && rho * beam.norm() <= range) behind = true;
+  }
+  return close ? -2 : (behind ? 1 : -1);
+}
+
+}  // namespace bki_mapping::reference

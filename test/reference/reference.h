@@ -1,0 +1,64 @@
+/// @file The slow, obvious mapper that every fast path is held to: brute-force sums in double precision,
+/// written from the formulas alone.
+#pragma once
+
+#include <map>
+#include <tuple>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/config.h"
+#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/core/scan.h"
+
+namespace bki_mapping::reference {
+
+/// A sum, and the part of it that hangs on comparisons too close to call in single precision.
+struct Value {
+  double sum = 0.0;
+  double slack = 0.0;
+};
+
+struct Point {
+  Eigen::Vector3d p;  ///< relative to the sensor [m]
+  int label;
+};
+
+/// k(d) in double precision. @param d, length [m].
+double sparseKernel(double d, double length, double scale);
+
+std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<Point>& points, double cell);
+
+/// One scan, ready to be summed at any voxel.
+class ScanReference {
+ public:
+  ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config);
+
+  /// Evidence that this scan adds to a class (kFreeClass for free) at a voxel.
+  Value evidence(const VoxelIndex& voxel, ClassId label) const;
+  /// Whether the scan sees a voxel only behind ends of beams: 1 yes, 0 crossed, -1 not reached, -2 too close
+  /// to call. Shadows end at `range` [m].
+  int occluded(const VoxelIndex& voxel, double range) const;
+
+  const std::vector<Point>& hits() const { return hits_; }
+  const std::vector<Point>& samples() const { return samples_; }
+  const std::vector<Eigen::Vector3d>& beams() const { return beams_; }
+
+ private:
+  Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
+  Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
+  Value lineEvidence(const VoxelIndex& voxel) const;
+  bool blockIsHit(const BlockIndex& block) const;
+  void drawSamples(std::uint64_t stamp);
+  /// Whether the beam's line reaches the voxel, and rho and k there.
+  bool reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho, double& k) const;
+
+  MapperConfig config_;
+  GridGeometry geometry_;
+  Eigen::Vector3d origin_;
+  std::vector<Point> hits_, samples_;
+  std::vector<Eigen::Vector3d> beams_;
+  mutable std::map<std::tuple<int, int, int>, bool> hit_blocks_;
+};
+
+}  // namespace bki_mapping::reference
