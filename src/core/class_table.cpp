@@ -23,6 +23,8 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
     if (!names.insert(c.name).second) fault("name '" + c.name + "' is given twice");
     if (c.unlabelled && unlabelled_) fault("more than one class is flagged unlabelled");
     if (c.unlabelled) unlabelled_ = c.id;
+    if (c.any_raw && any_raw_) fault("more than one class takes all other raw labels");
+    if (c.any_raw) any_raw_ = c.id;
     for (const std::uint32_t raw : c.raw) {
       if (!class_of_raw_.emplace(raw, c.id).second) {
         fault("raw label " + std::to_string(raw) + " is given twice");
@@ -38,7 +40,7 @@ const SemanticClass* ClassTable::find(ClassId id) const {
 
 std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
   const auto found = class_of_raw_.find(raw);
-  if (found == class_of_raw_.end()) return std::nullopt;
+  if (found == class_of_raw_.end()) return any_raw_;
   return found->second;
 }
 

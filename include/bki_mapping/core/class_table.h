@@ -17,15 +17,16 @@ struct SemanticClass {
   std::string name;                     ///< unique in the table
   std::array<std::uint8_t, 3> color{};  ///< red, green, blue
   std::vector<std::uint32_t> raw;       ///< label numbers in the data set that mean this class
-  bool unlabelled = false;              ///< hits of no known class; at most one class has this
-  bool dynamic = false;                 ///< things of this class can move
+  bool any_raw = false;     ///< means all label numbers that no class lists; at most one class has this
+  bool unlabelled = false;  ///< hits of no known class; at most one class has this
+  bool dynamic = false;     ///< things of this class can move
 };
 
 /// Maps label numbers of clouds to classes. Immutable.
 class ClassTable {
  public:
   /// @throws std::invalid_argument that lists every fault: no class, more than 254, an id, name or raw
-  /// number given twice, an id above 253, two unlabelled classes.
+  /// number given twice, an id above 253, two unlabelled or catch-all classes.
   ClassTable(std::string name, std::vector<SemanticClass> classes);
 
   const std::string& name() const { return name_; }
@@ -45,6 +46,7 @@ class ClassTable {
   std::array<std::int16_t, 256> place_of_id_;
   std::unordered_map<std::uint32_t, ClassId> class_of_raw_;
   std::optional<ClassId> unlabelled_;
+  std::optional<ClassId> any_raw_;
 };
 
 }  // namespace bki_mapping

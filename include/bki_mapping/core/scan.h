@@ -1,8 +1,9 @@
 /// @file One labelled lidar scan.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace bki_mapping {
@@ -20,5 +21,20 @@ struct Scan {
   /// same seed draw the same numbers, whatever their order.
   std::uint64_t stamp = 0;
 };
+
+/// A scan from points of the sensor's own frame.
+/// @param T_map_sensor pose of the sensor in the map frame. @param points in the sensor frame [m].
+inline Scan scanFromSensorFrame(const Eigen::Isometry3d& T_map_sensor,
+                                const std::vector<Eigen::Vector3f>& points, std::vector<std::uint32_t> labels,
+                                std::uint64_t stamp) {
+  Scan scan;
+  scan.origin = T_map_sensor.translation();
+  scan.labels = std::move(labels);
+  scan.stamp = stamp;
+  const Eigen::Matrix3f rotation = T_map_sensor.linear().cast<float>();
+  scan.points.reserve(points.size());
+  for (const Eigen::Vector3f& point : points) scan.points.push_back(rotation * point);
+  return scan;
+}
 
 }  // namespace bki_mapping

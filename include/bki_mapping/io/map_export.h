@@ -1,0 +1,36 @@
+/// @file Maps as PLY and PCD files.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/map_query.h"
+
+namespace bki_mapping {
+
+/// One voxel as files have it; docs/files.md describes the fields.
+struct VoxelRecord {
+  float x, y, z;  ///< centre, map frame [m]
+  std::uint8_t red, green, blue;
+  std::uint16_t label;  ///< class id; 255 unless occupied
+  std::uint8_t state;   ///< VoxelState
+  float probability, variance, entropy, evidence;
+};
+
+/// The states named in a list like "occupied,free". @throws std::invalid_argument on any other word.
+std::set<VoxelState> parseStates(const std::string& list);
+
+/// The voxels in the given states, blocks in sorted order.
+std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
+                                       const std::set<VoxelState>& states);
+
+/// Writes a map file whole or not at all; the ending chooses the format, .ply or .pcd (both binary).
+/// @throws std::invalid_argument on another ending, std::runtime_error if the file cannot be written.
+void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+               const std::set<VoxelState>& states);
+/// @throws std::invalid_argument if exportMap would refuse the ending.
+void checkMapFileName(const std::string& path);
+
+}  // namespace bki_mapping

@@ -1,0 +1,36 @@
+/// @file Command lines: one way to parse them and to fail.
+#pragma once
+
+#include <boost/program_options.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/config.h"
+
+namespace bki_mapping::tools {
+
+namespace po = boost::program_options;
+
+/// Parses a command line that has named options only; adds --help. A misspelt option is refused by name, with
+/// the nearest known one.
+/// @return nothing if help was asked for (and printed). @throws std::invalid_argument in one sentence.
+std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
+                                         po::options_description options);
+
+/// Options that tools with a mapper share: --classes, --config, --set, --threads.
+po::options_description mapperOptions();
+/// The settings that those options ask for. @throws std::invalid_argument.
+MapperConfig mapperConfig(const po::variables_map& given);
+std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
+
+/// Runs a program; an exception becomes one line on standard error and exit status 1.
+int run(const std::string& program, const std::function<int()>& body);
+
+/// A progress bar on standard error if that is a terminal, nothing otherwise.
+void showProgress(std::size_t done, std::size_t all, const std::string& text);
+
+}  // namespace bki_mapping::tools

@@ -1,0 +1,104 @@
+#include "bki_mapping/io/class_table_yaml.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/io/share_path.h"
+
+namespace bki_mapping {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path classFolder() {
+  return fs::path(sharePath()) / "config" / "classes";
+}
+
+std::vector<std::string> knownTables() {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(classFolder(), ignored)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string findFile(const std::string& name_or_file) {
+  if (fs::is_regular_file(name_or_file)) return name_or_file;
+  const fs::path known = classFolder() / (name_or_file + ".yaml");
+  if (name_or_file.find('/') == std::string::npos && fs::is_regular_file(known)) return known.string();
+  std::string text = "class table '" + name_or_file + "' is neither a file nor one of:";
+  for (const std::string& name : knownTables()) text += " " + name;
+  throw std::invalid_argument(text + nearestWord(name_or_file, knownTables()));
+}
+
+[[noreturn]] void fail(const std::string& file, const std::string& why) {
+  throw std::invalid_argument("class table " + file + ": " + why);
+}
+
+void setFlag(const std::string& file, const std::string& flag, SemanticClass& c) {
+  if (flag == "unlabelled") {
+    c.unlabelled = true;
+  } else if (flag == "dynamic") {
+    c.dynamic = true;
+  } else {
+    fail(file, "flag '" + flag + "' is unknown" + nearestWord(flag, {"unlabelled", "dynamic"}));
+  }
+}
+
+std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::string& what) {
+  const int value = node.as<int>();
+  if (value < 0 || value > 255) fail(file, what + " " + std::to_string(value) + " is not in 0 to 255");
+  return static_cast<std::uint8_t>(value);
+}
+
+SemanticClass parseClass(const std::string& file, const YAML::Node& node) {
+  const std::vector<std::string> keys = {"id", "name", "color", "raw", "flags"};
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>();
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      fail(file, "key '" + key + "' of a class is unknown" + nearestWord(key, keys));
+    }
+  }
+  for (const char* key : {"id", "name", "color"}) {
+    if (!node[key]) fail(file, std::string("a class has no '") + key + "'");
+  }
+  SemanticClass c;
+  c.id = byteOf(file, node["id"], "id");
+  c.name = node["name"].as<std::string>();
+  if (node["color"].size() != 3) fail(file, "the color of class '" + c.name + "' is not [red, green, blue]");
+  for (std::size_t i = 0; i < 3; ++i) c.color[i] = byteOf(file, node["color"][i], "color");
+  if (!node["raw"]) {
+    c.raw = {c.id};
+  } else if (node["raw"].IsScalar() && node["raw"].as<std::string>() == "any") {
+    c.any_raw = true;
+  } else {
+    c.raw = node["raw"].as<std::vector<std::uint32_t>>();
+  }
+  for (const YAML::Node& flag : node["flags"]) setFlag(file, flag.as<std::string>(), c);
+  return c;
+}
+
+}  // namespace
+
+ClassTable loadClassTable(const std::string& name_or_file) {
+  const std::string file = findFile(name_or_file);
+  try {
+    const YAML::Node root = YAML::LoadFile(file);
+    if (!root.IsMap() || !root["classes"].IsSequence()) fail(file, "it must be a map with a list 'classes'");
+    std::vector<SemanticClass> classes;
+    for (const YAML::Node& node : root["classes"]) classes.push_back(parseClass(file, node));
+    return ClassTable(root["name"] ? root["name"].as<std::string>() : fs::path(file).stem().string(),
+                      classes);
+  } catch (const YAML::Exception& error) {
+    fail(file, error.what());
+  }
+}
+
+}  // namespace bki_mapping

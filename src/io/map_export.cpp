@@ -1,0 +1,146 @@
+#include "bki_mapping/io/map_export.h"
+
+#include <pcl/io/pcd_io.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "bki_mapping/core/voxel_color.h"
+#include "bki_mapping/io/atomic_file.h"
+
+namespace bki_mapping {
+namespace {
+
+const char kPlyProperties[] =
+    "property float x\nproperty float y\nproperty float z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    "property ushort label\nproperty uchar state\n"
+    "property float probability\nproperty float variance\nproperty float entropy\nproperty float evidence\n";
+
+/// Appends a value's bytes, little-endian (as all hosts that ROS 1 supports are).
+template <typename T>
+void append(std::string& bytes, T value) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, double resolution) {
+  std::ostringstream header;
+  header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
+         << " m, map frame\nelement vertex " << voxels.size() << "\n"
+         << kPlyProperties << "end_header\n";
+  std::string bytes;
+  for (const VoxelRecord& v : voxels) {
+    for (const float c : {v.x, v.y, v.z}) append(bytes, c);
+    for (const std::uint8_t c : {v.red, v.green, v.blue}) append(bytes, c);
+    append(bytes, v.label);
+    append(bytes, v.state);
+    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) append(bytes, f);
+  }
+  std::ofstream out(path, std::ios::binary);
+  out << header.str();
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) throw std::runtime_error(path + " cannot be written; check rights and free space");
+}
+
+void writePcd(const std::string& path, const std::vector<VoxelRecord>& voxels) {
+  pcl::PCLPointCloud2 cloud;
+  using Field = pcl::PCLPointField;
+  std::uint32_t step = 0;
+  const auto field = [&](const char* name, std::uint8_t type, std::uint32_t size) {
+    pcl::PCLPointField f;
+    f.name = name;
+    f.offset = step;
+    f.datatype = type;
+    f.count = 1;
+    cloud.fields.push_back(f);
+    step += size;
+  };
+  for (const char* name : {"x", "y", "z"}) field(name, Field::FLOAT32, 4);
+  field("rgb", Field::UINT32, 4);
+  field("label", Field::UINT16, 2);
+  field("state", Field::UINT8, 1);
+  for (const char* name : {"probability", "variance", "entropy", "evidence"}) field(name, Field::FLOAT32, 4);
+  std::string bytes;
+  for (const VoxelRecord& v : voxels) {
+    for (const float c : {v.x, v.y, v.z}) append(bytes, c);
+    append(bytes, std::uint32_t{v.red} << 16 | std::uint32_t{v.green} << 8 | v.blue);
+    append(bytes, v.label);
+    append(bytes, v.state);
+    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) append(bytes, f);
+  }
+  cloud.point_step = step;
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(voxels.size());
+  cloud.row_step = step * cloud.width;
+  cloud.is_dense = true;
+  cloud.data.assign(bytes.begin(), bytes.end());
+  if (pcl::PCDWriter().writeBinary(path, cloud) != 0) {
+    throw std::runtime_error(path + " cannot be written; check rights and free space");
+  }
+}
+
+std::string endingOf(const std::string& path) {
+  return std::filesystem::path(path).extension().string();
+}
+
+}  // namespace
+
+std::set<VoxelState> parseStates(const std::string& list) {
+  std::set<VoxelState> states;
+  std::istringstream words(list);
+  for (std::string word; std::getline(words, word, ',');) {
+    if (word == "occupied") {
+      states.insert(VoxelState::kOccupied);
+    } else if (word == "free") {
+      states.insert(VoxelState::kFree);
+    } else if (word == "occluded") {
+      states.insert(VoxelState::kOccluded);
+    } else {
+      throw std::invalid_argument("voxel state '" + word +
+                                  "' is unknown; known states: occupied, free, occluded");
+    }
+  }
+  return states;
+}
+
+std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
+                                       const std::set<VoxelState>& states) {
+  std::vector<VoxelRecord> voxels;
+  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
+    if (states.count(view.state) == 0) return;
+    const Eigen::Vector3f centre = map.geometry().voxelCentre(index).cast<float>();
+    const Color color = semanticColor(view, classes);
+    voxels.push_back({centre.x(), centre.y(), centre.z(), color[0], color[1], color[2], view.label,
+                      static_cast<std::uint8_t>(view.state), view.probability, view.variance, view.entropy,
+                      view.evidence});
+  });
+  return voxels;
+}
+
+void checkMapFileName(const std::string& path) {
+  const std::string ending = endingOf(path);
+  if (ending != ".ply" && ending != ".pcd") {
+    throw std::invalid_argument("map file '" + path + "' must end in .ply or .pcd");
+  }
+}
+
+void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+               const std::set<VoxelState>& states) {
+  checkMapFileName(path);
+  const std::vector<VoxelRecord> voxels = collectVoxels(map, classes, states);
+  AtomicFile file(path);
+  if (endingOf(path) == ".ply") {
+    writePly(file.temporaryPath(), voxels, map.geometry().resolution());
+  } else {
+    writePcd(file.temporaryPath(), voxels);
+  }
+  file.commit();
+}
+
+}  // namespace bki_mapping

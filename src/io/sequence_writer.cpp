@@ -1,0 +1,70 @@
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/sequence.h"
+
+namespace bki_mapping {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename T>
+void writeBinary(const fs::path& path, const std::vector<T>& values) {
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(values.data()),
+            static_cast<std::streamsize>(values.size() * sizeof(T)));
+  out.close();
+  if (!out) throw std::runtime_error(path.string() + " cannot be written; check rights and free space");
+}
+
+}  // namespace
+
+SequenceWriter::SequenceWriter(const std::string& folder) : folder_(folder) {
+  for (const char* name : {"velodyne", "labels"}) {
+    const fs::path path = fs::path(folder) / name;
+    std::error_code error;
+    fs::create_directories(path, error);
+    if (error) throw std::runtime_error(path.string() + " cannot be made: " + error.message());
+    if (!fs::is_empty(path)) {
+      throw std::runtime_error(path.string() +
+                               " is not empty; give a new folder, or remove the old scans first");
+    }
+  }
+}
+
+void SequenceWriter::write(const SequenceFrame& frame) {
+  char name[16];
+  std::snprintf(name, sizeof(name), "%06zu", count_++);
+  std::vector<float> values;
+  values.reserve(4 * frame.points.size());
+  for (std::size_t i = 0; i < frame.points.size(); ++i) {
+    values.insert(values.end(),
+                  {frame.points[i].x(), frame.points[i].y(), frame.points[i].z(), frame.remissions[i]});
+  }
+  writeBinary(fs::path(folder_) / "velodyne" / (std::string(name) + ".bin"), values);
+  writeBinary(fs::path(folder_) / "labels" / (std::string(name) + ".label"), frame.labels);
+
+  std::ostringstream pose, time;
+  pose.precision(17);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      pose << (row + column ? " " : "") << frame.T_map_sensor.matrix()(row, column);
+    }
+  }
+  time.precision(9);
+  time << std::fixed << static_cast<double>(frame.stamp - Sequence::kFirstStamp) * 1e-9;
+  poses_ += pose.str() + "\n";
+  times_ += time.str() + "\n";
+}
+
+void SequenceWriter::finish() {
+  writeTextFile((fs::path(folder_) / "poses.txt").string(), poses_);
+  writeTextFile((fs::path(folder_) / "times.txt").string(), times_);
+  writeTextFile((fs::path(folder_) / "calib.txt").string(), "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,74 @@
+// Maps a sequence in SemanticKITTI's layout, without ROS: scans in, a map file and a report out.
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+
+#include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/map_export.h"
+#include "bki_mapping/io/report.h"
+#include "bki_mapping/io/sequence.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/tools/options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
+  options.add_options()("sequence", text("DIR")->required(),
+                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
+      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
+      "first", number("N")->default_value(0), "first scan to map")(
+      "scans", number("N"), "how many; default all")("output", text("FILE.ply|FILE.pcd"),
+                                                     "map file to write")(
+      "include", text("STATES")->default_value("occupied"), "voxels in the map file: occupied,free,occluded")(
+      "report", text("FILE.json"), "report to write");
+  options.add(tools::mapperOptions());
+  return options;
+}
+
+std::string progressText(const ScanReport& scan) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << scan.stats.totalMs() << " ms";
+  return text.str();
+}
+
+int mapSequence(const po::variables_map& given) {
+  const auto states = parseStates(given["include"].as<std::string>());
+  if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
+  SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
+  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+
+  const std::size_t first = given["first"].as<std::size_t>();
+  if (first >= sequence.size()) {
+    throw std::invalid_argument("--first " + std::to_string(first) + " is beyond the last of " +
+                                std::to_string(sequence.size()) + " scans");
+  }
+  std::size_t count = sequence.size() - first;
+  if (given.count("scans")) count = std::min(count, given["scans"].as<std::size_t>());
+
+  std::vector<ScanReport> scans;
+  for (std::size_t i = first; i < first + count; ++i) {
+    scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
+    tools::showProgress(scans.size(), count, progressText(scans.back()));
+  }
+  if (given.count("output"))
+    exportMap(given["output"].as<std::string>(), mapper.map(), mapper.classes(), states);
+  if (given.count("report")) writeTextFile(given["report"].as<std::string>(), reportJson(mapper, scans));
+  std::cout << summaryText(mapper, scans);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("map_sequence", [&] {
+    const auto given = tools::parse(argc, argv, "Maps a sequence in SemanticKITTI's layout.", options());
+    return given ? mapSequence(*given) : 0;
+  });
+}

@@ -1,0 +1,91 @@
+#include "bki_mapping/tools/options.h"
+
+#include <unistd.h>
+
+#include <iostream>
+#include <stdexcept>
+
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/config_yaml.h"
+
+namespace bki_mapping::tools {
+
+std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
+                                         po::options_description options) {
+  options.add_options()("help,h", "print this help");
+  auto given = std::make_unique<po::variables_map>();
+  try {
+    const int style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
+    const auto parsed =
+        po::command_line_parser(argc, argv).options(options).positional({}).style(style).run();
+    po::store(parsed, *given);
+    if (given->count("help")) {
+      std::cout << what << "\n\n" << options;
+      return nullptr;
+    }
+    po::notify(*given);
+  } catch (const po::unknown_option& error) {
+    std::vector<std::string> known;
+    for (const auto& option : options.options()) known.push_back("--" + option->long_name());
+    const std::string name = error.get_option_name();
+    throw std::invalid_argument("option '" + name + "' is unknown" + nearestWord(name, known) +
+                                " (see --help)");
+  } catch (const po::error& error) {
+    throw std::invalid_argument(std::string(error.what()) + " (see --help)");
+  }
+  return given;
+}
+
+po::options_description mapperOptions() {
+  po::options_description options("Mapper");
+  options.add_options()("classes",
+                        po::value<std::string>()->default_value("semantic_kitti")->value_name("NAME|FILE"),
+                        "class table: a name of config/classes, or a YAML file")(
+      "config", po::value<std::string>()->value_name("FILE"), "YAML file of parameters")(
+      "set", po::value<std::vector<std::string>>()->value_name("NAME=VALUE")->composing(),
+      "set a parameter (after --config); may be given often")(
+      "threads", po::value<std::string>()->value_name("N"), "threads of the update; 0 takes all cores");
+  return options;
+}
+
+MapperConfig mapperConfig(const po::variables_map& given) {
+  MapperConfig config;
+  if (given.count("config")) setParameters(config, loadParameterFile(given["config"].as<std::string>()));
+  std::map<std::string, std::string> values;
+  if (given.count("set")) {
+    for (const std::string& setting : given["set"].as<std::vector<std::string>>()) {
+      const std::size_t equals = setting.find('=');
+      if (equals == std::string::npos) {
+        throw std::invalid_argument("--set " + setting + " has no '='; write --set name=value");
+      }
+      values[setting.substr(0, equals)] = setting.substr(equals + 1);
+    }
+  }
+  if (given.count("threads")) values["threads"] = given["threads"].as<std::string>();
+  setParameters(config, values);
+  return config;
+}
+
+std::shared_ptr<const ClassTable> classTable(const po::variables_map& given) {
+  return std::make_shared<const ClassTable>(loadClassTable(given["classes"].as<std::string>()));
+}
+
+int run(const std::string& program, const std::function<int()>& body) {
+  try {
+    return body();
+  } catch (const std::exception& error) {
+    std::cerr << program << ": " << error.what() << "\n";
+    return 1;
+  }
+}
+
+void showProgress(std::size_t done, std::size_t all, const std::string& text) {
+  if (!isatty(STDERR_FILENO)) return;
+  constexpr std::size_t kWidth = 30;
+  const std::size_t filled = all == 0 ? kWidth : kWidth * done / all;
+  std::cerr << "\r[" << std::string(filled, '#') << std::string(kWidth - filled, ' ') << "] " << done << "/"
+            << all << " " << text << (done == all ? "\n" : "") << std::flush;
+}
+
+}  // namespace bki_mapping::tools
