@@ -13,6 +13,9 @@ add_library(bki_mapping_io
   src/io/sequence_reader.cpp
   src/io/sequence_writer.cpp
   src/io/share_path.cpp
+  src/simulation/lidar.cpp
+  src/simulation/scene.cpp
+  src/simulation/street.cpp
   src/tools/options.cpp
 )
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
@@ -28,3 +31,4 @@ function(bki_mapping_tool name)
   bki_mapping_warnings(${name})
 endfunction()
 bki_mapping_tool(map_sequence)
+bki_mapping_tool(simulate_drive)

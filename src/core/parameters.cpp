@@ -204,7 +204,7 @@ void setParameters(MapperConfig& config, const std::map<std::string, std::string
       }
       parameters[static_cast<std::size_t>(found - names.begin())].set(changed, value);
     } catch (const std::invalid_argument& fault) {
-      faults += (faults.empty() ? "" : "\n") + std::string(fault.what());
+      faults += (faults.empty() ? "" : "; ") + std::string(fault.what());
     }
   }
   if (!faults.empty()) throw std::invalid_argument(faults);

@@ -1,0 +1,117 @@
+#include "bki_mapping/simulation/lidar.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bki_mapping/inference/counter_random.h"
+#include "bki_mapping/inference/parallel_for.h"
+
+namespace bki_mapping::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Return {
+  double range = 0.0;  ///< [m]; 0: none
+  std::uint32_t label = 0;
+};
+
+/// Standard normal number from a counter (Box and Muller 1958).
+double normal(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam) {
+  const double u = 1.0 - counterRandom(seed, scan, beam, 0), v = counterRandom(seed, scan, beam, 1);
+  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * kPi * v);
+}
+
+Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const Eigen::Vector3d& origin,
+            const Eigen::Vector3d& direction, double time, double max_range) {
+  Return nearest{max_range, 0};
+  if (direction.z() < 0.0 && -origin.z() / direction.z() < nearest.range) {
+    nearest.range = -origin.z() / direction.z();
+    nearest.label = scene.ground.labelAt(origin.y() + nearest.range * direction.y());
+  }
+  for (const Shape* shape : shapes) {
+    const auto range = shape->hit(origin, direction, time);
+    if (range && *range < nearest.range) nearest = {*range, shape->label};
+  }
+  return nearest.range < max_range ? nearest : Return{};
+}
+
+/// The shapes that a vertical fan of beams may meet.
+std::vector<const Shape*> shapesInFan(const Scene& scene, const Eigen::Vector3d& origin,
+                                      const Eigen::Vector3d& direction, double time, double max_range) {
+  std::vector<const Shape*> shapes;
+  const Eigen::Vector2d forward = direction.head<2>().normalized();
+  for (const Shape& shape : scene.shapes) {
+    const Eigen::Vector2d to = (shape.centreAt(time) - origin).head<2>();
+    const double radius = shape.half.head<2>().norm();
+    const double along = to.dot(forward), aside = to.x() * forward.y() - to.y() * forward.x();
+    if (along > -radius && along < max_range + radius && std::abs(aside) < radius) shapes.push_back(&shape);
+  }
+  return shapes;
+}
+
+/// The label of a shape chosen at random. @param pick uniform on [0, 1).
+std::uint32_t randomLabel(const Scene& scene, double pick) {
+  return scene.shapes[static_cast<std::size_t>(pick * static_cast<double>(scene.shapes.size()))].label;
+}
+
+}  // namespace
+
+SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
+                   double time, std::uint64_t scan) {
+  const Eigen::Vector3d origin = T_world_sensor.translation();
+  const auto beams = static_cast<std::size_t>(lidar.beams), columns = static_cast<std::size_t>(lidar.columns);
+  const double step = lidar.beams > 1 ? (lidar.highest - lidar.lowest) / (lidar.beams - 1) : 0.0;
+  std::vector<Return> returns(beams * columns);
+  const auto directionOf = [&](std::size_t column, std::size_t beam) {
+    const double azimuth = 2.0 * kPi * static_cast<double>(column) / static_cast<double>(columns);
+    const double elevation = lidar.lowest + step * static_cast<double>(beam);
+    return Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
+                           std::sin(elevation));
+  };
+  parallelFor(columns, threadCount(0), [&](std::size_t column, std::size_t) {
+    const auto world = [&](std::size_t beam) -> Eigen::Vector3d {
+      return T_world_sensor.linear() * directionOf(column, beam);
+    };
+    const auto shapes = shapesInFan(scene, origin, world(beams / 2), time, lidar.max_range);
+    for (std::size_t beam = 0; beam < beams; ++beam) {
+      returns[column * beams + beam] = cast(scene, shapes, origin, world(beam), time, lidar.max_range);
+    }
+  });
+  SequenceFrame frame;
+  for (std::size_t r = 0; r < returns.size(); ++r) {
+    if (returns[r].range == 0.0) continue;
+    const double range = std::max(0.01, returns[r].range + lidar.range_noise * normal(lidar.seed, scan, r));
+    const bool wrong = !scene.shapes.empty() && counterRandom(lidar.seed, scan, r, 2) < lidar.label_noise;
+    frame.points.push_back((directionOf(r / beams, r % beams) * range).cast<float>());
+    frame.remissions.push_back(0.5f);
+    frame.labels.push_back(wrong ? randomLabel(scene, counterRandom(lidar.seed, scan, r, 3))
+                                 : returns[r].label);
+  }
+  return frame;
+}
+
+Drive::Drive(std::size_t scans, const LidarConfig& lidar, double speed, std::uint64_t seed)
+    : scans_(scans),
+      lidar_(lidar),
+      speed_(speed),
+      scene_(makeStreet(speed * static_cast<double>(scans) / lidar.rate + 110.0, seed)) {}
+
+Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
+  // In the right lane, weaving a little, 1.73 m above the ground.
+  const double x = speed_ * timeOf(i), wave = 0.06;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = Eigen::Vector3d(x, -1.5 + 0.3 * std::sin(wave * x), 1.73);
+  T.linear() = Eigen::AngleAxisd(std::atan(0.3 * wave * std::cos(wave * x)), Eigen::Vector3d::UnitZ())
+                   .toRotationMatrix();
+  return T;
+}
+
+SequenceFrame Drive::frame(std::size_t i) const {
+  SequenceFrame frame = scan(scene_, lidar_, T_world_sensor(i), timeOf(i), i);
+  frame.T_map_sensor = T_world_sensor(0).inverse() * T_world_sensor(i);
+  frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(timeOf(i) * 1e9));
+  return frame;
+}
+
+}  // namespace bki_mapping::simulation

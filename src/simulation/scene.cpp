@@ -1,0 +1,94 @@
+#include "bki_mapping/simulation/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bki_mapping::simulation {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Turns a vector about the vertical by -yaw: from the world into a box's axes.
+Eigen::Vector3d intoAxes(const Eigen::Vector3d& v, double yaw) {
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  return {c * v.x() + s * v.y(), -s * v.x() + c * v.y(), v.z()};
+}
+
+/// The stretch of a ray inside a slab |coordinate| <= half.
+void clipToSlab(double origin, double direction, double half, double& enter, double& leave) {
+  if (direction == 0.0) {
+    if (std::abs(origin) > half) leave = -kInfinity;
+    return;
+  }
+  const double a = (-half - origin) / direction, b = (half - origin) / direction;
+  enter = std::max(enter, std::min(a, b));
+  leave = std::min(leave, std::max(a, b));
+}
+
+/// The stretch of a ray where a quadratic a t^2 + 2 b t + c is below 0.
+void clipToQuadric(double a, double b, double c, double& enter, double& leave) {
+  const double discriminant = b * b - a * c;
+  if (a <= 0.0) {
+    if (c > 0.0) leave = -kInfinity;  // a vertical ray beside a cylinder
+    return;
+  }
+  if (discriminant < 0.0) {
+    leave = -kInfinity;
+    return;
+  }
+  enter = std::max(enter, (-b - std::sqrt(discriminant)) / a);
+  leave = std::min(leave, (-b + std::sqrt(discriminant)) / a);
+}
+
+}  // namespace
+
+bool Shape::contains(const Eigen::Vector3d& point, double time) const {
+  const Eigen::Array3d r = intoAxes(point - centreAt(time), yaw).cwiseQuotient(half).array();
+  switch (type) {
+    case ShapeType::kBox:
+      return (r.abs() <= 1.0).all();
+    case ShapeType::kCylinder:
+      return r.x() * r.x() + r.y() * r.y() <= 1.0 && std::abs(r.z()) <= 1.0;
+    case ShapeType::kEllipsoid:
+      return r.square().sum() <= 1.0;
+  }
+  return false;
+}
+
+std::optional<double> Shape::hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                 double time) const {
+  // In axes where the shape has half extents 1.
+  const Eigen::Vector3d o = intoAxes(origin - centreAt(time), yaw).cwiseQuotient(half);
+  const Eigen::Vector3d d = intoAxes(direction, yaw).cwiseQuotient(half);
+  double enter = 0.0, leave = kInfinity;
+  switch (type) {
+    case ShapeType::kBox:
+      for (int axis = 0; axis < 3; ++axis) clipToSlab(o[axis], d[axis], 1.0, enter, leave);
+      break;
+    case ShapeType::kCylinder:
+      clipToSlab(o.z(), d.z(), 1.0, enter, leave);
+      clipToQuadric(d.head<2>().squaredNorm(), o.head<2>().dot(d.head<2>()), o.head<2>().squaredNorm() - 1.0,
+                    enter, leave);
+      break;
+    case ShapeType::kEllipsoid:
+      clipToQuadric(d.squaredNorm(), o.dot(d), o.squaredNorm() - 1.0, enter, leave);
+      break;
+  }
+  if (enter > leave || enter <= 0.0) return std::nullopt;
+  return enter;
+}
+
+std::uint32_t Ground::labelAt(double y) const {
+  return std::abs(y) < road_half_width ? road : (std::abs(y) < sidewalk_half_width ? sidewalk : terrain);
+}
+
+std::optional<std::uint32_t> Scene::labelAt(const Eigen::Vector3d& point, double time) const {
+  for (const Shape& shape : shapes) {
+    if (shape.contains(point, time)) return shape.label;
+  }
+  if (point.z() <= 0.0) return ground.labelAt(point.y());
+  return std::nullopt;
+}
+
+}  // namespace bki_mapping::simulation
