@@ -1,7 +1,8 @@
 # The core: no ROS, no PCL. Everything a scan passes through until it is in the map.
-add_library(bki_mapping_core
+add_library(bki_mapping_core SHARED
   src/core/class_table.cpp
   src/core/map_query.cpp
+  src/core/named_parameter.cpp
   src/core/parameters.cpp
   src/core/semantic_map.cpp
   src/inference/beam_evidence.cpp

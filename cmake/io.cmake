@@ -2,9 +2,9 @@
 find_package(PCL REQUIRED COMPONENTS common io)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(Boost REQUIRED COMPONENTS program_options)
 
-add_library(bki_mapping_io
+
+add_library(bki_mapping_io SHARED
   src/io/atomic_file.cpp
   src/io/class_table_yaml.cpp
   src/io/config_yaml.cpp
@@ -13,16 +13,17 @@ add_library(bki_mapping_io
   src/io/sequence_reader.cpp
   src/io/sequence_writer.cpp
   src/io/share_path.cpp
+  src/io/voxel_pcl.cpp
   src/simulation/lidar.cpp
   src/simulation/scene.cpp
   src/simulation/street.cpp
   src/tools/options.cpp
 )
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-target_include_directories(bki_mapping_io SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
+target_include_directories(bki_mapping_io SYSTEM PUBLIC ${PCL_INCLUDE_DIRS})
 target_link_libraries(bki_mapping_io
-  PUBLIC bki_mapping_core Boost::program_options
-  PRIVATE pcl_common pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+  PUBLIC bki_mapping_core Boost::program_options pcl_common
+  PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 bki_mapping_warnings(bki_mapping_io)
 
 function(bki_mapping_tool name)

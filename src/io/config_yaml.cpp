@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "bki_mapping/core/parameters.h"
+
 namespace bki_mapping {
 namespace {
 
@@ -31,6 +33,21 @@ std::map<std::string, std::string> loadParameterFile(const std::string& file) {
     throw std::invalid_argument("parameter file " + file + ": " + error.what());
   }
   return values;
+}
+
+std::string parameterYaml(const MapperConfig& config) {
+  std::string text, group;
+  for (const Parameter& p : mapperParameters()) {
+    const std::size_t slash = p.name.find('/');
+    const std::string new_group = slash == std::string::npos ? "" : p.name.substr(0, slash);
+    if (new_group != group && !new_group.empty()) text += new_group + ":\n";
+    group = new_group;
+    const std::string indent = group.empty() ? "" : "  ";
+    const std::string unit = p.unit.empty() ? "" : " [" + p.unit + "]";
+    text += indent + "# " + p.description + "\n" + indent + "# " + p.values + unit + "\n";
+    text += indent + (group.empty() ? p.name : p.name.substr(slash + 1)) + ": " + p.get(config) + "\n";
+  }
+  return text;
 }
 
 }  // namespace bki_mapping

@@ -2,7 +2,6 @@
 
 #include <pcl/io/pcd_io.h>
 
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,6 +9,8 @@
 
 #include "bki_mapping/core/voxel_color.h"
 #include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/little_endian.h"
+#include "bki_mapping/io/voxel_pcl.h"
 
 namespace bki_mapping {
 namespace {
@@ -20,14 +21,6 @@ const char kPlyProperties[] =
     "property ushort label\nproperty uchar state\n"
     "property float probability\nproperty float variance\nproperty float entropy\nproperty float evidence\n";
 
-/// Appends a value's bytes, little-endian (as all hosts that ROS 1 supports are).
-template <typename T>
-void append(std::string& bytes, T value) {
-  char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));
-  bytes.append(raw, sizeof(T));
-}
-
 void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, double resolution) {
   std::ostringstream header;
   header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
@@ -35,11 +28,11 @@ void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, d
          << kPlyProperties << "end_header\n";
   std::string bytes;
   for (const VoxelRecord& v : voxels) {
-    for (const float c : {v.x, v.y, v.z}) append(bytes, c);
-    for (const std::uint8_t c : {v.red, v.green, v.blue}) append(bytes, c);
-    append(bytes, v.label);
-    append(bytes, v.state);
-    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) append(bytes, f);
+    for (const float c : {v.x, v.y, v.z}) appendBytes(bytes, c);
+    for (const std::uint8_t c : {v.red, v.green, v.blue}) appendBytes(bytes, c);
+    appendBytes(bytes, v.label);
+    appendBytes(bytes, v.state);
+    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) appendBytes(bytes, f);
   }
   std::ofstream out(path, std::ios::binary);
   out << header.str();
@@ -49,38 +42,7 @@ void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, d
 }
 
 void writePcd(const std::string& path, const std::vector<VoxelRecord>& voxels) {
-  pcl::PCLPointCloud2 cloud;
-  using Field = pcl::PCLPointField;
-  std::uint32_t step = 0;
-  const auto field = [&](const char* name, std::uint8_t type, std::uint32_t size) {
-    pcl::PCLPointField f;
-    f.name = name;
-    f.offset = step;
-    f.datatype = type;
-    f.count = 1;
-    cloud.fields.push_back(f);
-    step += size;
-  };
-  for (const char* name : {"x", "y", "z"}) field(name, Field::FLOAT32, 4);
-  field("rgb", Field::UINT32, 4);
-  field("label", Field::UINT16, 2);
-  field("state", Field::UINT8, 1);
-  for (const char* name : {"probability", "variance", "entropy", "evidence"}) field(name, Field::FLOAT32, 4);
-  std::string bytes;
-  for (const VoxelRecord& v : voxels) {
-    for (const float c : {v.x, v.y, v.z}) append(bytes, c);
-    append(bytes, std::uint32_t{v.red} << 16 | std::uint32_t{v.green} << 8 | v.blue);
-    append(bytes, v.label);
-    append(bytes, v.state);
-    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) append(bytes, f);
-  }
-  cloud.point_step = step;
-  cloud.height = 1;
-  cloud.width = static_cast<std::uint32_t>(voxels.size());
-  cloud.row_step = step * cloud.width;
-  cloud.is_dense = true;
-  cloud.data.assign(bytes.begin(), bytes.end());
-  if (pcl::PCDWriter().writeBinary(path, cloud) != 0) {
+  if (pcl::PCDWriter().writeBinary(path, toPcl(voxels)) != 0) {
     throw std::runtime_error(path + " cannot be written; check rights and free space");
   }
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/report.h"
 #include "bki_mapping/io/sequence.h"
@@ -20,14 +21,14 @@ po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
-  options.add_options()("sequence", text("DIR")->required(),
-                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
+  options.add_options()("sequence", text("DIR"), "folder with velodyne/, labels/, poses.txt, calib.txt")(
       "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
       "first", number("N")->default_value(0), "first scan to map")(
       "scans", number("N"), "how many; default all")("output", text("FILE.ply|FILE.pcd"),
                                                      "map file to write")(
       "include", text("STATES")->default_value("occupied"), "voxels in the map file: occupied,free,occluded")(
-      "report", text("FILE.json"), "report to write");
+      "report", text("FILE.json"), "report to write")(
+      "print-config", po::bool_switch(), "print the parameters in force as YAML, and map nothing");
   options.add(tools::mapperOptions());
   return options;
 }
@@ -39,6 +40,11 @@ std::string progressText(const ScanReport& scan) {
 }
 
 int mapSequence(const po::variables_map& given) {
+  if (given["print-config"].as<bool>()) {
+    std::cout << parameterYaml(tools::mapperConfig(given));
+    return 0;
+  }
+  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
   const auto states = parseStates(given["include"].as<std::string>());
   if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));

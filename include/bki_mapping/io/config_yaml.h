@@ -4,10 +4,15 @@
 #include <map>
 #include <string>
 
+#include "bki_mapping/core/config.h"
+
 namespace bki_mapping {
 
 /// Reads a YAML file of nested maps as names with `/` between the parts, and values as text.
 /// @throws std::invalid_argument in one sentence: no such file, bad YAML, a value that is a list.
 std::map<std::string, std::string> loadParameterFile(const std::string& file);
+
+/// The mapper's settings as such a file, each with a comment that tells values, unit and meaning.
+std::string parameterYaml(const MapperConfig& config);
 
 }  // namespace bki_mapping

@@ -1,0 +1,38 @@
+# The ROS shell: nodelet, node and the programs that speak ROS.
+add_library(bki_mapping_ros SHARED
+  src/ros/cloud_conversion.cpp
+  src/ros/mapping_server.cpp
+  src/ros/publishers/cell_markers.cpp
+  src/ros/publishers/occupancy.cpp
+  src/ros/publishers/projected_map.cpp
+  src/ros/publishers/registry.cpp
+  src/ros/publishers/trajectory.cpp
+  src/ros/publishers/voxel_cloud.cpp
+  src/ros/server_config.cpp
+  src/tools/sequence_messages.cpp
+)
+target_include_directories(bki_mapping_ros SYSTEM PUBLIC ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
+target_link_libraries(bki_mapping_ros PUBLIC bki_mapping_io ${catkin_LIBRARIES})
+add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp)
+bki_mapping_warnings(bki_mapping_ros)
+
+add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)
+target_link_libraries(bki_mapping_nodelets PRIVATE bki_mapping_ros)
+bki_mapping_warnings(bki_mapping_nodelets)
+
+add_executable(mapping_node src/ros/mapping_node.cpp)
+target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
+bki_mapping_warnings(mapping_node)
+
+bki_mapping_tool(play_sequence bki_mapping_ros)
+bki_mapping_tool(sequence_to_bag bki_mapping_ros)
+
+install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_nodelets
+  ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
+install(TARGETS mapping_node map_sequence play_sequence sequence_to_bag simulate_drive
+  RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
+install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

@@ -1,0 +1,32 @@
+/// @file Poses between tf and Eigen.
+#pragma once
+
+#include <geometry_msgs/Transform.h>
+
+#include <Eigen/Geometry>
+
+namespace bki_mapping::ros_shell {
+
+inline Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& t) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() << t.translation.x, t.translation.y, t.translation.z;
+  T.linear() = Eigen::Quaterniond(t.rotation.w, t.rotation.x, t.rotation.y, t.rotation.z)
+                   .normalized()
+                   .toRotationMatrix();
+  return T;
+}
+
+inline geometry_msgs::Transform toTransform(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond q(T.linear());
+  geometry_msgs::Transform t;
+  t.translation.x = T.translation().x();
+  t.translation.y = T.translation().y();
+  t.translation.z = T.translation().z();
+  t.rotation.w = q.w();
+  t.rotation.x = q.x();
+  t.rotation.y = q.y();
+  t.rotation.z = q.z();
+  return t;
+}
+
+}  // namespace bki_mapping::ros_shell

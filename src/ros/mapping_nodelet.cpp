@@ -1,0 +1,27 @@
+#include <nodelet/nodelet.h>
+
+#include <memory>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "bki_mapping/ros/mapping_server.h"
+
+namespace bki_mapping::ros_shell {
+
+/// The mapping server inside a nodelet manager.
+class MappingNodelet : public nodelet::Nodelet {
+ private:
+  void onInit() override {
+    try {
+      server_ = std::make_unique<MappingServer>(getNodeHandle(), getPrivateNodeHandle());
+    } catch (const std::exception& fault) {
+      NODELET_FATAL("%s", fault.what());
+      throw;  // the manager refuses to load the nodelet
+    }
+  }
+
+  std::unique_ptr<MappingServer> server_;
+};
+
+}  // namespace bki_mapping::ros_shell
+
+PLUGINLIB_EXPORT_CLASS(bki_mapping::ros_shell::MappingNodelet, nodelet::Nodelet)

@@ -1,0 +1,16 @@
+#include "bki_mapping/ros/map_publisher.h"
+
+namespace bki_mapping::ros_shell {
+
+std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context) {
+  std::vector<std::unique_ptr<MapPublisher>> publishers;
+  publishers.push_back(makeOccupiedCells(context));  // occupied_cells_vis_array
+  publishers.push_back(makeFreeCells(context));      // free_cells_vis_array
+  publishers.push_back(makeVoxelCloud(context));     // voxel_cloud
+  publishers.push_back(makeProjectedMap(context));   // projected_map
+  publishers.push_back(makeOccupancy(context));      // occupancy
+  publishers.push_back(makeTrajectory(context));     // trajectory
+  return publishers;
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,29 @@
+#include <nav_msgs/Path.h>
+
+#include "bki_mapping/ros/map_publisher.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// Where the sensor was at each integrated scan.
+class Trajectory : public MapPublisher {
+ public:
+  explicit Trajectory(const PublisherContext& context) {
+    publisher_ = context.advertise<nav_msgs::Path>("trajectory");
+  }
+
+  void publish(const MapSnapshot& snapshot) override {
+    nav_msgs::Path path;
+    path.header = snapshot.header;
+    path.poses = snapshot.trajectory;
+    publisher_.publish(path);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context) {
+  return std::make_unique<Trajectory>(context);
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,140 @@
+// Plays a sequence in SemanticKITTI's layout as clouds, tf and /clock.
+#include <bki_mapping/MappingStatus.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <rosgraph_msgs/Clock.h>
+
+#include <algorithm>
+#include <iostream>
+
+#include "bki_mapping/tools/options.h"
+#include "bki_mapping/tools/sequence_messages.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+/// How long to wait for a first listener, and for an acknowledgement [s].
+constexpr double kListenerWait = 60.0, kAcknowledgeWait = 60.0;
+constexpr double kClockStep = 0.01;  ///< [s] of wall time
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
+  options.add_options()("sequence", text("DIR")->required(),
+                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
+      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
+      "first", number("N")->default_value(0), "first scan to play")("scans", number("N"),
+                                                                    "how many; default all")(
+      "rate", po::value<double>()->value_name("FACTOR")->default_value(1.0),
+      "1 is real time, 2 twice as fast; 0 waits until `mapping/status` acknowledges each scan")(
+      "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
+      "map-frame", text("FRAME")->default_value("map"), "frame of the map");
+  return options;
+}
+
+/// Publishes frames and, between them, the time.
+class Player {
+ public:
+  explicit Player(const tools::FrameNames& names) : names_(names) {
+    cloud_ = node_.advertise<sensor_msgs::PointCloud2>("cloud_in", 10);
+    tf_ = node_.advertise<tf2_msgs::TFMessage>("/tf", 100,
+                                               true);  // latched: who comes late still gets the last
+    clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 10);
+    status_ = node_.subscribe("mapping/status", 100, &Player::onStatus, this);
+  }
+
+  void waitForListener() {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kListenerWait);
+    while (ros::ok() && (cloud_.getNumSubscribers() == 0 || tf_.getNumSubscribers() == 0)) {
+      if (ros::WallTime::now() > end) {
+        throw std::runtime_error("nobody subscribed to " + cloud_.getTopic() +
+                                 " and /tf within 60 s; start the mapper");
+      }
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kClockStep));
+    }
+  }
+
+  void publish(const SequenceFrame& frame) {
+    publishClock(frame.stamp);
+    tf_.publish(tools::tfMessage(frame, names_));
+    cloud_.publish(tools::cloudMessage(frame, names_));
+  }
+
+  void publishClock(std::uint64_t nanoseconds) {
+    rosgraph_msgs::Clock clock;
+    clock.clock.fromNSec(nanoseconds);
+    clock_.publish(clock);
+  }
+
+  void waitForAcknowledgement(const SequenceFrame& frame) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kAcknowledgeWait);
+    while (ros::ok() && acknowledged_ < frame.stamp) {
+      if (ros::WallTime::now() > end) {
+        throw std::runtime_error(status_.getTopic() +
+                                 " did not acknowledge a scan within 60 s; check the mapper");
+      }
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kClockStep));
+    }
+  }
+
+ private:
+  void onStatus(const MappingStatus& status) {
+    acknowledged_ = std::max(acknowledged_, status.header.stamp.toNSec());
+  }
+
+  tools::FrameNames names_;
+  ros::NodeHandle node_;
+  ros::Publisher cloud_, tf_, clock_;
+  ros::Subscriber status_;
+  std::uint64_t acknowledged_ = 0;
+};
+
+int play(const po::variables_map& given) {
+  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  const double rate = given["rate"].as<double>();
+  const std::size_t first = std::min(given["first"].as<std::size_t>(), sequence.size());
+  std::size_t last = sequence.size();
+  if (given.count("scans")) last = std::min(last, first + given["scans"].as<std::size_t>());
+  if (!(rate >= 0.0)) throw std::invalid_argument("--rate must be 0 or more");
+
+  Player player({given["map-frame"].as<std::string>(), given["frame"].as<std::string>()});
+  player.waitForListener();
+  const ros::WallTime start = ros::WallTime::now();
+  std::uint64_t first_stamp = 0;
+  for (std::size_t i = first; i < last && ros::ok(); ++i) {
+    const SequenceFrame frame = sequence.read(i);
+    if (i == first) first_stamp = frame.stamp;
+    const auto due = [&] { return static_cast<double>(frame.stamp - first_stamp) * 1e-9; };
+    while (rate > 0.0 && ros::ok()) {
+      const double now = (ros::WallTime::now() - start).toSec() * rate;
+      if (now >= due()) break;
+      player.publishClock(first_stamp + static_cast<std::uint64_t>(now * 1e9));
+      ros::WallDuration(std::min(kClockStep, (due() - now) / rate)).sleep();
+    }
+    player.publish(frame);
+    if (rate == 0.0) player.waitForAcknowledgement(frame);
+    tools::showProgress(i + 1 - first, last - first, "scans");
+  }
+  std::cout << "played " << last - first << " scans\n";
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("play_sequence", [&] {
+    std::vector<std::string> arguments;
+    ros::removeROSArgs(argc, argv, arguments);
+    std::vector<char*> pointers;
+    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    const auto given =
+        tools::parse(static_cast<int>(pointers.size()), pointers.data(),
+                     "Plays a sequence in SemanticKITTI's layout: cloud_in, /tf and /clock.", options());
+    if (!given) return 0;
+    ros::init(argc, argv, "play_sequence");
+    return play(*given);
+  });
+}

@@ -1,0 +1,64 @@
+// Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.
+#include <rosbag/bag.h>
+
+#include <iostream>
+
+#include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/tools/options.h"
+#include "bki_mapping/tools/sequence_messages.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  options.add_options()("sequence", text("DIR")->required(),
+                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
+      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
+      "output", text("FILE.bag")->required(), "bag to write")(
+      "cloud-topic", text("TOPIC")->default_value("/velodyne_points"), "topic of the clouds")(
+      "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
+      "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
+      "compression", text("KIND")->default_value("none"), "none, lz4 or bz2");
+  return options;
+}
+
+rosbag::CompressionType compression(const std::string& name) {
+  if (name == "none") return rosbag::compression::Uncompressed;
+  if (name == "lz4") return rosbag::compression::LZ4;
+  if (name == "bz2") return rosbag::compression::BZ2;
+  throw std::invalid_argument("--compression '" + name + "' is unknown; known kinds: none, lz4, bz2");
+}
+
+int writeBag(const po::variables_map& given) {
+  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  const tools::FrameNames names{given["map-frame"].as<std::string>(), given["frame"].as<std::string>()};
+  AtomicFile file(given["output"].as<std::string>());
+  rosbag::Bag bag;
+  bag.open(file.temporaryPath(), rosbag::bagmode::Write);
+  bag.setCompression(compression(given["compression"].as<std::string>()));
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
+    const SequenceFrame frame = sequence.read(i);
+    const ros::Time stamp = ros::Time().fromNSec(frame.stamp);
+    bag.write("/tf", stamp, tools::tfMessage(frame, names));
+    bag.write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
+    tools::showProgress(i + 1, sequence.size(), "scans");
+  }
+  bag.close();
+  file.commit();
+  std::cout << sequence.size() << " scans in " << given["output"].as<std::string>() << "\n";
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("sequence_to_bag", [&] {
+    const auto given = tools::parse(
+        argc, argv, "Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.", options());
+    return given ? writeBag(*given) : 0;
+  });
+}
