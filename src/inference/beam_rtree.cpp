@@ -1,3 +1,4 @@
+#define BOOST_ALLOW_DEPRECATED_HEADERS  // Boost 1.74 warns of its own use of old headers
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>

@@ -1,0 +1,51 @@
+# Shared by the scripts: steps with times, packages, the environment of a build. Source it.
+set -Eeuo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+export ROS_HOSTNAME=${ROS_HOSTNAME:-localhost}
+
+# step "what it does" command...: runs the command, says what and how long. A failing command ends the script.
+step() {
+  current_step=$1
+  local start=$SECONDS
+  shift
+  echo "==> $current_step"
+  "$@"
+  echo "    done in $((SECONDS - start)) s"
+  current_step=
+}
+current_step=
+trap 'if [ -n "$current_step" ]; then echo "FAILED: $current_step" >&2; fi' ERR
+
+# Installs with apt what is missing.
+install_dependencies() {
+  local list=$root/scripts/dependencies.debian.txt missing=() package
+  if [ -d /opt/ros/noetic ]; then list=$root/scripts/dependencies.noetic.txt; fi
+  for package in $(grep -v '^#' "$list"); do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
+  done
+  if [ ${#missing[@]} -eq 0 ]; then
+    echo "    nothing is missing"
+    return
+  fi
+  echo "    installing ${#missing[@]} packages"
+  local sudo=
+  if [ "$(id -u)" -ne 0 ]; then sudo=sudo; fi
+  $sudo apt-get update -qq
+  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# ROS of the system, where it is not in the standard places.
+source_system_ros() {
+  if [ -f /opt/ros/noetic/setup.bash ]; then
+    set +u
+    source /opt/ros/noetic/setup.bash
+    set -u
+  fi
+}
+
+# The packages of a build tree. $1: build folder.
+source_build() {
+  set +u
+  source "$1/devel/setup.bash"
+  set -u
+}

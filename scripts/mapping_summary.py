@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""Follows a running mapper until it has dealt with a number of scans, saves the map and sums up."""
+import argparse
+import os
+import sys
+import threading
+
+import rospy
+from bki_mapping.msg import MappingStatus
+from bki_mapping.srv import SaveMap
+
+
+class Follower:
+    """Collects one status a scan."""
+
+    def __init__(self, scans):
+        self.scans = scans
+        self.times = []
+        self.last = None
+        self.done = threading.Event()
+
+    def on_status(self, status):
+        if status.integrated_last:
+            self.times.append(status.integration_ms)
+        self.last = status
+        if status.received >= self.scans and status.waiting == 0:
+            self.done.set()
+
+
+def quantile(values, share):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * len(values)))]
+
+
+def summary(follower):
+    status = follower.last
+    dropped = {name[len('dropped_'):]: getattr(status, name) for name in status.__slots__
+               if name.startswith('dropped_')}
+    return '\n'.join([
+        f'clouds: {status.received} received, {status.integrated} mapped, dropped: {dropped}',
+        f'time a scan: median {quantile(follower.times, 0.5):.1f} ms, 99th percentile '
+        f'{quantile(follower.times, 0.99):.1f} ms ({os.cpu_count()} cores)',
+        f'map: {status.blocks} blocks, {status.map_bytes / 1e6:.1f} MB',
+    ]) + '\n'
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--scans', type=int, required=True, help='how many clouds to wait for')
+    parser.add_argument('--map', required=True, help='map file to write, .ply or .pcd')
+    parser.add_argument('--summary', required=True, help='text file to write')
+    parser.add_argument('--timeout', type=float, default=600.0, help='seconds to wait')
+    arguments = parser.parse_args()
+
+    follower = Follower(arguments.scans)
+    rospy.init_node('mapping_summary', disable_signals=True)
+    rospy.Subscriber('mapping/status', MappingStatus, follower.on_status, queue_size=1000)
+    if not follower.done.wait(arguments.timeout):
+        received = follower.last.received if follower.last else 0
+        sys.exit(f'only {received} of {arguments.scans} clouds came within {arguments.timeout:.0f} s; see ros.log')
+    saved = rospy.ServiceProxy('mapping/save_map', SaveMap)(os.path.abspath(arguments.map), '')
+    if not saved.success:
+        sys.exit(saved.message)
+    with open(arguments.summary, 'w') as file:
+        file.write(summary(follower))
+
+
+if __name__ == '__main__':
+    main()
