@@ -2,7 +2,7 @@
 if(NOT BUILD_TESTING AND NOT CATKIN_ENABLE_TESTING)
   return()
 endif()
-find_package(GTest REQUIRED)
+find_package(GTest REQUIRED CONFIG)
 
 add_library(bki_mapping_reference STATIC test/reference/reference.cpp)
 target_include_directories(bki_mapping_reference PUBLIC test)
@@ -19,4 +19,8 @@ function(bki_mapping_unit_test name)
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
 endfunction()
 
-bki_mapping_unit_test(brute_force_test)
+foreach(name
+    beam_index_test brute_force_test downsample_test grid_geometry_test kernel_test laws_test map_query_test
+    observation_test occlusion_test sampling_test)
+  bki_mapping_unit_test(${name})
+endforeach()

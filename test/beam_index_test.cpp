@@ -1,0 +1,88 @@
+// The beam table and the R-tree find every beam that passes a ball: at the seam, at the poles, at the sensor.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "bki_mapping/inference/beam_index.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+std::vector<Eigen::Vector3f> directionsOf(const Scan& scan) {
+  std::vector<Eigen::Vector3f> directions;
+  for (const auto& point : scan.points) directions.push_back(point.normalized());
+  return directions;
+}
+
+/// The half-lines that pass a ball, one by one.
+std::set<std::uint32_t> bruteForce(const std::vector<Eigen::Vector3f>& directions,
+                                   const Eigen::Vector3d& centre, double radius) {
+  std::set<std::uint32_t> found;
+  for (std::uint32_t b = 0; b < directions.size(); ++b) {
+    const Eigen::Vector3d u = directions[b].cast<double>().normalized();
+    const double along = std::max(0.0, centre.dot(u));
+    if ((centre - along * u).norm() < radius - 1e-6) found.insert(b);
+  }
+  return found;
+}
+
+class BothIndices : public testing::TestWithParam<BeamIndexType> {};
+
+TEST_P(BothIndices, FindAllBeamsOfEveryBall) {
+  std::mt19937 random(9);
+  for (const reference::Scene& scene : reference::nastyScenes(400)) {
+    const auto directions = directionsOf(scene.scan);
+    const auto index = makeBeamIndex(GetParam(), directions);
+    std::vector<std::uint32_t> beams;
+    for (int trial = 0; trial < 300; ++trial) {
+      // Balls about places on beams, about the axes and the seam, and everywhere.
+      const float scale = std::uniform_real_distribution<float>(0.0f, 1.5f)(random);
+      Eigen::Vector3f centre = scene.scan.points[random() % scene.scan.points.size()] * scale;
+      if (trial % 3 == 1) centre[static_cast<int>(random() % 3)] = 0.0f;
+      if (trial % 3 == 2) centre += Eigen::Vector3f::Random() * 0.5f;
+      const float radius = std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
+      index->query(centre, radius, beams);
+      const std::set<std::uint32_t> found(beams.begin(), beams.end());
+      EXPECT_EQ(found.size(), beams.size()) << scene.name << ": a beam is named twice";
+      for (const std::uint32_t b : bruteForce(directions, centre.cast<double>(), radius)) {
+        ASSERT_TRUE(found.count(b)) << scene.name << ": beam " << b << " misses at " << centre.transpose();
+      }
+    }
+  }
+}
+
+TEST_P(BothIndices, NameFewOthers) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  std::vector<Eigen::Vector3f> directions;
+  for (int i = 0; i < 20000; ++i) {
+    directions.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
+  }
+  const auto index = makeBeamIndex(GetParam(), directions);
+  std::vector<std::uint32_t> beams;
+  std::size_t named = 0, needed = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Vector3f centre = 10.0f * directions[static_cast<std::size_t>(trial)];
+    index->query(centre, 1.0f, beams);
+    named += beams.size();
+    needed += bruteForce(directions, centre.cast<double>(), 1.0).size();
+  }
+  EXPECT_LT(named, 3 * needed);
+}
+
+TEST_P(BothIndices, AllBeamsAtTheSensorAndNoneOfNone) {
+  const auto directions = directionsOf(reference::nastyScenes(50)[0].scan);
+  std::vector<std::uint32_t> beams;
+  makeBeamIndex(GetParam(), directions)->query(Eigen::Vector3f(0.1f, 0.0f, 0.0f), 0.2f, beams);
+  EXPECT_EQ(beams.size(), directions.size());
+  makeBeamIndex(GetParam(), {})->query(Eigen::Vector3f(1.0f, 0.0f, 0.0f), 0.2f, beams);
+  EXPECT_TRUE(beams.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Indices, BothIndices, testing::Values(BeamIndexType::kTable, BeamIndexType::kRtree));
+
+}  // namespace
+}  // namespace bki_mapping

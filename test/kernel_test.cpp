@@ -1,0 +1,43 @@
+// The kernel computed is the formula's, within its stated bound.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bki_mapping/inference/kernel.h"
+#include "reference/reference.h"
+
+namespace bki_mapping {
+namespace {
+
+TEST(Kernel, IsWithinItsBoundOfTheFormula) {
+  for (int i = 0; i <= 200000; ++i) {
+    const double r = i / 100000.0;
+    ASSERT_NEAR(sparseKernel(static_cast<float>(r * r)), reference::sparseKernel(r, 1.0, 1.0), 1e-6)
+        << "r = " << r;
+  }
+}
+
+TEST(Kernel, IsOneAtTheCentreAndNothingAtTheEdge) {
+  EXPECT_NEAR(sparseKernel(0.0f), 1.0f, 1e-6f);
+  for (const float t : {1.0f, 1.0000001f, 2.0f, 1e9f}) EXPECT_EQ(sparseKernel(t), 0.0f) << t;
+}
+
+TEST(Kernel, NeverNegativeAndFallsWithDistance) {
+  float last = 1.1f;
+  for (int i = 0; i <= 10000; ++i) {
+    const float value = sparseKernel(static_cast<float>(i) * 1e-4f);
+    ASSERT_GE(value, 0.0f);
+    ASSERT_LE(value, last + 2e-7f);
+    last = value;
+  }
+}
+
+TEST(Kernel, WithoutTheFactorItWouldNotVanishAtItsEdge) {
+  // The paper's Equation (1) as printed: (2 + cos(2 pi r)) / 3 + sin(2 pi r) / (2 pi) is 1 at r = 1.
+  const double printed = (2.0 + std::cos(2.0 * M_PI)) / 3.0 + std::sin(2.0 * M_PI) / (2.0 * M_PI);
+  EXPECT_NEAR(printed, 1.0, 1e-12);
+  EXPECT_NEAR(reference::sparseKernel(1.0 - 1e-9, 1.0, 1.0), 0.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,194 @@
+// Laws of the map that need no reference: threads, order, sums, shifts, and what a mode may change.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "bki_mapping/core/map_query.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+const std::vector<std::string> kModes = {"none", "even", "uniform", "linear", "line"};
+
+std::vector<Scan> someScans() {
+  std::vector<Scan> scans;
+  for (const reference::Scene& scene : reference::nastyScenes(200)) {
+    if (scene.name != "far from zero") scans.push_back(scene.scan);
+  }
+  return scans;
+}
+
+SemanticMap mapOf(const std::vector<Scan>& scans, MapperConfig config) {
+  SemanticMapper mapper(config, reference::smallTable());
+  SemanticMap map = SemanticMap(mapper.map().geometry(), config.prior, mapper.classes().size());
+  for (const Scan& scan : scans) mapper.integrate(scan);
+  map.add(mapper.map());
+  return map;
+}
+
+MapperConfig configOf(const std::string& mode, int threads = 2) {
+  MapperConfig config;
+  config.free_space.mode = mode;
+  config.free_space.gap = 0.5;
+  config.free_space.samples_per_beam = 2;
+  config.occlusion = OcclusionExtent::kMapped;
+  config.threads = threads;
+  return config;
+}
+
+/// Calls check(label, evidence in a, evidence in b, index, offset) for everything in a; a missing plane is 0.
+template <typename Check>
+void compare(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift, Check&& check) {
+  static const std::vector<float> kNothing(kBlockVoxels, 0.0f);
+  for (const auto& entry : a.entries()) {
+    const Block* other =
+        b.find({{entry.index.x + shift.x, entry.index.y + shift.y, entry.index.z + shift.z}});
+    for (const ClassId label : entry.block->classes()) {
+      const float* theirs = other ? other->evidence(label) : nullptr;
+      if (!theirs) theirs = kNothing.data();
+      for (int v = 0; v < kBlockVoxels; ++v) check(label, entry.block->evidence(label)[v], theirs[v]);
+    }
+  }
+}
+
+void expectNear(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift,
+                const std::string& what) {
+  std::size_t faults = 0;
+  const auto check = [&](ClassId, float x, float y) {
+    faults += std::abs(x - y) > 1e-5f + 1e-4f * std::abs(x);
+  };
+  compare(a, b, shift, check);
+  compare(b, a, {{-shift.x, -shift.y, -shift.z}}, check);
+  EXPECT_EQ(faults, 0u) << what;
+  EXPECT_GT(a.size(), 0u) << what;
+}
+
+TEST(Laws, ThreadCountChangesNoBit) {
+  for (const std::string& mode : kModes) {
+    const SemanticMap one = mapOf(someScans(), configOf(mode, 1));
+    for (const int threads : {2, 7}) {
+      const SemanticMap many = mapOf(someScans(), configOf(mode, threads));
+      ASSERT_EQ(one.size(), many.size()) << mode;
+      for (const auto& entry : one.entries()) {
+        const Block* other = many.find(entry.index);
+        ASSERT_NE(other, nullptr) << mode;
+        ASSERT_EQ(entry.block->classes(), other->classes()) << mode;
+        EXPECT_EQ(entry.block->occlusion(), other->occlusion()) << mode;
+        for (std::size_t p = 0; p < other->classes().size(); ++p) {
+          EXPECT_EQ(std::memcmp(entry.block->plane(p), other->plane(p), kBlockVoxels * sizeof(float)), 0)
+              << mode << " with " << threads << " threads";
+        }
+      }
+    }
+  }
+}
+
+TEST(Laws, ScansAddInAnyOrder) {
+  for (const std::string& mode : kModes) {
+    std::vector<Scan> scans = someScans();
+    const SemanticMap forth = mapOf(scans, configOf(mode));
+    const SemanticMap back = mapOf({scans.rbegin(), scans.rend()}, configOf(mode));
+    expectNear(forth, back, {}, mode + ", order");
+    SemanticMap sum = mapOf({scans.begin(), scans.begin() + 3}, configOf(mode));
+    sum.add(mapOf({scans.begin() + 3, scans.end()}, configOf(mode)));
+    expectNear(forth, sum, {}, mode + ", sum of two maps");
+  }
+}
+
+TEST(Laws, ShiftingTheSceneByBlocksShiftsTheMap) {
+  for (const std::string& mode : kModes) {
+    MapperConfig config = configOf(mode);
+    config.resolution = 0.25;  // so that 40 blocks are exactly 80 m
+    config.downsample_resolution = 0.125;
+    std::vector<Scan> scans = someScans(), shifted = scans;
+    for (Scan& scan : shifted) scan.origin += Eigen::Vector3d(80.0, -160.0, 2.0);
+    expectNear(mapOf(scans, config), mapOf(shifted, config), {{40, -80, 1}}, mode);
+  }
+}
+
+TEST(Laws, AModeChangesOnlyFree) {
+  const SemanticMap none = mapOf(someScans(), configOf("none"));
+  for (const std::string& mode : kModes) {
+    const SemanticMap other = mapOf(someScans(), configOf(mode));
+    std::size_t changed = 0;
+    float free = 0.0f;
+    compare(other, none, {}, [&](ClassId label, float x, float y) {
+      changed += label != kFreeClass && x != y;
+      if (label == kFreeClass) free += x;
+    });
+    compare(none, other, {},
+            [&](ClassId label, float x, float y) { changed += label != kFreeClass && x != y; });
+    EXPECT_EQ(changed, 0u) << mode;
+    EXPECT_EQ(free > 0.0f, mode != "none") << mode;
+  }
+}
+
+TEST(Laws, ModesDiffer) {
+  // Each mode, weight and extent gives a map of its own.
+  std::vector<SemanticMap> maps;
+  for (const std::string mode : {"none", "even", "uniform", "linear"})
+    maps.push_back(mapOf(someScans(), configOf(mode)));
+  for (const BeamWeight weight : {BeamWeight::kUniform, BeamWeight::kLinear, BeamWeight::kBilinear}) {
+    for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
+      MapperConfig config = configOf("line");
+      config.free_space.weight = weight;
+      config.free_space.extent = extent;
+      maps.push_back(mapOf(someScans(), config));
+    }
+  }
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      double difference = 0.0;
+      compare(maps[i], maps[j], {}, [&](ClassId, float x, float y) { difference += std::abs(x - y); });
+      EXPECT_GT(difference, 1e-3) << i << " and " << j;
+    }
+  }
+}
+
+TEST(Laws, ExtentsAgreeWhereBothClear) {
+  MapperConfig observed = configOf("line"), mapped = configOf("line");
+  mapped.free_space.extent = FreeSpaceExtent::kMapped;
+  const std::vector<Scan> scan = {someScans().front()};
+  const SemanticMap all = mapOf(scan, observed), some = mapOf(scan, mapped);
+  EXPECT_LT(some.size(), all.size());
+  compare(some, all, {}, [](ClassId, float x, float y) { ASSERT_EQ(x, y); });
+}
+
+TEST(Laws, EveryBlockKnowsSomething) {
+  for (const std::string& mode : kModes) {
+    const SemanticMap map = mapOf(someScans(), configOf(mode));
+    for (const auto& entry : map.entries()) EXPECT_FALSE(entry.block->empty()) << mode;
+  }
+}
+
+TEST(Laws, ProbabilitiesSumToOne) {
+  const SemanticMap map = mapOf(someScans(), configOf("line"));
+  for (const auto& entry : map.entries()) {
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelView view = viewVoxel(map, *entry.block, v);
+      double sum = 0.0;
+      for (const int label : {0, 1, 2, 3, 255}) {
+        const float* plane = entry.block->evidence(static_cast<ClassId>(label));
+        sum += (map.prior() + (plane ? plane[v] : 0.0f)) / (map.priorSum() + view.evidence);
+      }
+      ASSERT_NEAR(sum, 1.0, 1e-5);
+    }
+  }
+}
+
+TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
+  SemanticMapper mapper(configOf("line"), reference::smallTable());
+  const ScanStats stats = mapper.integrate(Scan());
+  EXPECT_EQ(stats.hits, 0u);
+  EXPECT_EQ(mapper.map().size(), 0u);
+  mapper.integrate(someScans().front());
+  EXPECT_GT(mapper.map().size(), 0u);
+  mapper.reset();
+  EXPECT_EQ(mapper.map().size(), 0u);
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,100 @@
+// Bad and unwanted points are left out, each counted under its reason.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+Scan scanOf(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& labels) {
+  Scan scan;
+  scan.points = points;
+  scan.labels = labels;
+  return scan;
+}
+
+MapperConfig plainConfig() {
+  MapperConfig config;
+  config.downsample_resolution = 0.0;
+  return config;
+}
+
+TEST(Observation, CountsEveryReason) {
+  MapperConfig config = plainConfig();
+  config.sensor_model.min_range = 0.5;
+  config.sensor_model.max_range = 50.0;
+  config.unlabelled_points = UnlabelledPoints::kIgnore;
+  const Scan scan = scanOf(
+      {{kNan, 1, 1}, {1, kInfinity, 1}, {0, 0, 0}, {0.2f, 0, 0}, {60, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}},
+      {10, 10, 10, 10, 10, 10, 0, 77});
+  const Observation seen = observe(scan, *reference::smallTable(), config);
+  const PointCounts& c = seen.counts;
+  EXPECT_EQ(c.points, 8u);
+  EXPECT_EQ(c.not_finite, 2u);
+  EXPECT_EQ(c.at_sensor, 1u);
+  EXPECT_EQ(c.too_near, 1u);
+  EXPECT_EQ(c.beyond_max, 1u);
+  EXPECT_EQ(c.unlabelled, 1u);
+  EXPECT_EQ(c.unknown_label, 1u);
+  EXPECT_EQ(c.labels_not_in_table, 1u);
+  EXPECT_EQ(c.used, 1u);
+  EXPECT_EQ(c.points, c.used + c.not_finite + c.at_sensor + c.too_near + c.beyond_max + c.outside_map +
+                          c.unknown_label + c.unlabelled);
+  ASSERT_EQ(seen.beams.ends.size(), 2u);  // to the hit, and the one cut at max_range
+  EXPECT_NEAR(seen.beams.ends[1].x(), 50.0f, 1e-4f);
+}
+
+TEST(Observation, UnlabelledIsAHitUnlessIgnored) {
+  MapperConfig config = plainConfig();
+  const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}}, {0, 77});
+  EXPECT_EQ(observe(scan, *reference::smallTable(), config).hits.labels, std::vector<ClassId>{0});
+  config.unknown_labels = UnknownLabels::kUnlabelled;
+  const Observation seen = observe(scan, *reference::smallTable(), config);
+  EXPECT_EQ(seen.hits.labels, (std::vector<ClassId>{0, 0}));
+  EXPECT_EQ(seen.counts.labels_not_in_table, 1u);
+  EXPECT_EQ(seen.counts.unknown_label, 0u);
+}
+
+TEST(Observation, LabelsMayBeIds) {
+  MapperConfig config = plainConfig();
+  config.label_values = LabelValues::kId;
+  const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 1, 1}}, {3, 10, 255, 4294967295u});
+  const Observation seen = observe(scan, *reference::smallTable(), config);
+  EXPECT_EQ(seen.hits.labels, std::vector<ClassId>{3});
+  EXPECT_EQ(seen.counts.unknown_label, 3u);
+}
+
+TEST(Observation, PointsFarFromTheMapAreCounted) {
+  Scan scan = scanOf({{1, 0, 0}, {1e10f, 0, 0}, {1e30f, 0, 0}}, {10, 10, 10});
+  SemanticMapper mapper(plainConfig(), reference::smallTable());
+  EXPECT_EQ(mapper.integrate(scan).counts.outside_map, 2u);
+  scan.origin.x() = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t before = mapper.map().size();
+  EXPECT_THROW(mapper.integrate(scan), std::invalid_argument);
+  EXPECT_EQ(mapper.map().size(), before);
+}
+
+TEST(Observation, LabelsMustBeAsManyAsPoints) {
+  SemanticMapper mapper(plainConfig(), reference::smallTable());
+  EXPECT_THROW(mapper.integrate(scanOf({{1, 0, 0}}, {})), std::invalid_argument);
+}
+
+TEST(Mapper, RefusesWrongSettings) {
+  MapperConfig config;
+  config.resolution = -1.0;
+  EXPECT_THROW(SemanticMapper(config, reference::smallTable()), std::invalid_argument);
+  config = MapperConfig();
+  config.unknown_labels = UnknownLabels::kUnlabelled;
+  std::vector<SemanticClass> one(1);
+  one[0].name = "thing";
+  EXPECT_THROW(SemanticMapper(config, std::make_shared<ClassTable>("one", one)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace bki_mapping
