@@ -24,3 +24,16 @@ foreach(name
     observation_test occlusion_test sampling_test)
   bki_mapping_unit_test(${name})
 endforeach()
+foreach(name class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test)
+  bki_mapping_unit_test(${name} bki_mapping_io)
+endforeach()
+target_link_libraries(map_export_test PRIVATE pcl_io)
+
+# Tests in Python: the programs as a user calls them, and the layering of the rooms.
+function(bki_mapping_script_test name)
+  add_test(NAME ${name} COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/${name}.py)
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300
+    ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
+endfunction()
+bki_mapping_script_test(layering_test)
+bki_mapping_script_test(tools_test)

@@ -1,0 +1,98 @@
+// Class tables: the shipped ones, and faults that must be named.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <functional>
+#include <map>
+
+#include "bki_mapping/io/class_table_yaml.h"
+
+namespace bki_mapping {
+namespace {
+
+std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& fault) {
+    return fault.what();
+  }
+  return "";
+}
+
+/// What loading a table with this text says.
+std::string faultOf(const std::string& text) {
+  const std::string file = testing::TempDir() + "class_table_" + std::to_string(getpid()) + ".yaml";
+  std::ofstream(file) << text;
+  return messageOf([&] { loadClassTable(file); });
+}
+
+#define EXPECT_NAMES(message, words) EXPECT_NE((message).find(words), std::string::npos) << (message)
+
+TEST(ClassTable, AllShippedTablesLoad) {
+  const std::map<std::string, std::size_t> sizes = {{"semantic_kitti", 20}, {"nuscenes", 17}, {"carla", 23},
+                                                    {"kitti", 12},          {"nclt", 14},     {"toy", 4},
+                                                    {"occupancy", 1}};
+  for (const auto& [name, size] : sizes) {
+    const ClassTable table = loadClassTable(name);
+    EXPECT_EQ(table.name(), name);
+    EXPECT_EQ(table.size(), size) << name;
+    EXPECT_EQ(table.unlabelled().has_value(), name != "occupancy") << name;
+  }
+}
+
+TEST(ClassTable, SemanticKittiLearningMap) {
+  const ClassTable table = loadClassTable("semantic_kitti");
+  const std::map<std::uint32_t, int> expected = {
+      {0, 0},   {1, 0},   {52, 0},  {99, 0},  {10, 1},  {252, 1}, {11, 2},  {15, 3},  {18, 4},
+      {258, 4}, {13, 5},  {16, 5},  {20, 5},  {256, 5}, {257, 5}, {259, 5}, {30, 6},  {254, 6},
+      {31, 7},  {253, 7}, {32, 8},  {255, 8}, {40, 9},  {60, 9},  {44, 10}, {48, 11}, {49, 12},
+      {50, 13}, {51, 14}, {70, 15}, {71, 16}, {72, 17}, {80, 18}, {81, 19}};
+  for (const auto& [raw, id] : expected) EXPECT_EQ(table.classOfRaw(raw), id) << raw;
+  EXPECT_FALSE(table.classOfRaw(2).has_value());
+  EXPECT_TRUE(table.find(1)->dynamic);
+  EXPECT_FALSE(table.find(9)->dynamic);
+}
+
+TEST(ClassTable, OccupancyTakesEveryLabel) {
+  const ClassTable table = loadClassTable("occupancy");
+  for (const std::uint32_t raw : {0u, 40u, 252u, 70000u}) EXPECT_EQ(table.classOfRaw(raw), 0);
+}
+
+TEST(ClassTable, AnyCountUpTo254) {
+  std::vector<SemanticClass> classes(254);
+  for (std::size_t i = 0; i < classes.size(); ++i) {
+    classes[i].id = static_cast<ClassId>(i);
+    classes[i].name = "c" + std::to_string(i);
+  }
+  EXPECT_EQ(ClassTable("many", classes).size(), 254u);
+  classes.emplace_back();
+  classes.back().id = 254;
+  EXPECT_NAMES(messageOf([&] { ClassTable("too many", classes); }), "more than 254");
+}
+
+TEST(ClassTable, NamesEveryFault) {
+  const std::string head = "classes:\n  - {id: 1, name: a, color: [1, 2, 3]}\n";
+  EXPECT_EQ(faultOf(head), "");
+  EXPECT_NAMES(messageOf([] { loadClassTable("semantic_kiti"); }), "did you mean 'semantic_kitti'?");
+  EXPECT_NAMES(messageOf([] { loadClassTable("/no/such/file.yaml"); }), "/no/such/file.yaml");
+  EXPECT_NAMES(faultOf(head + "  - {id: 1, name: b, color: [1, 2, 3], raw: [9]}\n"), "id 1 is given twice");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: a, color: [1, 2, 3], raw: [9]}\n"),
+               "name 'a' is given twice");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [1]}\n"),
+               "raw label 1 is given twice");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, colour: [1, 2, 3]}\n"), "did you mean 'color'?");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2]}\n"), "not [red, green, blue]");
+  EXPECT_NAMES(faultOf(head + "  - {id: 300, name: b, color: [1, 2, 3]}\n"), "300");
+  EXPECT_NAMES(faultOf(head + "  - {id: 254, name: b, color: [1, 2, 3]}\n"), "254 is above 253");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], flags: [dynamik]}\n"),
+               "did you mean 'dynamic'?");
+  EXPECT_NAMES(faultOf(head + "  - {id: two, name: b, color: [1, 2, 3]}\n"), "bad conversion");
+  EXPECT_NAMES(faultOf(head + "  - {name: b, color: [1, 2, 3]}\n"), "no 'id'");
+  EXPECT_NAMES(faultOf("classes: []\n"), "no class");
+  EXPECT_NAMES(faultOf("just text"), "list 'classes'");
+  EXPECT_NAMES(faultOf("classes: [\n"), "class table");
+}
+
+}  // namespace
+}  // namespace bki_mapping

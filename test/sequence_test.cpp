@@ -1,0 +1,127 @@
+// Sequences: what is written is read back, and every fault is named.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "bki_mapping/io/sequence.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+SequenceFrame frameAt(double x, std::uint64_t stamp) {
+  SequenceFrame frame;
+  frame.points = {{1.0f, 2.0f, 3.0f}, {-4.0f, 5.5f, 0.25f}};
+  frame.remissions = {0.1f, 0.9f};
+  frame.labels = {40, 252};
+  frame.T_map_sensor.translation() = Eigen::Vector3d(x, 0.1 * x, 0.0);
+  frame.T_map_sensor.linear() = Eigen::AngleAxisd(0.1 * x, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  frame.stamp = Sequence::kFirstStamp + stamp;
+  return frame;
+}
+
+class SequenceFolder : public testing::Test {
+ protected:
+  void SetUp() override {
+    SequenceWriter writer(folder_ / "drive");
+    writer.write(frameAt(0.0, 0));
+    writer.write(frameAt(1.0, 100000000));
+    writer.finish();
+  }
+  void replace(const std::string& file, const std::string& text) {
+    std::ofstream(folder_ / ("drive/" + file), std::ios::binary) << text;
+  }
+  void expectFault(const std::string& words) {
+    try {
+      const Sequence sequence(folder_ / "drive");
+      for (std::size_t i = 0; i < sequence.size(); ++i) sequence.read(i);
+      FAIL() << "nothing was wrong, but should be: " << words;
+    } catch (const std::runtime_error& fault) {
+      EXPECT_NE(std::string(fault.what()).find(words), std::string::npos) << fault.what();
+    }
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(SequenceFolder, ReadsWhatWasWritten) {
+  const Sequence sequence(folder_ / "drive");
+  ASSERT_EQ(sequence.size(), 2u);
+  const SequenceFrame frame = sequence.read(1), expected = frameAt(1.0, 100000000);
+  EXPECT_EQ(frame.points, expected.points);
+  EXPECT_EQ(frame.labels, expected.labels);
+  EXPECT_EQ(frame.remissions, expected.remissions);
+  EXPECT_EQ(frame.stamp, expected.stamp);
+  EXPECT_TRUE(frame.T_map_sensor.isApprox(expected.T_map_sensor, 1e-12));
+  EXPECT_EQ(sequence.name(1), "000001");
+}
+
+TEST_F(SequenceFolder, TheMapFrameIsTheFirstSensorFrame) {
+  // Poses are of the camera; Tr turns sensor axes (x forward) into camera axes (z forward) and shifts.
+  replace("calib.txt", "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n");
+  replace("poses.txt", "1 0 0 7 0 1 0 0 0 0 1 0\n1 0 0 7 0 1 0 0 0 0 1 5\n");
+  const Sequence sequence(folder_ / "drive");
+  EXPECT_TRUE(sequence.read(0).T_map_sensor.isApprox(Eigen::Isometry3d::Identity(), 1e-12));
+  EXPECT_TRUE(sequence.read(1).T_map_sensor.translation().isApprox(Eigen::Vector3d(5, 0, 0), 1e-12));
+}
+
+TEST_F(SequenceFolder, UpperHalfOfLabelsIsTheInstance) {
+  const std::uint32_t labels[] = {40u | 7u << 16, 252u};
+  replace("labels/000000.label", std::string(reinterpret_cast<const char*>(labels), sizeof(labels)));
+  EXPECT_EQ(Sequence(folder_ / "drive").read(0).labels, (std::vector<std::uint32_t>{40, 252}));
+}
+
+TEST_F(SequenceFolder, WithoutTimesScansAreATenthApart) {
+  std::filesystem::remove(folder_ / "drive/times.txt");
+  EXPECT_EQ(Sequence(folder_ / "drive").read(1).stamp, Sequence::kFirstStamp + 100000000);
+}
+
+TEST_F(SequenceFolder, NamesMissingThings) {
+  std::filesystem::remove(folder_ / "drive/labels/000001.label");
+  expectFault("000001.label cannot be read");
+  std::filesystem::remove(folder_ / "drive/calib.txt");
+  expectFault("calib.txt cannot be read");
+  std::filesystem::remove_all(folder_ / "drive/velodyne");
+  expectFault("velodyne is no folder");
+}
+
+TEST_F(SequenceFolder, NamesFaultsOfLabelsAndScans) {
+  replace("labels/000001.label", "12345678ABCD");
+  expectFault("has 3 labels, but");
+  replace("labels/000001.label", "123");
+  expectFault("no multiple of 4");
+  replace("velodyne/000001.bin", "0123456789");
+  expectFault("no multiple of 16");
+}
+
+TEST_F(SequenceFolder, NamesFaultsOfPoses) {
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  expectFault("has 1 poses for 2 scans; scan 000001 has none");
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n");
+  expectFault("has 11 numbers, but needs 12");
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 nan 0 1 0 0 0 0 1 0\n");
+  expectFault("'nan' is no finite number");
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 0 0 0 0 0 0 0 0 0 0 0\n");
+  expectFault("no rigid transform");
+}
+
+TEST_F(SequenceFolder, NamesFaultsOfCalibrationAndTimes) {
+  replace("times.txt", "0\n");
+  expectFault("has 1 times for 2 scans");
+  replace("times.txt", "0\n-1\n");
+  expectFault("time must be from 0");
+  replace("calib.txt", "Tr: 1 0 0 0 0 1 0 0 0 0 0 0\n");
+  expectFault("determinant 0.0");
+  replace("calib.txt", "P0: 1 0 0 0\n");
+  expectFault("no line 'Tr:'");
+}
+
+TEST_F(SequenceFolder, TheWriterRefusesAFolderInUse) {
+  EXPECT_THROW(SequenceWriter(folder_ / "drive"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""The programs that need no ROS, called as a user calls them."""
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+BIN = os.environ['BKI_MAPPING_BIN']
+
+
+def call(program, *arguments):
+    return subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120)
+
+
+class Tools(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        cls.drive = os.path.join(cls.folder, 'drive')
+        made = call('simulate_drive', '--output', cls.drive, '--scans', '4', '--beams', '16', '--columns', '400')
+        assert made.returncode == 0, made.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def fails(self, words, program, *arguments):
+        result = call(program, *arguments)
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertIn(words, result.stderr)
+        self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
+
+    def test_help(self):
+        for program in ('map_sequence', 'simulate_drive'):
+            result = call(program, '--help')
+            self.assertEqual(result.returncode, 0)
+            self.assertIn('--output', result.stdout)
+
+    def test_map_and_report(self):
+        result = call('map_sequence', '--sequence', self.drive, '--output', self.path('map.ply'), '--report',
+                      self.path('report.json'), '--include', 'occupied,free', '--threads', '2', '--first', '1')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.path('report.json')) as file:
+            report = json.load(file)
+        self.assertEqual([scan['name'] for scan in report['scans']], ['000001', '000002', '000003'])
+        self.assertEqual(report['parameters']['threads'], '2')
+        for scan in report['scans']:
+            self.assertEqual(scan['points'], scan['used'] + sum(scan['dropped'].values()))
+            self.assertGreater(scan['blocks'], 0)
+            phases = sum(scan[name] for name in ('observe_ms', 'evidence_ms', 'collect_ms', 'update_ms'))
+            self.assertAlmostEqual(scan['total_ms'], phases, places=6)
+        self.assertEqual(sum(report['voxels_by_class'].values()), report['voxels']['occupied'])
+        self.assertGreater(report['voxels']['free'], report['voxels']['occupied'])
+        self.assertGreater(report['peak_resident_bytes'], report['map_bytes'])
+        self.assertGreaterEqual(report['p99_ms'], report['median_ms'])
+        with open(self.path('map.ply'), 'rb') as file:
+            vertices = report['voxels']['free'] + report['voxels']['occupied']
+            self.assertIn(f'element vertex {vertices}\n'.encode(), file.read(400))
+
+    def test_threads_do_not_show(self):
+        maps = []
+        for threads in ('1', '2', '7'):
+            path = self.path(f'threads{threads}.ply')
+            self.assertEqual(call('map_sequence', '--sequence', self.drive, '--threads', threads, '--include',
+                                  'occupied,free', '--output', path).returncode, 0)
+            with open(path, 'rb') as file:
+                maps.append(file.read())
+        self.assertEqual(maps[0], maps[1])
+        self.assertEqual(maps[0], maps[2])
+
+    def test_config_file_and_set(self):
+        config = self.path('config.yaml')
+        with open(config, 'w') as file:
+            file.write('prior: 0.01\nfree_space: {mode: linear}\n')
+        result = call('map_sequence', '--config', config, '--set', 'prior=0.02', '--print-config')
+        self.assertIn('\nprior: 0.02\n', result.stdout)
+        self.assertIn('\n  mode: linear\n', result.stdout)
+
+    def test_refusals(self):
+        self.fails("did you mean '--sequence'?", 'map_sequence', '--seqence', self.drive)
+        self.fails('--sequence DIR is missing', 'map_sequence')
+        self.fails("'resolutoin' is unknown; did you mean 'resolution'?", 'map_sequence', '--sequence', self.drive,
+                   '--set', 'resolutoin=0.1')
+        self.fails("did you mean 'line'?", 'map_sequence', '--sequence', self.drive, '--set', 'free_space/mode=liner')
+        self.fails('no such', 'map_sequence', '--sequence', '/no such')
+        self.fails('must end in .ply or .pcd', 'map_sequence', '--sequence', self.drive, '--output', 'map.xyz')
+        self.fails("did you mean 'toy'?", 'map_sequence', '--sequence', self.drive, '--classes', 'tooy')
+        self.fails("state 'busy' is unknown", 'map_sequence', '--sequence', self.drive, '--include', 'busy')
+        self.fails('--first 9 is beyond', 'map_sequence', '--sequence', self.drive, '--first', '9')
+        self.fails("no '='", 'map_sequence', '--sequence', self.drive, '--set', 'prior')
+        self.fails('cannot be read', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
+        self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
+        self.fails('is not empty', 'simulate_drive', '--output', self.drive)
+        self.fails('--beams must be', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
+
+    def test_occupancy_table_maps_everything_as_one_class(self):
+        report = self.path('one.json')
+        call('map_sequence', '--sequence', self.drive, '--classes', 'occupancy', '--report', report)
+        with open(report) as file:
+            counts = json.load(file)['voxels_by_class']
+        self.assertEqual(list(counts), ['occupied'])
+        self.assertGreater(counts['occupied'], 1000)
+
+
+if __name__ == '__main__':
+    unittest.main()
