@@ -1,0 +1,111 @@
+"""What the rostests share: clouds, poses, and waiting for messages with a timeout."""
+import struct
+import threading
+import time
+
+import roslib.packages
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import PointCloud2, PointField
+from tf2_msgs.msg import TFMessage
+
+TIMEOUT = 30.0  # wall time to wait for anything [s]
+FORMATS = {PointField.INT8: 'b', PointField.UINT8: 'B', PointField.INT16: 'h', PointField.UINT16: 'H',
+           PointField.INT32: 'i', PointField.UINT32: 'I', PointField.FLOAT32: 'f', PointField.FLOAT64: 'd'}
+
+
+def wait_until(condition, what, timeout=TIMEOUT):
+    """Returns the condition's value as soon as it is true; fails after the timeout."""
+    end = time.monotonic() + timeout
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.01)
+    raise AssertionError(f'{what} did not happen within {timeout} s')
+
+
+def program(name, package='bki_mapping'):
+    """The path of a program, found as roslaunch finds it (rosrun does not look into a build folder in the package)."""
+    return roslib.packages.find_node(package, name)[0]
+
+
+class Listener:
+    """Keeps the messages of one topic."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self.lock = threading.Lock()
+        self.subscriber = rospy.Subscriber(topic, kind, self.add, queue_size=1000)
+
+    def close(self):
+        """Ends the connection, so that the next listener makes a new one."""
+        self.subscriber.unregister()
+
+    def add(self, message):
+        with self.lock:
+            self.messages.append(message)
+
+    def find(self, condition):
+        with self.lock:
+            return next((m for m in reversed(self.messages) if condition(m)), None)
+
+    def wait_for(self, condition, what):
+        return wait_until(lambda: self.find(condition), what)
+
+
+def make_cloud(points, labels, stamp, frame='sensor', label_type=PointField.UINT32, label_name='label', padding=0,
+               big_endian=False):
+    """A cloud with fields label (any type), then x, y, z, after `padding` bytes."""
+    cloud = PointCloud2()
+    cloud.header.stamp = stamp
+    cloud.header.frame_id = frame
+    size = struct.calcsize(FORMATS[label_type])
+    cloud.fields = [PointField(label_name, padding, label_type, 1)]
+    for place, name in enumerate('xyz'):
+        cloud.fields.append(PointField(name, padding + size + 4 * place, PointField.FLOAT32, 1))
+    order = '>' if big_endian else '<'
+    cloud.data = b''.join(b'\xff' * padding + struct.pack(order + FORMATS[label_type] + 'fff', label, *point)
+                          for point, label in zip(points, labels))
+    cloud.is_bigendian = big_endian
+    cloud.height = 1
+    cloud.width = len(points)
+    cloud.point_step = padding + size + 12
+    cloud.row_step = cloud.point_step * cloud.width
+    return cloud
+
+
+class Robot:
+    """Publishes clouds of a sensor and its pose."""
+
+    def __init__(self, cloud_topic='cloud_in'):
+        self.clouds = rospy.Publisher(cloud_topic, PointCloud2, queue_size=100)
+        self.poses = rospy.Publisher('/tf', TFMessage, queue_size=100)
+        self.seconds = 100
+
+    def connect(self):
+        wait_until(lambda: self.clouds.get_num_connections() > 0, 'the mapper subscribing to clouds')
+        wait_until(lambda: self.poses.get_num_connections() > 0, 'the mapper subscribing to tf')
+
+    def next_stamp(self):
+        self.seconds += 1
+        return rospy.Time(self.seconds)
+
+    def publish_pose(self, stamp, position=(0.0, 0.0, 0.0), yaw_quarter_turns=0):
+        transform = TransformStamped()
+        transform.header.stamp = stamp
+        transform.header.frame_id = 'map'
+        transform.child_frame_id = 'sensor'
+        t = transform.transform.translation
+        t.x, t.y, t.z = position
+        half = 0.5 ** 0.5
+        transform.transform.rotation.w = {0: 1.0, 1: half, 2: 0.0}[yaw_quarter_turns]
+        transform.transform.rotation.z = {0: 0.0, 1: half, 2: 1.0}[yaw_quarter_turns]
+        self.poses.publish(TFMessage([transform]))
+
+    def scan(self, points, labels, position=(0.0, 0.0, 0.0), yaw_quarter_turns=0, **options):
+        """Publishes a pose and a cloud; returns the stamp."""
+        stamp = self.next_stamp()
+        self.publish_pose(stamp, position, yaw_quarter_turns)
+        self.clouds.publish(make_cloud(points, labels, stamp, **options))
+        return stamp

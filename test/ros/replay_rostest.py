@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""A simulated drive played by play_sequence, and the same drive replayed from a bag, give the map of map_sequence to
+the byte: through the launch files that users start."""
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import rospy
+import rostest
+from bki_mapping.msg import MappingStatus
+from bki_mapping.srv import SaveMap
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from harness import Listener, program, wait_until  # noqa: E402
+
+SCANS = 6
+
+
+def run(name, *arguments):
+    subprocess.run([program(name), *arguments], check=True, timeout=60)
+
+
+class Replay(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node('replay_rostest')
+        cls.folder = tempfile.mkdtemp()
+        cls.drive = os.path.join(cls.folder, 'drive')
+        run('simulate_drive', '--output', cls.drive, '--scans', str(SCANS), '--beams', '32', '--columns', '900')
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def expected_map(self, mode):
+        path = os.path.join(self.folder, f'expected_{mode}.ply')
+        run('map_sequence', '--sequence', self.drive, '--set', f'free_space/mode={mode}', '--include',
+            'occupied,free', '--output', path)
+        with open(path, 'rb') as file:
+            return file.read()
+
+    def map_of_launch(self, mode, *launch):
+        status = Listener('/mapping/status', MappingStatus)
+        server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, f'mode:={mode}', 'rviz:=false'])
+        try:
+            status.wait_for(lambda m: m.integrated == SCANS, f'mapping {SCANS} scans with {launch[0]}')
+            path = os.path.join(self.folder, 'map.ply')
+            answer = rospy.ServiceProxy('/mapping/save_map', SaveMap)(path, 'occupied,free')
+            self.assertTrue(answer.success, answer.message)
+        finally:
+            server.terminate()
+            server.wait(30)
+            wait_until(lambda: status.subscriber.get_num_connections() == 0, 'the launch ending')
+        with open(path, 'rb') as file:
+            return file.read()
+
+    def test_play_sequence(self):
+        for mode, nodelet in (('line', 'true'), ('linear', 'false')):
+            played = self.map_of_launch(mode, 'semantic_kitti.launch', f'sequence:={self.drive}', 'rate:=0',
+                                        f'nodelet:={nodelet}')
+            self.assertTrue(played == self.expected_map(mode), f'the maps of mode {mode} differ')
+
+    def test_bag(self):
+        for compression in ('none', 'lz4'):
+            bag = os.path.join(self.folder, f'{compression}.bag')
+            run('sequence_to_bag', '--sequence', self.drive, '--output', bag, '--compression', compression)
+            replayed = self.map_of_launch('line', 'replay.launch', f'bag:={bag}', 'rate:=0.5')
+            self.assertTrue(replayed == self.expected_map('line'), 'the maps differ')
+
+    def test_programs_refuse_what_they_do_not_know(self):
+        for name in ('play_sequence', 'sequence_to_bag'):
+            result = subprocess.run([program(name), '--seqence', 'x'], capture_output=True, text=True, timeout=30,
+                                    check=False)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("did you mean '--sequence'?", result.stderr)
+
+
+if __name__ == '__main__':
+    rostest.rosrun('bki_mapping', 'replay', Replay)

@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Two mappers with different settings in one nodelet manager do not meet."""
+import os
+import sys
+import unittest
+
+import rospy
+import rostest
+from bki_mapping.msg import MappingStatus, OccupancyMap
+from std_srvs.srv import Empty
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from harness import Listener, Robot  # noqa: E402
+
+
+def count(message, state):
+    return sum(bytes(block.state).count(state) for block in message.blocks)
+
+
+class TwoMappers(unittest.TestCase):
+    def test_each_has_its_own_map(self):
+        rospy.init_node('two_mappers_rostest')
+        robot = Robot('/cloud_in')
+        status = {name: Listener(f'/{name}/mapping/status', MappingStatus) for name in ('coarse', 'fine')}
+        for listener in status.values():
+            listener.wait_for(lambda m: True, 'a first status')
+        robot.connect()
+        stamp = robot.scan([(4.2, 0.1, 0.1), (4.1, 0.9, 0.1)], [10, 40])
+        for name, listener in status.items():
+            listener.wait_for(lambda m: m.header.stamp == stamp and m.integrated_last, f'{name} mapping the cloud')
+        occupancy = {name: Listener(f'/{name}/occupancy', OccupancyMap) for name in status}
+        maps = {name: occupancy[name].wait_for(lambda m: m.blocks, f'the map of {name}') for name in status}
+        self.assertEqual(maps['coarse'].resolution, 1.0)
+        self.assertEqual(maps['fine'].resolution, 0.25)
+        self.assertEqual(count(maps['coarse'], OccupancyMap.OCCUPIED), 1)
+        self.assertEqual(count(maps['fine'], OccupancyMap.OCCUPIED), 2)
+        self.assertEqual(count(maps['coarse'], OccupancyMap.FREE), 0)
+        self.assertGreater(count(maps['fine'], OccupancyMap.FREE), 10)
+        self.assertEqual((len(maps['coarse'].classes), len(maps['fine'].classes)), (20, 1))
+
+        rospy.ServiceProxy('/coarse/mapping/reset', Empty)()
+        occupancy['coarse'].wait_for(lambda m: not m.blocks, 'the coarse map being empty')
+        occupancy['fine'].close()
+        fine = Listener('/fine/occupancy', OccupancyMap).wait_for(lambda m: True, 'the fine map')
+        self.assertEqual(count(fine, OccupancyMap.OCCUPIED), 2)
+
+
+if __name__ == '__main__':
+    rostest.rosrun('bki_mapping', 'two_mappers', TwoMappers)
