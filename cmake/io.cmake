@@ -4,6 +4,7 @@ find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 
 
+include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 add_library(bki_mapping_io SHARED
   src/io/atomic_file.cpp
   src/io/class_table_yaml.cpp
@@ -20,16 +21,16 @@ add_library(bki_mapping_io SHARED
   src/tools/options.cpp
 )
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-target_include_directories(bki_mapping_io SYSTEM PUBLIC ${PCL_INCLUDE_DIRS})
 target_link_libraries(bki_mapping_io
   PUBLIC bki_mapping_core Boost::program_options pcl_common
   PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 bki_mapping_warnings(bki_mapping_io)
 
-function(bki_mapping_tool name)
-  add_executable(${name} src/tools/${name}.cpp)
-  target_link_libraries(${name} PRIVATE bki_mapping_io ${ARGN})
-  bki_mapping_warnings(${name})
+function(bki_mapping_tool target)
+  target_link_libraries(${target} PRIVATE bki_mapping_io ${ARGN})
+  bki_mapping_warnings(${target})
 endfunction()
+add_executable(map_sequence src/tools/map_sequence.cpp)
 bki_mapping_tool(map_sequence)
+add_executable(simulate_drive src/tools/simulate_drive.cpp)
 bki_mapping_tool(simulate_drive)

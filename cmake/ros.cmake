@@ -1,4 +1,5 @@
 # The ROS shell: nodelet, node and the programs that speak ROS.
+include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 add_library(bki_mapping_ros SHARED
   src/ros/cloud_conversion.cpp
   src/ros/mapping_server.cpp
@@ -11,7 +12,6 @@ add_library(bki_mapping_ros SHARED
   src/ros/server_config.cpp
   src/tools/sequence_messages.cpp
 )
-target_include_directories(bki_mapping_ros SYSTEM PUBLIC ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 target_link_libraries(bki_mapping_ros PUBLIC bki_mapping_io ${catkin_LIBRARIES})
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp)
 bki_mapping_warnings(bki_mapping_ros)
@@ -24,7 +24,9 @@ add_executable(mapping_node src/ros/mapping_node.cpp)
 target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
 bki_mapping_warnings(mapping_node)
 
+add_executable(play_sequence src/tools/play_sequence.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
+add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 
 install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_nodelets
@@ -36,3 +38,4 @@ install(TARGETS mapping_node map_sequence play_sequence sequence_to_bag simulate
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+catkin_install_python(PROGRAMS scripts/mapping_summary.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

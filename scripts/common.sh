@@ -1,6 +1,7 @@
 # Shared by the scripts: steps with times, packages, the environment of a build. Source it.
 set -Eeuo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+export PATH=/usr/bin:$PATH  # ROS belongs to the system's Python, whatever other comes first
 export ROS_HOSTNAME=${ROS_HOSTNAME:-localhost}
 
 # step "what it does" command...: runs the command, says what and how long. A failing command ends the script.

@@ -1,12 +1,12 @@
 // Class tables: the shipped ones, and faults that must be named.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <functional>
 #include <map>
 
 #include "bki_mapping/io/class_table_yaml.h"
+#include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
@@ -22,7 +22,8 @@ std::string messageOf(const std::function<void()>& action) {
 
 /// What loading a table with this text says.
 std::string faultOf(const std::string& text) {
-  const std::string file = testing::TempDir() + "class_table_" + std::to_string(getpid()) + ".yaml";
+  const TemporaryFolder folder;
+  const std::string file = folder / "file.yaml";
   std::ofstream(file) << text;
   return messageOf([&] { loadClassTable(file); });
 }

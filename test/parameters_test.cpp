@@ -1,6 +1,5 @@
 // Parameters: names, refusals, files, and that documents agree with the code.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <functional>
@@ -9,6 +8,7 @@
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/free_space/registry.h"
 #include "bki_mapping/io/config_yaml.h"
+#include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
@@ -116,7 +116,8 @@ TEST(Parameters, TheDocumentHasARowForEach) {
 }
 
 TEST(ParameterFile, NamesItsFaults) {
-  const std::string file = testing::TempDir() + "parameters_" + std::to_string(getpid()) + ".yaml";
+  const TemporaryFolder folder;
+  const std::string file = folder / "file.yaml";
   const auto faultOf = [&](const std::string& text) -> std::string {
     std::ofstream(file) << text;
     try {

@@ -18,7 +18,7 @@ class TemporaryFolder {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
   std::size_t fileCount() const {
     std::size_t count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(path_)) count += entry.is_regular_file();

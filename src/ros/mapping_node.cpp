@@ -1,9 +1,34 @@
 // The mapping server as a node of its own.
 #include <ros/ros.h>
 
+#include <iostream>
+#include <string>
+#include <vector>
+
 #include "bki_mapping/ros/mapping_server.h"
 
+namespace {
+
+const char kHelp[] =
+    "mapping_node: maps labelled point clouds (topic cloud_in, tf) as semantic 3D occupancy.\n"
+    "It takes ROS arguments alone: __name:=NAME, TOPIC:=OTHER, _PARAMETER:=VALUE. Parameters, topics and "
+    "services are\n"
+    "described in docs/parameters.md and docs/ros.md; launch/mapping.launch starts it with its defaults.\n";
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() > 1) {
+    if (arguments[1] == "--help" || arguments[1] == "-h") {
+      std::cout << kHelp;
+      return 0;
+    }
+    std::cerr << "mapping_node: option '" << arguments[1]
+              << "' is unknown; it takes ROS arguments alone (see --help)\n";
+    return 1;
+  }
   ros::init(argc, argv, "mapping");
   const ros::NodeHandle node, private_node("~");  // while one lives, ROS can still say what went wrong
   try {

@@ -20,16 +20,11 @@ namespace po = tools::po;
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
-  options.add_options()("sequence", text("DIR"), "folder with velodyne/, labels/, poses.txt, calib.txt")(
-      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
-      "first", number("N")->default_value(0), "first scan to map")(
-      "scans", number("N"), "how many; default all")("output", text("FILE.ply|FILE.pcd"),
-                                                     "map file to write")(
+  options.add_options()("output", text("FILE.ply|FILE.pcd"), "map file to write")(
       "include", text("STATES")->default_value("occupied"), "voxels in the map file: occupied,free,occluded")(
       "report", text("FILE.json"), "report to write")(
       "print-config", po::bool_switch(), "print the parameters in force as YAML, and map nothing");
-  options.add(tools::mapperOptions());
+  options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
 
@@ -44,24 +39,16 @@ int mapSequence(const po::variables_map& given) {
     std::cout << parameterYaml(tools::mapperConfig(given));
     return 0;
   }
-  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
   const auto states = parseStates(given["include"].as<std::string>());
   if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
-  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
-
-  const std::size_t first = given["first"].as<std::size_t>();
-  if (first >= sequence.size()) {
-    throw std::invalid_argument("--first " + std::to_string(first) + " is beyond the last of " +
-                                std::to_string(sequence.size()) + " scans");
-  }
-  std::size_t count = sequence.size() - first;
-  if (given.count("scans")) count = std::min(count, given["scans"].as<std::size_t>());
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
 
   std::vector<ScanReport> scans;
-  for (std::size_t i = first; i < first + count; ++i) {
+  for (std::size_t i = first; i < last; ++i) {
     scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
-    tools::showProgress(scans.size(), count, progressText(scans.back()));
+    tools::showProgress(scans.size(), last - first, progressText(scans.back()));
   }
   if (given.count("output"))
     exportMap(given["output"].as<std::string>(), mapper.map(), mapper.classes(), states);

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <iostream>
 #include <stdexcept>
 
@@ -69,6 +70,33 @@ MapperConfig mapperConfig(const po::variables_map& given) {
 
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given) {
   return std::make_shared<const ClassTable>(loadClassTable(given["classes"].as<std::string>()));
+}
+
+po::options_description sequenceOptions() {
+  po::options_description options("Sequence");
+  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
+  options.add_options()("sequence", po::value<std::string>()->value_name("DIR"),
+                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
+      "labels", po::value<std::string>()->value_name("FOLDER")->default_value("labels"),
+      "name of the folder with labels")("first", number("N")->default_value(0), "first scan")(
+      "scans", number("N"), "how many; default all");
+  return options;
+}
+
+Sequence openSequence(const po::variables_map& given) {
+  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
+  return Sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+}
+
+std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence) {
+  const std::size_t first = given["first"].as<std::size_t>();
+  if (first >= sequence.size()) {
+    throw std::invalid_argument("--first " + std::to_string(first) + " is beyond the last of " +
+                                std::to_string(sequence.size()) + " scans");
+  }
+  std::size_t count = sequence.size() - first;
+  if (given.count("scans")) count = std::min(count, given["scans"].as<std::size_t>());
+  return {first, first + count};
 }
 
 int run(const std::string& program, const std::function<int()>& body) {

@@ -22,16 +22,12 @@ constexpr double kClockStep = 0.01;  ///< [s] of wall time
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
-  options.add_options()("sequence", text("DIR")->required(),
-                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
-      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
-      "first", number("N")->default_value(0), "first scan to play")("scans", number("N"),
-                                                                    "how many; default all")(
+  options.add_options()(
       "rate", po::value<double>()->value_name("FACTOR")->default_value(1.0),
       "1 is real time, 2 twice as fast; 0 waits until `mapping/status` acknowledges each scan")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
       "map-frame", text("FRAME")->default_value("map"), "frame of the map");
+  options.add(tools::sequenceOptions());
   return options;
 }
 
@@ -93,11 +89,9 @@ class Player {
 };
 
 int play(const po::variables_map& given) {
-  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
   const double rate = given["rate"].as<double>();
-  const std::size_t first = std::min(given["first"].as<std::size_t>(), sequence.size());
-  std::size_t last = sequence.size();
-  if (given.count("scans")) last = std::min(last, first + given["scans"].as<std::size_t>());
   if (!(rate >= 0.0)) throw std::invalid_argument("--rate must be 0 or more");
 
   Player player({given["map-frame"].as<std::string>(), given["frame"].as<std::string>()});

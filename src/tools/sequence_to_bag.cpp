@@ -15,14 +15,12 @@ namespace po = tools::po;
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("sequence", text("DIR")->required(),
-                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
-      "labels", text("FOLDER")->default_value("labels"), "name of the folder with labels")(
-      "output", text("FILE.bag")->required(), "bag to write")(
+  options.add_options()("output", text("FILE.bag")->required(), "bag to write")(
       "cloud-topic", text("TOPIC")->default_value("/velodyne_points"), "topic of the clouds")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
       "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
       "compression", text("KIND")->default_value("none"), "none, lz4 or bz2");
+  options.add(tools::sequenceOptions());
   return options;
 }
 
@@ -34,22 +32,23 @@ rosbag::CompressionType compression(const std::string& name) {
 }
 
 int writeBag(const po::variables_map& given) {
-  const Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
   const tools::FrameNames names{given["map-frame"].as<std::string>(), given["frame"].as<std::string>()};
   AtomicFile file(given["output"].as<std::string>());
   rosbag::Bag bag;
   bag.open(file.temporaryPath(), rosbag::bagmode::Write);
   bag.setCompression(compression(given["compression"].as<std::string>()));
-  for (std::size_t i = 0; i < sequence.size(); ++i) {
+  for (std::size_t i = first; i < last; ++i) {
     const SequenceFrame frame = sequence.read(i);
     const ros::Time stamp = ros::Time().fromNSec(frame.stamp);
     bag.write("/tf", stamp, tools::tfMessage(frame, names));
     bag.write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
-    tools::showProgress(i + 1, sequence.size(), "scans");
+    tools::showProgress(i + 1 - first, last - first, "scans");
   }
   bag.close();
   file.commit();
-  std::cout << sequence.size() << " scans in " << given["output"].as<std::string>() << "\n";
+  std::cout << last - first << " scans in " << given["output"].as<std::string>() << "\n";
   return 0;
 }
 

@@ -44,6 +44,8 @@ class MappingTest(unittest.TestCase):
         cls.save_map = rospy.ServiceProxy('mapping/save_map', SaveMap)
 
     def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
         self.reset_map()
 
     def deal_with(self, stamp):
@@ -65,7 +67,7 @@ class MappingTest(unittest.TestCase):
 
     def saved_vertices(self, include='occupied'):
         """Voxels of a saved PLY: {(x, y, z): (label, state)}."""
-        path = os.path.join(tempfile.mkdtemp(), 'map.ply')
+        path = os.path.join(self.folder.name, 'map.ply')
         answer = self.save_map(path, include)
         self.assertTrue(answer.success, answer.message)
         with open(path, 'rb') as file:
@@ -202,11 +204,11 @@ class MappingTest(unittest.TestCase):
         self.assertEqual(self.saved_vertices('occupied,free'), {})
 
     def test_save_map_refuses_other_places(self):
-        for path in ('map.ply', '/no/such/folder/map.ply', '/tmp/map.txt', ''):
+        for path in ('map.ply', '/no/such/folder/map.ply', f'{self.folder.name}/map.txt', ''):
             answer = self.save_map(path, '')
             self.assertFalse(answer.success, path)
             self.assertIn(os.path.basename(path), answer.message)
-        self.assertFalse(self.save_map('/tmp/map.ply', 'everything').success)
+        self.assertFalse(self.save_map(f'{self.folder.name}/map.ply', 'everything').success)
 
     def test_nothing_is_published_to_nobody_and_all_to_who_comes_late(self):
         self.integrate(HITS, [CAR, CAR, ROAD])

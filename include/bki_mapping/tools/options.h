@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/config.h"
+#include "bki_mapping/io/sequence.h"
 
 namespace bki_mapping::tools {
 
@@ -26,6 +28,14 @@ po::options_description mapperOptions();
 /// The settings that those options ask for. @throws std::invalid_argument.
 MapperConfig mapperConfig(const po::variables_map& given);
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
+
+/// Options that tools with a sequence share: --sequence, --labels, --first, --scans.
+po::options_description sequenceOptions();
+/// The sequence asked for. @throws std::invalid_argument if --sequence is missing, std::runtime_error as
+/// Sequence.
+Sequence openSequence(const po::variables_map& given);
+/// The frames asked for, from first to before last. @throws std::invalid_argument if there are none.
+std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence);
 
 /// Runs a program; an exception becomes one line on standard error and exit status 1.
 int run(const std::string& program, const std::function<int()>& body);
