@@ -7,6 +7,8 @@ add_library(bki_mapping_core SHARED
   src/core/semantic_map.cpp
   src/inference/beam_evidence.cpp
   src/inference/beam_field.cpp
+  src/inference/beam_rows.cpp
+  src/inference/beam_rows_generic.cpp
   src/inference/beam_rtree.cpp
   src/inference/beam_table.cpp
   src/inference/block_walk.cpp
@@ -29,3 +31,9 @@ target_link_libraries(bki_mapping_core PUBLIC Eigen3::Eigen Threads::Threads PRI
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
 target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math -O3)
 bki_mapping_warnings(bki_mapping_core)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # Chosen at run time where the processor has it.
+  target_sources(bki_mapping_core PRIVATE src/inference/beam_rows_avx2.cpp)
+  set_source_files_properties(src/inference/beam_rows_avx2.cpp PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma")
+  target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_AVX2)
+endif()

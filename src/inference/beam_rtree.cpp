@@ -28,8 +28,8 @@ class BeamRtree : public BeamIndex {
     tree_ = Tree(values);  // packed
   }
 
-  void query(const Eigen::Vector3f& centre, float radius, std::vector<std::uint32_t>& beams) const override {
-    beams.clear();
+  void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const override {
+    ranges.clear();
     const float distance = centre.norm();
     // Directions within the angle delta = asin(radius / distance) lie within the chord 2 sin(delta / 2).
     float half = 2.0f;
@@ -39,7 +39,7 @@ class BeamRtree : public BeamIndex {
     const Box box(Point(q.x() - half, q.y() - half, q.z() - half),
                   Point(q.x() + half, q.y() + half, q.z() + half));
     for (auto found = tree_.qbegin(bg::index::intersects(box)); found != tree_.qend(); ++found) {
-      beams.push_back(found->second);
+      ranges.push_back({found->second, found->second + 1});
     }
   }
 

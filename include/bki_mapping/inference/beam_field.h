@@ -22,22 +22,27 @@ class BeamField {
 
   const GridGeometry& geometry() const { return geometry_; }
   const VoxelKernel& kernel() const { return kernel_; }
+  /// In the order of the index.
   const Beams& beams() const { return beams_; }
   /// Radius about a beam outside which no voxel centre is reached, in voxels and in metres.
   float reach() const { return reach_; }
   double reachMetres() const { return reach_ * geometry_.resolution(); }
   double longest() const { return longest_; }  ///< length of the longest beam [m]
 
-  /// Calls visit(const LocalBeam&, const Eigen::Vector3f& end) for every beam that may reach the block
-  /// between the sensor and its end, or `follow` [m from the sensor] if that is farther.
-  template <typename Visit>
-  void forEachBeamNear(const BlockIndex& index, double follow, std::vector<std::uint32_t>& candidates,
-                       Visit&& visit) const;
+  /// Finds the beams that may reach the block between the sensor and their end, or `follow` [m from the
+  /// sensor] if that is farther: their numbers in scratch.beams.
+  void findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const;
+
+  /// A beam in a block's coordinates, turned so that the given axis (0 x, 1 y, 2 z) comes first: what
+  /// LocalBeam calls x, y, z are then the axes `lane`, lane + 1, lane + 2 (mod 3).
+  LocalBeam localBeam(std::size_t beam, const BlockIndex& index, int lane) const;
+  /// The axis nearest to a beam's direction: along it a row of voxels holds most of those near the beam.
+  int laneOf(std::size_t beam) const;
 
   /// Calls visit(offset, rho, length) for every voxel of the block that the line of such a beam reaches, with
   /// rho the projection of the voxel's centre on the beam / beam length [m].
   template <typename Visit>
-  void forEachVoxelNear(const BlockIndex& index, double follow, std::vector<std::uint32_t>& candidates,
+  void forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
                         Visit&& visit) const;
 
  private:
@@ -49,6 +54,8 @@ class BeamField {
   Beams beams_;
   float reach_;
   double longest_ = 0.0;
+  std::vector<float> ux_, uy_, uz_, length_;  ///< unit directions and lengths [m], for a first look
+  std::vector<Eigen::Vector3d> directions_;   ///< the same, exactly
   std::unique_ptr<BeamIndex> index_;
 };
 
@@ -73,34 +80,22 @@ class LazyBeamField {
 };
 
 template <typename Visit>
-void BeamField::forEachBeamNear(const BlockIndex& index, double follow,
-                                std::vector<std::uint32_t>& candidates, Visit&& visit) const {
-  const double resolution = geometry_.resolution();
-  const Eigen::Vector3d centre = geometry_.blockCentre(index) - beams_.origin;
-  const auto radius = static_cast<float>((kLatticeRadius + reach_) * resolution);
-  index_->query(centre.cast<float>(), radius, candidates);
-  LocalBeam local;
-  for (const std::uint32_t b : candidates) {
-    if (toLocalBeam(centre, beams_.ends[b], resolution, reach_, follow, local)) visit(local, beams_.ends[b]);
-  }
-}
-
-template <typename Visit>
-void BeamField::forEachVoxelNear(const BlockIndex& index, double follow,
-                                 std::vector<std::uint32_t>& candidates, Visit&& visit) const {
+void BeamField::forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
+                                 Visit&& visit) const {
   const bool counting = kernel_.type == KernelType::kCounting;
-  const auto onBeam = [&](const LocalBeam& local, const Eigen::Vector3f& end) {
-    const float length = end.norm();
+  findBeamsNear(index, follow, scratch);
+  for (std::size_t b = 0; b < scratch.beams.size(); ++b) {
+    const LocalBeam local = localBeam(scratch.beams[b], index, 0);
+    const Eigen::Vector3f& end = beams_.ends[scratch.beams[b]];
     forEachNearRow(local, reach_, [&](const NearRow& row) {
       for (int i = 0; i < kBlockEdge; ++i) {
         const float dx = static_cast<float>(i) - row.x;
         const float d2 = row.distance2 + local.g * dx * dx;
         if (d2 >= reach_ * reach_ || (counting && !crosses(index, row.offset + i, end))) continue;
-        visit(row.offset + i, row.rho + static_cast<float>(i) * row.rho_step, length);
+        visit(row.offset + i, row.rho + static_cast<float>(i) * row.rho_step, length_[scratch.beams[b]]);
       }
     });
-  };
-  forEachBeamNear(index, follow, candidates, onBeam);
+  }
 }
 
 }  // namespace bki_mapping

@@ -1,20 +1,17 @@
 /// @file Beams in the coordinates of one block, and the rows of voxels near them.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
-#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/core/types.h"
 
 namespace bki_mapping {
 
 /// A beam's line in the coordinates of one block: [voxels], from the centre of the block's first voxel.
 struct LocalBeam {
-  Eigen::Vector3f u;    ///< unit direction
-  Eigen::Vector3f n;    ///< the line's point nearest to the block's centre
-  float g, inverse_g;   ///< u_y^2 + u_z^2 > 0, and its inverse
+  float ux, uy, uz;     ///< unit direction
+  float nx, ny, nz;     ///< the line's point nearest to the block's centre
+  float g, inverse_g;   ///< uy^2 + uz^2 > 0, and its inverse
   float rho_at_n;       ///< projection of n on the beam / beam length: 0 at the sensor, 1 at the end
   float rho_per_voxel;  ///< change of rho along u
 };
@@ -29,59 +26,50 @@ struct NearRow {
 /// Half the diagonal of the lattice of a block's voxel centres [voxels].
 constexpr double kLatticeRadius = 0.5 * (kBlockEdge - 1) * 1.7320508075688772;
 
-/// Brings a beam into a block's coordinates.
-/// @param block_centre relative to the sensor [m]. @param end of the beam, relative to the sensor [m].
-/// @param reach [voxels] @param follow how far from the sensor the line is followed, if beyond its end [m].
-/// @return false if no voxel centre of the block can lie within `reach` of that piece of the line.
-inline bool toLocalBeam(const Eigen::Vector3d& block_centre, const Eigen::Vector3f& end, double resolution,
-                        double reach, double follow, LocalBeam& beam) {
-  const double radius = (kLatticeRadius + reach) * resolution;
-  const Eigen::Vector3d e = end.cast<double>();
-  const double length = e.norm();
-  Eigen::Vector3d u = e / length;
-  const double along = block_centre.dot(u);
-  if (along < -radius || along > std::max(length, follow) + radius) return false;
-  const Eigen::Vector3d to_line = along * u - block_centre;
-  if (to_line.squaredNorm() > radius * radius) return false;
-  if (u.y() * u.y() + u.z() * u.z() < 1e-16) u.z() = 1e-8;  // along x: turned by 1e-8 rad, so that g > 0
-  const double g = u.y() * u.y() + u.z() * u.z();
-  beam.u = u.cast<float>();
-  beam.n = (to_line / resolution).cast<float>().array() + 0.5f * (kBlockEdge - 1);
-  beam.g = static_cast<float>(g);
-  beam.inverse_g = static_cast<float>(1.0 / g);
-  beam.rho_at_n = static_cast<float>(along / length);
-  beam.rho_per_voxel = static_cast<float>(resolution / length);
-  return true;
+/// Whole numbers from first to last; none if last is below first.
+struct RowSpan {
+  int first, last;
+};
+
+/// The rows of a block, 0 to 7, between two bounds.
+[[gnu::always_inline]] inline RowSpan rowsBetween(float low, float high) {
+  const float end = kBlockEdge - 1;
+  if (!(low <= end && high >= 0.0f)) return {0, -1};
+  return {low > 0.0f ? static_cast<int>(std::ceil(low)) : 0,
+          high < end ? static_cast<int>(high) : kBlockEdge - 1};
+}
+
+/// The rows that a beam passes within reach anywhere in the block, on one of the axes y and z: the line's
+/// course over x = 0 to 7, and the tube's half width at fixed x.
+[[gnu::always_inline]] inline RowSpan rowsNear(float ux, float uw, float nx, float nw, float reach) {
+  if (std::abs(ux) < 0.25f) return {0, kBlockEdge - 1};
+  const float slope = uw / ux;
+  const float half = reach * std::sqrt(1.0f + slope * slope) * 1.0001f + 1e-4f;
+  const float at_first = nw - nx * slope, at_last = at_first + (kBlockEdge - 1) * slope;
+  return at_first < at_last ? rowsBetween(at_first - half, at_last + half)
+                            : rowsBetween(at_last - half, at_first + half);
 }
 
 /// Calls visit(const NearRow&) for every row of the block with a voxel centre within `reach` [voxels] of the
 /// beam's line. Distances follow from the cross product of u with the offset from n.
 template <typename Visit>
-void forEachNearRow(const LocalBeam& beam, float reach, Visit&& visit) {
-  const float reach2 = reach * reach;
-  const float strip = reach * std::sqrt(beam.g) * 1.0001f + 1e-6f;
-  for (int k = 0; k < kBlockEdge; ++k) {
-    const float wz = static_cast<float>(k) - beam.n.z();
-    // Rows within reach form a strip: |w_y u_z - w_z u_y| < reach sqrt(g).
-    int first = 0, last = kBlockEdge - 1;
-    const float middle = wz * beam.u.y();
-    if (std::abs(beam.u.z()) * kBlockEdge > 1e-3f * strip) {
-      const float a = (middle - strip) / beam.u.z() + beam.n.y(),
-                  b = (middle + strip) / beam.u.z() + beam.n.y();
-      first = static_cast<int>(std::ceil(std::clamp(std::min(a, b), 0.0f, 100.0f)));
-      last = static_cast<int>(std::floor(std::clamp(std::max(a, b), -1.0f, kBlockEdge - 1.0f)));
-    }
-    for (int j = first; j <= last; ++j) {
-      const float wy = static_cast<float>(j) - beam.n.y();
-      const float c = wy * beam.u.z() - wz * beam.u.y();
+[[gnu::always_inline]] inline void forEachNearRow(const LocalBeam& beam, float reach, Visit&& visit) {
+  const RowSpan ys = rowsNear(beam.ux, beam.uy, beam.nx, beam.ny, reach);
+  if (ys.first > ys.last) return;
+  const RowSpan zs = rowsNear(beam.ux, beam.uz, beam.nx, beam.nz, reach);
+  const float reach2 = reach * reach, last_index = kBlockEdge - 1;
+  for (int k = zs.first; k <= zs.last; ++k) {
+    const float wz = static_cast<float>(k) - beam.nz;
+    for (int j = ys.first; j <= ys.last; ++j) {
+      const float wy = static_cast<float>(j) - beam.ny;
+      const float c = wy * beam.uz - wz * beam.uy;
       const float distance2 = c * c * beam.inverse_g;
-      if (distance2 >= reach2) continue;
-      const float p = wy * beam.u.y() + wz * beam.u.z();
-      const float x = beam.n.x() + beam.u.x() * p * beam.inverse_g;
-      const float nearest = std::clamp(x, 0.0f, kBlockEdge - 1.0f) - x;
+      const float p = wy * beam.uy + wz * beam.uz;
+      const float x = beam.nx + beam.ux * p * beam.inverse_g;
+      const float nearest = x < 0.0f ? x : (x > last_index ? x - last_index : 0.0f);
       if (distance2 + beam.g * nearest * nearest >= reach2) continue;
-      const float rho = beam.rho_at_n + (p - beam.n.x() * beam.u.x()) * beam.rho_per_voxel;
-      visit(NearRow{kBlockEdge * (j + kBlockEdge * k), distance2, x, rho, beam.u.x() * beam.rho_per_voxel});
+      const float rho = beam.rho_at_n + (p - beam.nx * beam.ux) * beam.rho_per_voxel;
+      visit(NearRow{kBlockEdge * (j + kBlockEdge * k), distance2, x, rho, beam.ux * beam.rho_per_voxel});
     }
   }
 }

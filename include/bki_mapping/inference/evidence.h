@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "bki_mapping/core/semantic_map.h"
+#include "bki_mapping/inference/beam_index.h"
+#include "bki_mapping/inference/beam_raster.h"
 #include "bki_mapping/inference/index_numbering.h"
 
 namespace bki_mapping {
@@ -12,7 +14,10 @@ namespace bki_mapping {
 /// Working memory of one thread.
 struct EvidenceScratch {
   alignas(64) std::array<float, kBlockVoxels> sums{};
+  std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
+  std::array<std::vector<LocalBeam>, 3> local_beams;  ///< by the axis that comes first
+  alignas(64) std::array<float, kBlockVoxels> turned_sums{};
 };
 
 /// Answers two questions: which blocks do you touch, and add yourself to this block.

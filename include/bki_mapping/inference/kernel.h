@@ -14,9 +14,9 @@ namespace bki_mapping {
 /// it is computed as (1 - r)^5 times a polynomial of degree 8, fitted for the least greatest error. The
 /// result is within 1e-6 of the formula.
 /// @param t r^2 = (d / l)^2, >= 0.
-inline float sparseKernel(float t) {
+[[gnu::always_inline]] inline float sparseKernel(float t) {
   const float r = std::sqrt(t);
-  const float s = std::max(0.0f, 1.0f - r);
+  const float s = 1.0f - r > 0.0f ? 1.0f - r : 0.0f;
   float q = -1.619635431551842f;
   q = q * r + 3.487306039115083f;
   q = q * r + 1.956194844059496f;
