@@ -1,5 +1,5 @@
 # Files and simulation, and the programs that need no ROS: yaml-cpp, nlohmann-json and PCL's file formats.
-find_package(PCL REQUIRED COMPONENTS common io)
+find_package(PCL REQUIRED COMPONENTS common filters io)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 
@@ -34,3 +34,5 @@ add_executable(map_sequence src/tools/map_sequence.cpp)
 bki_mapping_tool(map_sequence)
 add_executable(simulate_drive src/tools/simulate_drive.cpp)
 bki_mapping_tool(simulate_drive)
+add_executable(benchmark_sequence benchmark/benchmark_sequence.cpp)
+bki_mapping_tool(benchmark_sequence pcl_filters)

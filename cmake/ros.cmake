@@ -33,7 +33,7 @@ install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_node
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS mapping_node map_sequence play_sequence sequence_to_bag simulate_drive
+install(TARGETS benchmark_sequence map_sequence mapping_node play_sequence sequence_to_bag simulate_drive
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

@@ -126,7 +126,7 @@ TEST_P(EveryScene, RangeLimitsEqualBruteForce) {
   config.sensor_model.min_range = 0.2;
   config.sensor_model.max_range = 2.0;
   expectEqualsBruteForce(scene_.scan, config, scene_.name + ", cut");
-  config.sensor_model.clear_beyond_max_range = false;
+  config.clear_beyond_max_range = false;
   config.unlabelled_points = UnlabelledPoints::kIgnore;
   if (scene_.name != "seam" && scene_.name != "poles" && scene_.name != "cluster") {
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", not cut");

@@ -51,11 +51,11 @@ TEST(Parameters, SetAndGetEveryOne) {
   setParameters(config, {{"resolution", "0.125"},
                          {"kernel/type", "counting"},
                          {"free_space/mode", "linear"},
-                         {"sensor_model/clear_beyond_max_range", "false"},
+                         {"clear_beyond_max_range", "false"},
                          {"free_space/seed", "9007199254740991"}});
   EXPECT_EQ(config.resolution, 0.125);
   EXPECT_EQ(config.kernel.type, KernelType::kCounting);
-  EXPECT_FALSE(config.sensor_model.clear_beyond_max_range);
+  EXPECT_FALSE(config.clear_beyond_max_range);
   EXPECT_EQ(config.free_space.seed, 9007199254740991);
 }
 

@@ -65,9 +65,9 @@ std::vector<Parameter> mapperParameters() {
           [](MapperConfig & c) -> auto& { return c.sensor_model.max_range; },
           [](double x) { return x > 0.0 || x == -1.0; }),
       choiceParameter<MapperConfig>(
-          "sensor_model/clear_beyond_max_range", {"false", "true"},
-          "Whether beams with a hit beyond max_range clear the space up to max_range.",
-          [](MapperConfig & c) -> auto& { return c.sensor_model.clear_beyond_max_range; }),
+          "clear_beyond_max_range", {"false", "true"},
+          "Whether beams with a hit beyond sensor_model/max_range clear the space up to it.",
+          [](MapperConfig & c) -> auto& { return c.clear_beyond_max_range; }),
       choiceParameter<MapperConfig>(
           "occlusion", {"none", "mapped", "all"},
           "Mark voxels behind hits: not at all, in blocks of the map, or wherever beams point.",

@@ -69,7 +69,7 @@ Observation observe(const Scan& scan, const ClassTable& classes, const MapperCon
       ++counts.too_near;
     } else if (limited && range > sensor.max_range) {
       ++counts.beyond_max;
-      if (sensor.clear_beyond_max_range) {
+      if (config.clear_beyond_max_range) {
         cut.points.push_back(point * (static_cast<float>(sensor.max_range) / range));
       }
     } else if (!geometry.contains(scan.origin + point.cast<double>())) {

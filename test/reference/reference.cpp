@@ -61,7 +61,7 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
     const double range = p.norm();
     if (!p.allFinite() || range < 1e-3 || range < config.sensor_model.min_range) continue;
     if (max_range > 0.0 && range > max_range) {
-      if (config.sensor_model.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
+      if (config.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
       continue;
     }
     auto id = classes.classOfRaw(scan.labels[i]);

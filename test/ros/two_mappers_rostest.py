@@ -8,6 +8,7 @@ import rospy
 import rostest
 from bki_mapping.msg import MappingStatus, OccupancyMap
 from std_srvs.srv import Empty
+from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import Listener, Robot  # noqa: E402
@@ -37,6 +38,14 @@ class TwoMappers(unittest.TestCase):
         self.assertEqual(count(maps['coarse'], OccupancyMap.FREE), 0)
         self.assertGreater(count(maps['fine'], OccupancyMap.FREE), 10)
         self.assertEqual((len(maps['coarse'].classes), len(maps['fine'].classes)), (20, 1))
+
+        # The coarse map shows the class's colour, the fine one its height: z = 0.125 m is 1/160 of 20 m, nearly blue.
+        colors = {name: Listener(f'/{name}/occupied_cells_vis_array', MarkerArray).wait_for(
+            lambda m: any(marker.colors for marker in m.markers), f'markers of {name}') for name in status}
+        car = next(marker for marker in colors['coarse'].markers if marker.ns == 'car')
+        self.assertAlmostEqual(car.colors[0].b, 245 / 255, places=5)
+        self.assertEqual((colors['fine'].markers[0].colors[0].r, colors['fine'].markers[0].colors[0].g), (0.0, 0.0))
+        self.assertAlmostEqual(colors['fine'].markers[0].colors[0].b, 0.525, places=2)
 
         rospy.ServiceProxy('/coarse/mapping/reset', Empty)()
         occupancy['coarse'].wait_for(lambda m: not m.blocks, 'the coarse map being empty')

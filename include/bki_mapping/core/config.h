@@ -27,9 +27,8 @@ struct FreeSpaceConfig {
 };
 
 struct SensorModelConfig {
-  double min_range = 0.0;              ///< hits nearer than this are dropped [m]
-  double max_range = -1.0;             ///< hits farther than this are no hits [m]; -1: no limit
-  bool clear_beyond_max_range = true;  ///< such hits clear as beams cut at max_range
+  double min_range = 0.0;   ///< hits nearer than this are dropped [m]
+  double max_range = -1.0;  ///< hits farther than this are no hits [m]; -1: no limit
 };
 
 enum class OcclusionExtent { kNone, kMapped, kAll };
@@ -45,6 +44,7 @@ struct MapperConfig {
   KernelConfig kernel;
   FreeSpaceConfig free_space;
   SensorModelConfig sensor_model;
+  bool clear_beyond_max_range = true;  ///< hits beyond max_range clear as beams cut there
   OcclusionExtent occlusion = OcclusionExtent::kNone;
   UnlabelledPoints unlabelled_points = UnlabelledPoints::kOccupied;
   UnknownLabels unknown_labels = UnknownLabels::kIgnore;

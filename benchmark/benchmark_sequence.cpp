@@ -1,0 +1,132 @@
+// Times the integration of a sequence in every mode, against pcl::VoxelGrid on the same scans in the same
+// run.
+#include <pcl/filters/voxel_grid.h>
+#include <pcl/point_types.h>
+
+#include <cstdio>
+
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/core/stopwatch.h"
+#include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/report.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/tools/options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+/// Settings to time, with the name under which they are listed.
+struct Case {
+  std::string name;
+  std::map<std::string, std::string> settings;
+};
+
+struct Timing {
+  double median_ms, p99_ms;
+  std::size_t map_bytes;
+};
+
+const std::vector<Case>& cases() {
+  static const std::vector<Case> all = {
+      {"none", {{"free_space/mode", "none"}}},
+      {"linear, 1 sample", {{"free_space/mode", "linear"}}},
+      {"linear, 5 samples", {{"free_space/mode", "linear"}, {"free_space/samples_per_beam", "5"}}},
+      {"uniform, 1 sample", {{"free_space/mode", "uniform"}}},
+      {"even, gap 1 m", {{"free_space/mode", "even"}}},
+      {"line, bilinear, mapped", {{"free_space/extent", "mapped"}}},
+      {"line, bilinear, observed", {{"free_space/extent", "observed"}}},
+      {"line, bilinear, mapped", {{"free_space/extent", "mapped"}, {"resolution", "0.1"}}},
+  };
+  return all;
+}
+
+po::options_description options() {
+  po::options_description options("Options");
+  options.add(tools::sequenceOptions());
+  options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "table to write")(
+      "warm-up", po::value<std::size_t>()->value_name("N")->default_value(3),
+      "first scans that are not timed");
+  return options;
+}
+
+/// The median time of pcl::VoxelGrid with 0.1 m leaves on raw scans, one thread [ms].
+double yardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up) {
+  std::vector<double> times;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
+    for (std::size_t p = 0; p < frames[i].points.size(); ++p) {
+      pcl::PointXYZL point;
+      point.getVector3fMap() = frames[i].points[p];
+      point.label = frames[i].labels[p];
+      cloud->push_back(point);
+    }
+    pcl::VoxelGrid<pcl::PointXYZL> grid;
+    pcl::PointCloud<pcl::PointXYZL> output;
+    Stopwatch watch;
+    grid.setInputCloud(cloud);
+    grid.setLeafSize(0.1f, 0.1f, 0.1f);
+    grid.filter(output);
+    if (i >= warm_up) times.push_back(watch.lap());
+  }
+  return quantile(times, 0.5);
+}
+
+Timing timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& frames, std::size_t warm_up,
+                const std::shared_ptr<const ClassTable>& classes) {
+  MapperConfig config;
+  setParameters(config, c.settings);
+  config.threads = threads;
+  SemanticMapper mapper(config, classes);
+  std::vector<double> times;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Scan scan = frames[i].scan();
+    Stopwatch watch;
+    mapper.integrate(scan);
+    if (i >= warm_up) times.push_back(watch.lap());
+  }
+  return {quantile(times, 0.5), quantile(times, 0.99), mapper.map().bytes()};
+}
+
+int benchmark(const po::variables_map& given) {
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
+  const std::size_t warm_up = given["warm-up"].as<std::size_t>();
+  if (last - first <= warm_up) throw std::invalid_argument("there are no scans left after --warm-up");
+  std::vector<SequenceFrame> frames;
+  for (std::size_t i = first; i < last; ++i) frames.push_back(sequence.read(i));
+  const auto classes = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
+
+  std::string csv = "mode,resolution,threads,median_ms,p99_ms,ratio_to_y,map_bytes\n";
+  std::printf("%-26s %10s %7s %9s %9s %8s %8s\n", "mode", "resolution", "threads", "median ms", "p99 ms",
+              "ratio", "map MB");
+  for (const Case& c : cases()) {
+    for (const int threads : {1, 2}) {
+      // The yardstick is taken again for each row, so that both sides of a ratio meet the same machine.
+      const double y = yardstick(frames, warm_up);
+      const Timing t = timeCase(c, threads, frames, warm_up, classes);
+      const auto set = c.settings.find("resolution");
+      const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
+      std::printf("%-26s %10s %7d %9.1f %9.1f %8.2f %8.1f\n", c.name.c_str(), edge.c_str(), threads,
+                  t.median_ms, t.p99_ms, t.median_ms / y, static_cast<double>(t.map_bytes) / 1e6);
+      csv += '"' + c.name + "\"," + edge + "," + std::to_string(threads) + "," + std::to_string(t.median_ms) +
+             "," + std::to_string(t.p99_ms) + "," + std::to_string(t.median_ms / y) + "," +
+             std::to_string(t.map_bytes) + "\n";
+    }
+  }
+  if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("benchmark_sequence", [&] {
+    const auto given = tools::parse(
+        argc, argv, "Times every mode on a sequence, in ratios to pcl::VoxelGrid at 0.1 m in the same run.",
+        options());
+    return given ? benchmark(*given) : 0;
+  });
+}
