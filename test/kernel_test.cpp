@@ -32,12 +32,5 @@ TEST(Kernel, NeverNegativeAndFallsWithDistance) {
   }
 }
 
-TEST(Kernel, WithoutTheFactorItWouldNotVanishAtItsEdge) {
-  // The paper's Equation (1) as printed: (2 + cos(2 pi r)) / 3 + sin(2 pi r) / (2 pi) is 1 at r = 1.
-  const double printed = (2.0 + std::cos(2.0 * M_PI)) / 3.0 + std::sin(2.0 * M_PI) / (2.0 * M_PI);
-  EXPECT_NEAR(printed, 1.0, 1e-12);
-  EXPECT_NEAR(reference::sparseKernel(1.0 - 1e-9, 1.0, 1.0), 0.0, 1e-12);
-}
-
 }  // namespace
 }  // namespace bki_mapping
