@@ -7,12 +7,12 @@ add_library(bki_mapping_core SHARED
   src/core/semantic_map.cpp
   src/inference/beam_evidence.cpp
   src/inference/beam_field.cpp
-  src/inference/beam_rows.cpp
-  src/inference/beam_rows_generic.cpp
   src/inference/beam_rtree.cpp
   src/inference/beam_table.cpp
   src/inference/block_walk.cpp
   src/inference/downsample.cpp
+  src/inference/inner_loops.cpp
+  src/inference/inner_loops_generic.cpp
   src/inference/map_updater.cpp
   src/inference/occlusion.cpp
   src/inference/parallel_for.cpp
@@ -31,9 +31,15 @@ target_link_libraries(bki_mapping_core PUBLIC Eigen3::Eigen Threads::Threads PRI
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
 target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math -O3)
 bki_mapping_warnings(bki_mapping_core)
+# The inner loops meet no infinities or NaN; without them a choice is a minimum or a maximum, one instruction.
+set(inner_loop_options -ffinite-math-only -fno-signed-zeros)
+set_source_files_properties(src/inference/inner_loops_generic.cpp PROPERTIES COMPILE_OPTIONS "${inner_loop_options}")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Chosen at run time where the processor has it.
-  target_sources(bki_mapping_core PRIVATE src/inference/beam_rows_avx2.cpp)
-  set_source_files_properties(src/inference/beam_rows_avx2.cpp PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma")
-  target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_AVX2)
+  target_sources(bki_mapping_core PRIVATE src/inference/inner_loops_avx2.cpp src/inference/inner_loops_avx512.cpp)
+  set_source_files_properties(src/inference/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
+    "${inner_loop_options};-mavx2;-mfma")
+  set_source_files_properties(src/inference/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
+    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl")
+  target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_X86)
 endif()

@@ -11,9 +11,28 @@
 namespace bki_mapping {
 namespace {
 
+/// A table, and the order in which it wants its beams.
+struct SortedTable {
+  std::unique_ptr<BeamTable> table = std::make_unique<BeamTable>();
+  std::vector<std::uint32_t> order;
+};
+
+SortedTable sortedTable(const std::vector<Eigen::Vector3f>& directions) {
+  SortedTable result;
+  std::vector<std::uint32_t> cells;
+  for (const Eigen::Vector3f& u : directions) cells.push_back(BeamTable::cellOf(u));
+  result.table->build(cells, result.order);
+  return result;
+}
+
+std::unique_ptr<BeamIndex> makeBeamIndex(BeamIndexType type, const std::vector<Eigen::Vector3f>& directions) {
+  if (type == BeamIndexType::kRtree) return makeBeamRtree(directions);
+  return std::move(sortedTable(directions).table);
+}
+
 std::vector<Eigen::Vector3f> sorted(const std::vector<Eigen::Vector3f>& directions) {
   std::vector<Eigen::Vector3f> result;
-  for (const std::uint32_t b : sortedByDirection(directions)) result.push_back(directions[b]);
+  for (const std::uint32_t b : sortedTable(directions).order) result.push_back(directions[b]);
   return result;
 }
 

@@ -8,6 +8,22 @@
 namespace bki_mapping {
 namespace {
 
+LabelledPoints downsample(const Eigen::Vector3d& origin, const LabelledPoints& input, double cell,
+                          int threads = 2) {
+  Workers workers(threads);
+  Downsampler downsampler;
+  LabelledPoints output;
+  for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
+    const std::size_t chunks = 3;
+    downsampler.start(origin, cell, chunks);
+    for (std::size_t i = 0; i < input.points.size(); ++i) {
+      downsampler.add(i * chunks / input.points.size(), input.points[i], input.labels[i]);
+    }
+    downsampler.finish(workers, output);
+  }
+  return output;
+}
+
 TEST(Downsample, EqualsReferenceOnNastyScenes) {
   for (const reference::Scene& scene : reference::nastyScenes(500)) {
     LabelledPoints input;

@@ -5,22 +5,23 @@
 
 #include "bki_mapping/inference/beam_evidence.h"
 #include "bki_mapping/inference/map_updater.h"
+#include "bki_mapping/inference/point_evidence.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
 namespace {
 
-/// Voxels of the map whose free evidence is not the brute-force sum.
-std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& brute,
+/// Voxels of the map whose evidence for a class is not the brute-force sum.
+std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& brute, ClassId id,
                      const MapperConfig& config) {
   std::size_t faults = 0;
   for (const auto& entry : map.entries()) {
-    const float* free = entry.block->evidence(kFreeClass);
+    const float* plane = entry.block->evidence(id);
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const reference::Value truth = brute.evidence(GridGeometry::voxelOf(entry.index, v), kFreeClass);
+      const reference::Value truth = brute.evidence(GridGeometry::voxelOf(entry.index, v), id);
       const double tolerance = 2e-5 * config.kernel.scale + 2e-5 * truth.sum + truth.slack;
-      faults += std::abs(free[v] - truth.sum) > tolerance;
+      faults += std::abs((plane ? plane[v] : 0.0f) - truth.sum) > tolerance;
     }
   }
   return faults;
@@ -28,26 +29,57 @@ std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& bru
 
 TEST(InstructionSets, GenericIsAlwaysThere) {
   EXPECT_EQ(instructionSets().front(), "generic");
-  EXPECT_THROW(addBeamRowsFor("abacus"), std::invalid_argument);
+  EXPECT_THROW(innerLoopsFor("abacus"), std::invalid_argument);
+  EXPECT_EQ(innerLoopsFor("").instruction_set, instructionSets().back());
 }
 
-TEST(InstructionSets, EachEqualsBruteForce) {
-  const GridGeometry geometry(0.3);
+TEST(InstructionSets, LinesEqualBruteForceOnEach) {
+  Workers workers(2);
   for (const std::string& set : instructionSets()) {
     for (const reference::Scene& scene : reference::nastyScenes(60)) {
       for (const BeamWeight weight : {BeamWeight::kUniform, BeamWeight::kLinear, BeamWeight::kBilinear}) {
+        for (const BeamIndexType index : {BeamIndexType::kTable, BeamIndexType::kRtree}) {
+          MapperConfig config;
+          config.downsample_resolution = 0.0;
+          config.free_space.weight = weight;
+          const GridGeometry geometry(config.resolution);
+          BeamField field(geometry, config.kernel, index);
+          field.setBeams({scene.scan.origin, scene.scan.points}, workers);
+          BeamEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
+          evidence.setField(field);
+          SemanticMap map(geometry, config.prior, 4);
+          MapUpdater().update(map, {&evidence}, workers);
+          ASSERT_GT(map.size(), 0u);
+          const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
+          EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u) << set << ", " << scene.name;
+        }
+      }
+    }
+  }
+}
+
+TEST(InstructionSets, PointsEqualBruteForceOnEach) {
+  Workers workers(2);
+  for (const std::string& set : instructionSets()) {
+    for (const reference::Scene& scene : reference::nastyScenes(300)) {
+      for (const double length : {0.2, 0.3, 0.5, 1.0}) {  // below, at and above a voxel
         MapperConfig config;
         config.downsample_resolution = 0.0;
-        config.free_space.weight = weight;
-        const Beams beams{scene.scan.origin, scene.scan.points};
-        const auto field =
-            std::make_shared<const BeamField>(geometry, config.kernel, BeamIndexType::kTable, beams);
-        const BeamEvidence evidence(field, weight, FreeSpaceExtent::kObserved, set);
+        config.kernel.length = length;
+        const GridGeometry geometry(config.resolution);
+        LabelledPoints points{scene.scan.points, {}};
+        for (const std::uint32_t raw : scene.scan.labels)
+          points.labels.push_back(static_cast<ClassId>(raw / 10));
+        PointEvidence evidence(geometry, config.kernel, set);
+        evidence.setPoints(scene.scan.origin, points, workers);
         SemanticMap map(geometry, config.prior, 4);
-        updateMap(map, {&evidence}, 2);
+        MapUpdater().update(map, {&evidence}, workers);
         ASSERT_GT(map.size(), 0u);
         const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
-        EXPECT_EQ(faultsOf(map, brute, config), 0u) << set << ", " << scene.name;
+        for (ClassId id = 0; id < 4; ++id) {
+          EXPECT_EQ(faultsOf(map, brute, id, config), 0u)
+              << set << ", " << scene.name << ", length " << length;
+        }
       }
     }
   }

@@ -9,6 +9,12 @@
 namespace bki_mapping {
 namespace {
 
+Observation observe(const Scan& scan, const MapperConfig& config) {
+  Workers workers(2);
+  Observer observer(config);
+  return observer.observe(scan, *reference::smallTable(), workers);
+}
+
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -33,7 +39,7 @@ TEST(Observation, CountsEveryReason) {
   const Scan scan = scanOf(
       {{kNan, 1, 1}, {1, kInfinity, 1}, {0, 0, 0}, {0.2f, 0, 0}, {60, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}},
       {10, 10, 10, 10, 10, 10, 0, 77});
-  const Observation seen = observe(scan, *reference::smallTable(), config);
+  const Observation seen = observe(scan, config);
   const PointCounts& c = seen.counts;
   EXPECT_EQ(c.points, 8u);
   EXPECT_EQ(c.not_finite, 2u);
@@ -53,9 +59,9 @@ TEST(Observation, CountsEveryReason) {
 TEST(Observation, UnlabelledIsAHitUnlessIgnored) {
   MapperConfig config = plainConfig();
   const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}}, {0, 77});
-  EXPECT_EQ(observe(scan, *reference::smallTable(), config).hits.labels, std::vector<ClassId>{0});
+  EXPECT_EQ(observe(scan, config).hits.labels, std::vector<ClassId>{0});
   config.unknown_labels = UnknownLabels::kUnlabelled;
-  const Observation seen = observe(scan, *reference::smallTable(), config);
+  const Observation seen = observe(scan, config);
   EXPECT_EQ(seen.hits.labels, (std::vector<ClassId>{0, 0}));
   EXPECT_EQ(seen.counts.labels_not_in_table, 1u);
   EXPECT_EQ(seen.counts.unknown_label, 0u);
@@ -65,7 +71,7 @@ TEST(Observation, LabelsMayBeIds) {
   MapperConfig config = plainConfig();
   config.label_values = LabelValues::kId;
   const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 1, 1}}, {3, 10, 255, 4294967295u});
-  const Observation seen = observe(scan, *reference::smallTable(), config);
+  const Observation seen = observe(scan, config);
   EXPECT_EQ(seen.hits.labels, std::vector<ClassId>{3});
   EXPECT_EQ(seen.counts.unknown_label, 3u);
 }

@@ -4,25 +4,56 @@
 
 namespace bki_mapping {
 
+GridIndex SemanticMap::regionOf(const BlockIndex& block) {
+  static_assert(kRegionEdge == kBlockEdge, "blocks lie in a region as voxels lie in a block");
+  return GridGeometry::blockOf({block});
+}
+
+std::vector<std::uint32_t>& SemanticMap::regionAt(const BlockIndex& block) {
+  const auto fresh = static_cast<std::uint32_t>(regions_.size());
+  const std::uint32_t number = region_number_.insert(regionOf(block), fresh);
+  if (number == fresh) regions_.emplace_back();
+  return regions_[number];
+}
+
 const Block* SemanticMap::find(const BlockIndex& index) const {
-  const auto found = place_.find(index);
-  return found == place_.end() ? nullptr : entries_[found->second].block.get();
+  const std::uint32_t place = place_.find(index);
+  return place == GridTable::kNone ? nullptr : entries_[place].block.get();
 }
 
 Block& SemanticMap::getOrAllocate(const BlockIndex& index) {
-  const auto [found, inserted] = place_.try_emplace(index, entries_.size());
-  if (inserted) entries_.push_back({index, std::make_unique<Block>()});
-  return *entries_[found->second].block;
+  const auto fresh = static_cast<std::uint32_t>(entries_.size());
+  const std::uint32_t place = place_.insert(index, fresh);
+  if (place == fresh) {
+    std::vector<std::uint32_t>& region = regionAt(index);
+    entries_.push_back({index, nullptr, static_cast<std::uint32_t>(region.size())});
+    region.push_back(place);
+    if (spare_.empty()) {
+      entries_.back().block = std::make_unique<Block>();
+    } else {
+      entries_.back().block = std::move(spare_.back());
+      spare_.pop_back();
+    }
+  }
+  return *entries_[place].block;
 }
 
 void SemanticMap::erase(const BlockIndex& index) {
-  const auto found = place_.find(index);
-  if (found == place_.end()) return;
-  const std::size_t hole = found->second;
-  place_.erase(found);
+  const std::uint32_t hole = place_.find(index);
+  if (hole == GridTable::kNone) return;
+  const auto removeFrom = [this](std::vector<std::uint32_t>& region, std::uint32_t place) {
+    region[place] = region.back();
+    entries_[region[place]].place_in_region = place;
+    region.pop_back();
+  };
+  removeFrom(regionAt(index), entries_[hole].place_in_region);
+  place_.erase(index);
+  if (entries_[hole].block->empty()) spare_.push_back(std::move(entries_[hole].block));
   if (hole + 1 != entries_.size()) {
-    entries_[hole] = std::move(entries_.back());
-    place_[entries_[hole].index] = hole;
+    Entry& last = entries_.back();
+    place_.set(last.index, hole);
+    regionAt(last.index)[last.place_in_region] = hole;
+    entries_[hole] = std::move(last);
   }
   entries_.pop_back();
 }
@@ -30,6 +61,8 @@ void SemanticMap::erase(const BlockIndex& index) {
 void SemanticMap::clear() {
   entries_.clear();
   place_.clear();
+  regions_.clear();
+  region_number_.clear();
 }
 
 void SemanticMap::add(const SemanticMap& other) {
@@ -47,8 +80,10 @@ void SemanticMap::add(const SemanticMap& other) {
 }
 
 std::size_t SemanticMap::bytes() const {
-  std::size_t sum = entries_.capacity() * sizeof(Entry) + place_.bucket_count() * sizeof(void*) +
-                    place_.size() * (sizeof(BlockIndex) + 3 * sizeof(std::size_t));
+  std::size_t sum = entries_.capacity() * sizeof(Entry) + place_.bytes() + region_number_.bytes() +
+                    regions_.capacity() * sizeof(regions_[0]) + spare_.capacity() * sizeof(spare_[0]) +
+                    spare_.size() * sizeof(Block);
+  for (const auto& region : regions_) sum += region.capacity() * sizeof(region[0]);
   for (const Entry& entry : entries_) sum += entry.block->bytes();
   return sum;
 }

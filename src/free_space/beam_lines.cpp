@@ -7,15 +7,15 @@ namespace {
 /// Whole beams, retrieved on the sphere of directions.
 class BeamLines : public FreeSpaceModel {
  public:
-  explicit BeamLines(const FreeSpaceConfig& config) : config_(config) {}
+  explicit BeamLines(const FreeSpaceConfig& config) : evidence_(config.weight, config.extent) {}
 
-  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t) const override {
-    return {std::make_unique<BeamEvidence>(beams.field(), config_.weight, config_.extent),
-            beams.beams().ends.size()};
+  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, Workers& workers) override {
+    evidence_.setField(beams.field(workers));
+    return {&evidence_, beams.beams().ends.size()};
   }
 
  private:
-  FreeSpaceConfig config_;
+  BeamEvidence evidence_;
 };
 
 }  // namespace

@@ -7,16 +7,17 @@ namespace {
 /// A sample at every multiple of the gap before the end of a beam.
 class EvenSamples : public FreeSpaceModel {
  public:
-  explicit EvenSamples(const MapperConfig& config) : config_(config) {}
+  explicit EvenSamples(const MapperConfig& config) : gap_(config.free_space.gap), samples_(config) {}
 
-  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t) const override {
-    return sampleBeams(config_, beams.beams(), [this](std::size_t, double length, auto&& add) {
-      for (int n = 1; n * config_.free_space.gap < length; ++n) add(n * config_.free_space.gap);
+  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, Workers& workers) override {
+    return samples_.sample(beams.beams(), workers, [this](std::size_t, double length, auto&& add) {
+      for (int n = 1; n * gap_ < length; ++n) add(n * gap_);
     });
   }
 
  private:
-  MapperConfig config_;
+  double gap_;
+  BeamSamples samples_;
 };
 
 }  // namespace

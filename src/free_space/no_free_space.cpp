@@ -5,7 +5,7 @@ namespace {
 
 /// Maps hits alone: nothing is ever free.
 class NoFreeSpace : public FreeSpaceModel {
-  FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t) const override { return {}; }
+  FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t, Workers&) override { return {}; }
 };
 
 }  // namespace

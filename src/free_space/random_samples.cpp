@@ -9,19 +9,20 @@ namespace {
 template <double (*Distance)(double, double)>
 class RandomSamples : public FreeSpaceModel {
  public:
-  explicit RandomSamples(const MapperConfig& config) : config_(config) {}
+  explicit RandomSamples(const MapperConfig& config) : config_(config.free_space), samples_(config) {}
 
-  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp) const override {
-    const auto seed = static_cast<std::uint64_t>(config_.free_space.seed);
-    return sampleBeams(config_, beams.beams(), [&](std::size_t beam, double length, auto&& add) {
-      for (int n = 0; n < config_.free_space.samples_per_beam; ++n) {
+  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, Workers& workers) override {
+    const auto seed = static_cast<std::uint64_t>(config_.seed);
+    return samples_.sample(beams.beams(), workers, [&](std::size_t beam, double length, auto&& add) {
+      for (int n = 0; n < config_.samples_per_beam; ++n) {
         add(Distance(counterRandom(seed, stamp, beam, static_cast<std::uint64_t>(n)), length));
       }
     });
   }
 
  private:
-  MapperConfig config_;
+  FreeSpaceConfig config_;
+  BeamSamples samples_;
 };
 
 }  // namespace

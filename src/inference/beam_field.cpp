@@ -1,94 +1,119 @@
 #include "bki_mapping/inference/beam_field.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
-#include <utility>
+
+#include "bki_mapping/inference/chunks.h"
 
 namespace bki_mapping {
-namespace {
 
-std::vector<Eigen::Vector3f> directionsOf(const Beams& beams) {
-  std::vector<Eigen::Vector3f> directions;
-  directions.reserve(beams.ends.size());
-  for (const Eigen::Vector3f& end : beams.ends) directions.push_back(end.normalized());
-  return directions;
-}
-
-}  // namespace
-
-BeamField::BeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index,
-                     Beams beams)
-    : geometry_(geometry), kernel_(kernel, geometry.resolution()) {
+BeamField::BeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index)
+    : geometry_(geometry), kernel_(kernel, geometry.resolution()), index_type_(index) {
   // A line that crosses a voxel passes its centre within half the voxel's diagonal.
   reach_ = kernel_.type == KernelType::kCounting ? 0.8660255f : kernel_.reach;
+}
+
+void BeamField::setBeams(const Beams& beams, Workers& workers) {
+  const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
+  const Chunks chunks(count);
+  cells_.resize(count);
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
+      cells_[b] = BeamTable::cellOf(beams.ends[b].normalized());
+    }
+  });
+  table_.build(cells_, order_);
   beams_.origin = beams.origin;
-  std::vector<Eigen::Vector3f> directions;
-  for (const std::uint32_t b : sortedByDirection(directionsOf(beams))) {
-    const Eigen::Vector3d end = beams.ends[b].cast<double>();
-    const double length = end.norm();
-    beams_.ends.push_back(beams.ends[b]);
-    directions_.push_back(end / length);
-    directions.push_back(beams.ends[b].normalized());
-    ux_.push_back(directions.back().x());
-    uy_.push_back(directions.back().y());
-    uz_.push_back(directions.back().z());
-    length_.push_back(static_cast<float>(length));
-    longest_ = std::max(longest_, length);
+  beams_.ends.resize(count);
+  for (auto* u : {&ux_, &uy_, &uz_}) u->assign(padded, 0);
+  inverse_length_.assign(padded, 0.0f);
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
+      beams_.ends[b] = beams.ends[order_[b]];
+      const Eigen::Vector3d end = beams_.ends[b].cast<double>();
+      const double inverse = 1.0 / end.norm(), steps = inverse / static_cast<double>(kDirectionStep);
+      ux_[b] = static_cast<std::int32_t>(end.x() * steps);
+      uy_[b] = static_cast<std::int32_t>(end.y() * steps);
+      uz_[b] = static_cast<std::int32_t>(end.z() * steps);
+      inverse_length_[b] = static_cast<float>(inverse);
+    }
+  });
+  const auto last = inverse_length_.begin() + static_cast<std::ptrdiff_t>(count);
+  longest_ = count == 0 ? 0.0 : 1.0 / static_cast<double>(*std::min_element(inverse_length_.begin(), last));
+  if (index_type_ == BeamIndexType::kRtree) {
+    std::vector<Eigen::Vector3f> directions;
+    directions.reserve(count);
+    for (const Eigen::Vector3f& end : beams_.ends) directions.push_back(end.normalized());
+    rtree_ = makeBeamRtree(directions);
   }
-  index_ = makeBeamIndex(index, directions);
 }
 
-int BeamField::laneOf(std::size_t b) const {
-  int lane = 0;
-  directions_[b].cwiseAbs().maxCoeff(&lane);
-  return lane;
+BeamArrays BeamField::arrays() const {
+  return {ux_.data(),
+          uy_.data(),
+          uz_.data(),
+          inverse_length_.data(),
+          table_.begin().data(),
+          static_cast<std::uint32_t>(beams_.ends.size())};
 }
 
-LocalBeam BeamField::localBeam(std::size_t b, const BlockIndex& index, int lane) const {
+BeamBlock BeamField::blockAt(const BlockIndex& index) const {
+  const Eigen::Vector3d first = geometry_.voxelCentre(GridGeometry::voxelOf(index, 0)) - beams_.origin;
+  return {{first.x(), first.y(), first.z()}, geometry_.resolution(), static_cast<float>(reachMetres())};
+}
+
+void BeamField::findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const {
+  const Eigen::Vector3d centre = geometry_.blockCentre(index) - beams_.origin;
+  const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
+  if (hasTable()) return table_.query(centre.cast<float>(), radius, scratch.ranges);
+  auto& ranges = scratch.ranges;
+  rtree_->query(centre.cast<float>(), radius, ranges);
+  std::sort(ranges.begin(), ranges.end(),
+            [](const BeamRange& a, const BeamRange& b) { return a.first < b.first; });
+  std::size_t kept = 0;
+  for (const BeamRange& range : ranges) {
+    if (kept > 0 && ranges[kept - 1].last == range.first) {
+      ranges[kept - 1].last = range.last;
+    } else {
+      ranges[kept++] = range;
+    }
+  }
+  ranges.resize(kept);
+}
+
+LocalBeam BeamField::localBeam(std::size_t b, const BlockIndex& index) const {
   const double resolution = geometry_.resolution();
+  const Eigen::Vector3d end = beams_.ends[b].cast<double>();
+  const double length = end.norm();
+  Eigen::Vector3d u = end / length;
   const Eigen::Vector3d block_centre = geometry_.blockCentre(index) - beams_.origin;
-  const auto turned = [lane](const Eigen::Vector3d& v) {
-    return Eigen::Vector3d(v[lane], v[(lane + 1) % 3], v[(lane + 2) % 3]);
-  };
-  const double along = block_centre.dot(directions_[b]);
-  const Eigen::Vector3d to_line = along * directions_[b] - block_centre;
-  const Eigen::Vector3d n = turned(to_line) / resolution + Eigen::Vector3d::Constant(0.5 * (kBlockEdge - 1));
-  Eigen::Vector3d u = turned(directions_[b]);
+  const double along = block_centre.dot(u);
+  const Eigen::Vector3d n =
+      (along * u - block_centre) / resolution + Eigen::Vector3d::Constant(0.5 * (kBlockEdge - 1));
   if (u.y() * u.y() + u.z() * u.z() < 1e-16) u.z() = 1e-8;  // along x: turned by 1e-8 rad, so that g > 0
   const double g = u.y() * u.y() + u.z() * u.z();
   const auto f = [](double x) { return static_cast<float>(x); };
-  return {f(u.x()),
-          f(u.y()),
-          f(u.z()),
-          f(n.x()),
-          f(n.y()),
-          f(n.z()),
-          f(g),
-          f(1.0 / g),
-          f(along) / length_[b],
-          f(resolution) / length_[b]};
+  return {f(u.x()), f(u.y()), f(u.z()),   f(n.x()),          f(n.y()),
+          f(n.z()), f(g),     f(1.0 / g), f(along / length), f(resolution / length)};
 }
 
 void BeamField::findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const {
-  const Eigen::Vector3d centre = geometry_.blockCentre(index) - beams_.origin;
-  const Eigen::Vector3f c = centre.cast<float>();
-  const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
-  index_->query(c, radius, scratch.ranges);
-
+  findRangesNear(index, scratch);
   // A first look in single precision, with room for its rounding.
+  const Eigen::Vector3f c = (geometry_.blockCentre(index) - beams_.origin).cast<float>();
+  const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
   const float distance2 = c.squaredNorm(), limit2 = radius * radius + 1e-5f * distance2;
   const auto follow_to = static_cast<float>(follow);
-  std::size_t candidates = 0, found = 0;
-  for (const BeamRange& range : scratch.ranges) candidates += range.last - range.first;
-  if (scratch.beams.size() < candidates) scratch.beams.resize(candidates);
+  scratch.beams.clear();
   for (const BeamRange& range : scratch.ranges) {
     for (std::uint32_t b = range.first; b < range.last; ++b) {
-      const float along = c.x() * ux_[b] + c.y() * uy_[b] + c.z() * uz_[b];
-      const float end = (length_[b] > follow_to ? length_[b] : follow_to) + radius;
-      scratch.beams[found] = b;
-      found += (distance2 - along * along < limit2) & (along > -radius) & (along < end);
+      const float length = 1.0f / inverse_length_[b];
+      const Eigen::Vector3f u = beams_.ends[b] * inverse_length_[b];
+      const float along = c.dot(u), end = std::max(length, follow_to) + radius;
+      if (distance2 - along * along < limit2 && along > -radius && along < end) scratch.beams.push_back(b);
     }
   }
-  scratch.beams.resize(found);
 }
 
 bool BeamField::crosses(const BlockIndex& index, int offset, const Eigen::Vector3f& end) const {

@@ -50,9 +50,8 @@ class BeamRtree : public BeamIndex {
 
 }  // namespace
 
-std::unique_ptr<BeamIndex> makeBeamIndex(BeamIndexType type, const std::vector<Eigen::Vector3f>& directions) {
-  if (type == BeamIndexType::kRtree) return std::make_unique<BeamRtree>(directions);
-  return std::make_unique<BeamTable>(directions);
+std::unique_ptr<BeamIndex> makeBeamRtree(const std::vector<Eigen::Vector3f>& directions) {
+  return std::make_unique<BeamRtree>(directions);
 }
 
 }  // namespace bki_mapping

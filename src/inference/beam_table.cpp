@@ -1,71 +1,27 @@
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "bki_mapping/inference/beam_index.h"
 
 namespace bki_mapping {
-namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr int kRows = 512;     ///< of sin(elevation), from -1 to 1
-constexpr int kColumns = 720;  ///< of the azimuth's pseudo-angle, from 0 to 4
-/// Room for rounding of angles [rad].
-constexpr double kMargin = 1e-5;
-
-int rowOf(double sine) {
-  return std::clamp(static_cast<int>((sine * 0.5 + 0.5) * kRows), 0, kRows - 1);
+std::uint32_t BeamTable::cellOf(const Eigen::Vector3f& u) {
+  return static_cast<std::uint32_t>(beamRow(u.z()) * kBeamColumns + beamColumn(pseudoAngle(u.x(), u.y())));
 }
 
-/// Grows with the azimuth, from 0 at -pi to 4 at pi, by 1 a quadrant: the azimuth without its arc tangent.
-template <typename T>
-T pseudoAngle(T x, T y) {
-  const T sum = std::abs(x) + std::abs(y);
-  const T share = sum > T(0) ? y / sum : T(0);
-  if (x >= T(0)) return T(2) + share;
-  return y >= T(0) ? T(4) - share : -share;
-}
-
-int columnOf(double pseudo_angle) {
-  return std::clamp(static_cast<int>(pseudo_angle * (kColumns / 4)), 0, kColumns - 1);
-}
-int columnAt(double azimuth) {
-  return columnOf(pseudoAngle(std::cos(azimuth), std::sin(azimuth)));
-}
-
-std::uint32_t cellOf(const Eigen::Vector3f& u) {
-  return static_cast<std::uint32_t>(rowOf(u.z()) * kColumns + columnOf(pseudoAngle(u.x(), u.y())));
-}
-
-}  // namespace
-
-std::vector<std::uint32_t> sortedByDirection(const std::vector<Eigen::Vector3f>& directions) {
-  // A counting sort by cell.
-  std::vector<std::uint32_t> cells, next(kRows * kColumns + 1, 0), order(directions.size());
-  cells.reserve(directions.size());
-  for (const Eigen::Vector3f& u : directions) {
-    cells.push_back(cellOf(u));
-    ++next[cells.back() + 1];
-  }
-  for (std::size_t c = 1; c < next.size(); ++c) next[c] += next[c - 1];
-  for (std::uint32_t b = 0; b < cells.size(); ++b) order[next[cells[b]]++] = b;
-  return order;
-}
-
-BeamTable::BeamTable(const std::vector<Eigen::Vector3f>& directions) : begin_(kRows * kColumns + 1, 0) {
-  std::uint32_t last = 0;
-  for (const Eigen::Vector3f& u : directions) {
-    const std::uint32_t cell = cellOf(u);
-    if (cell < last)
-      throw std::invalid_argument("BeamTable needs directions in the order of sortedByDirection");
-    last = cell;
-    ++begin_[cell + 1];
-  }
-  for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
+void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order) {
+  // A counting sort.
+  constexpr std::size_t kCells = kBeamRows * kBeamColumns;
+  begin_.assign(kCells + 1, 0);
+  for (const std::uint32_t cell : cells) ++begin_[cell + 1];
+  for (std::size_t c = 1; c <= kCells; ++c) begin_[c] += begin_[c - 1];
+  next_ = begin_;
+  order.resize(cells.size());
+  for (std::uint32_t b = 0; b < cells.size(); ++b) order[next_[cells[b]]++] = b;
 }
 
 void BeamTable::appendCells(int row, int first, int last, std::vector<BeamRange>& ranges) const {
-  const std::size_t base = static_cast<std::size_t>(row) * kColumns;
+  const std::size_t base = static_cast<std::size_t>(row) * kBeamColumns;
   const BeamRange range{begin_[base + static_cast<std::size_t>(first)],
                         begin_[base + static_cast<std::size_t>(last) + 1]};
   if (range.first < range.last) ranges.push_back(range);
@@ -73,33 +29,35 @@ void BeamTable::appendCells(int row, int first, int last, std::vector<BeamRange>
 
 void BeamTable::query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const {
   ranges.clear();
-  const double distance = centre.cast<double>().norm();
-  if (distance <= radius * (1.0 + 1e-6)) {
+  if (begin_.empty()) return;
+  const Eigen::Vector3d c = centre.cast<double>();
+  const double l = radius * (1.0 + 1e-5) + 1e-5 * c.norm();  // room for rounding of directions
+  const double r = c.norm(), rho = c.head<2>().norm();
+  if (r <= l) {
     if (begin_.back() > 0) ranges.push_back({0, begin_.back()});
     return;
   }
-  // A ball of radius l at distance r subtends delta = asin(l / r) in elevation, and in azimuth
-  // asin(sin(delta) / cos(theta)), or the whole circle where it covers a pole.
-  const double theta = std::asin(std::clamp(centre.z() / distance, -1.0, 1.0));
-  const double delta = std::asin(radius / distance) + kMargin;
-  const double azimuth = std::atan2(centre.y(), centre.x());
-  double half_width = kPi;
-  if (std::abs(theta) + delta < kPi / 2) {
-    half_width = std::asin(std::min(1.0, std::sin(delta) / std::cos(theta))) + kMargin;
+  // A ball of radius l subtends delta = asin(l / r) in elevation, asin(l / rho) in azimuth: the whole circle
+  // where it covers a pole.
+  const double cos_delta = std::sqrt(1.0 - l * l / (r * r));
+  const double a = c.z() / r * cos_delta, b = rho / r * (l / r);
+  const bool pole = rho <= l;
+  const int first_row = beamRow(static_cast<float>(pole && c.z() < 0.0 ? -1.0 : a - b));
+  const int last_row = beamRow(static_cast<float>(pole && c.z() > 0.0 ? 1.0 : a + b));
+  int first = 0, last = kBeamColumns - 1;
+  if (!pole) {
+    const double s = l / rho, k = std::sqrt(1.0 - s * s);
+    const auto column = [](double x, double y) {
+      return beamColumn(pseudoAngle(static_cast<float>(x), static_cast<float>(y)));
+    };
+    first = column(c.x() * k + c.y() * s, c.y() * k - c.x() * s);
+    last = column(c.x() * k - c.y() * s, c.y() * k + c.x() * s);
   }
-  const int first_row = rowOf(std::sin(std::max(theta - delta, -kPi / 2)));
-  const int last_row = rowOf(std::sin(std::min(theta + delta, kPi / 2)));
-  const bool whole = half_width > 0.99 * kPi;
-  const int first = whole ? 0 : columnAt(azimuth - half_width);
-  const int last = whole ? kColumns - 1 : columnAt(azimuth + half_width);
-  const bool over_seam = !whole && (azimuth - half_width < -kPi || azimuth + half_width > kPi);
   for (int row = first_row; row <= last_row; ++row) {
-    if (!over_seam) {
+    if (first <= last) {
       appendCells(row, first, last, ranges);
-    } else if (last >= first) {  // all columns, in one piece
-      appendCells(row, 0, kColumns - 1, ranges);
-    } else {
-      appendCells(row, first, kColumns - 1, ranges);
+    } else {  // over the seam; less than half the circle
+      appendCells(row, first, kBeamColumns - 1, ranges);
       appendCells(row, 0, last, ranges);
     }
   }

@@ -3,11 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bki_mapping/inference/chunks.h"
+
 namespace bki_mapping {
 namespace {
 
-int blockAt(double coordinate) {
-  return static_cast<int>(std::floor(coordinate));
+/// Boxes of more blocks are not marked one by one.
+constexpr double kMostMarks = 1 << 27;
+
+/// A straight piece of a beam.
+struct Segment {
+  Eigen::Vector3d from, to;
+};
+
+Segment segmentOf(const Beams& beams, std::size_t b, const BeamPiece& piece) {
+  const Eigen::Vector3d end = beams.ends[b].cast<double>();
+  if (!piece.shadow) return {beams.origin, beams.origin + end};
+  return {beams.origin + end, beams.origin + end * (piece.shadow_range / end.norm())};
 }
 
 /// Calls visit(x, y, z) for every block with a voxel centre within `reach` of a segment, and for some around
@@ -15,30 +27,25 @@ int blockAt(double coordinate) {
 template <typename Visit>
 void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, double reach, Visit&& visit) {
   // In units of blocks. Voxel centres keep half a voxel from the block's faces.
-  const double size = geometry.blockSize();
-  const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) / size + 1e-9;
-  const Eigen::Vector3d a = segment.from / size, d = (segment.to - segment.from) / size;
+  const double per_metre = 1.0 / geometry.blockSize();
+  const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-9;
+  const Eigen::Vector3d a = segment.from * per_metre, d = (segment.to - segment.from) * per_metre;
   int main = 0;
   d.cwiseAbs().maxCoeff(&main);
   const int side1 = (main + 1) % 3, side2 = (main + 2) % 3;
-  const double low = std::min(a[main], a[main] + d[main]), high = std::max(a[main], a[main] + d[main]);
-
-  for (int slab = blockAt(low - margin); slab <= blockAt(high + margin); ++slab) {
-    // The piece of the segment that is within `margin` of this slab of blocks.
-    double s0 = 0.0, s1 = 1.0;
-    if (d[main] != 0.0) {
-      const double t0 = (slab - margin - a[main]) / d[main], t1 = (slab + 1 + margin - a[main]) / d[main];
-      s0 = std::clamp(std::min(t0, t1), 0.0, 1.0);
-      s1 = std::clamp(std::max(t0, t1), 0.0, 1.0);
-    }
-    const auto range = [&](int axis) {
-      const double p = a[axis] + s0 * d[axis], q = a[axis] + s1 * d[axis];
-      return std::pair<int, int>(blockAt(std::min(p, q) - margin), blockAt(std::max(p, q) + margin));
-    };
-    const auto [first1, last1] = range(side1);
-    const auto [first2, last2] = range(side2);
-    int block[3];
-    block[main] = slab;
+  const double a0 = a[main], a1 = a[side1], a2 = a[side2], d0 = d[main], d1 = d[side1], d2 = d[side2];
+  const double inverse = d0 != 0.0 ? 1.0 / d0 : 0.0;
+  const double reach1 = margin * (1.0 + std::abs(d1 * inverse)),
+               reach2 = margin * (1.0 + std::abs(d2 * inverse));
+  const int last = floorToInt(std::max(a0, a0 + d0) + margin);
+  int block[3];
+  for (block[main] = floorToInt(std::min(a0, a0 + d0) - margin); block[main] <= last; ++block[main]) {
+    // The piece of the segment in this slab of blocks; margins at its two ends are in reach1 and reach2.
+    const double t0 = (block[main] - a0) * inverse, t1 = t0 + inverse;
+    const double s0 = std::clamp(t0, 0.0, 1.0), s1 = std::clamp(t1, 0.0, 1.0);
+    const double p1 = a1 + s0 * d1, q1 = a1 + s1 * d1, p2 = a2 + s0 * d2, q2 = a2 + s1 * d2;
+    const int first1 = floorToInt(std::min(p1, q1) - reach1), last1 = floorToInt(std::max(p1, q1) + reach1);
+    const int first2 = floorToInt(std::min(p2, q2) - reach2), last2 = floorToInt(std::max(p2, q2) + reach2);
     for (block[side1] = first1; block[side1] <= last1; ++block[side1]) {
       for (block[side2] = first2; block[side2] <= last2; ++block[side2]) {
         visit(block[0], block[1], block[2]);
@@ -47,66 +54,75 @@ void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, dou
   }
 }
 
-/// Blocks of a box, each marked or not: a hash table would be slower for the many blocks that beams share.
-class BlockMarks {
- public:
-  static constexpr double kMostBlocks = 1 << 27;
+}  // namespace
 
-  BlockMarks(const Eigen::Array3i& low, const Eigen::Array3i& size)
-      : low_(low), size_(size), marks_(static_cast<std::size_t>(size.cast<std::int64_t>().prod()), 0) {}
-  void mark(int x, int y, int z) {
-    marks_[static_cast<std::size_t>(x - low_.x()) +
-           static_cast<std::size_t>(size_.x()) *
-               (static_cast<std::size_t>(y - low_.y()) +
-                static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(z - low_.z()))] = 1;
+void BlockWalk::clearMarks(std::size_t count) {
+  if (capacity_ < count) {
+    capacity_ = count;
+    marks_ = std::make_unique<std::atomic<std::uint8_t>[]>(capacity_);
   }
-  void insertInto(IndexNumbering& blocks) const {
-    std::size_t place = 0;
-    for (int z = 0; z < size_.z(); ++z) {
-      for (int y = 0; y < size_.y(); ++y) {
-        for (int x = 0; x < size_.x(); ++x) {
-          if (marks_[place++]) blocks.insert({low_.x() + x, low_.y() + y, low_.z() + z});
+  for (std::size_t m = 0; m < count; ++m) marks_[m].store(0, std::memory_order_relaxed);
+}
+
+void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
+  std::size_t place = 0;
+  for (int z = 0; z < box.size.z(); ++z) {
+    for (int y = 0; y < box.size.y(); ++y) {
+      for (int x = 0; x < box.size.x(); ++x) {
+        if (marks_[place++].load(std::memory_order_relaxed)) {
+          blocks.insert({box.low.x() + x, box.low.y() + y, box.low.z() + z});
         }
       }
     }
   }
+}
 
- private:
-  Eigen::Array3i low_, size_;
-  std::vector<std::uint8_t> marks_;
-};
-
-}  // namespace
-
-void insertBlocksAlong(const GridGeometry& geometry, const std::vector<Segment>& segments, double reach,
-                       IndexNumbering& blocks) {
-  if (segments.empty()) return;
-  Eigen::Array3d low = segments.front().from.array(), high = low;
-  for (const Segment& segment : segments) {
-    low = low.min(segment.from.array()).min(segment.to.array());
-    high = high.max(segment.from.array()).max(segment.to.array());
+void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
+                                  double reach, Workers& workers, IndexNumbering& blocks) {
+  if (beams.ends.empty()) return;
+  Eigen::Array3d low = Eigen::Array3d::Zero(), high = Eigen::Array3d::Zero();
+  for (const Eigen::Vector3f& end : beams.ends) {
+    low = low.min(end.array().cast<double>());
+    high = high.max(end.array().cast<double>());
   }
-  const Eigen::Array3d first = ((low - reach) / geometry.blockSize()).floor() - 1.0;
-  const Eigen::Array3d count = ((high + reach) / geometry.blockSize()).floor() + 2.0 - first;
-  if (count.prod() > BlockMarks::kMostBlocks) {
-    const auto insert = [&](int x, int y, int z) { blocks.insert({x, y, z}); };
-    for (const Segment& segment : segments) forEachBlockAlong(geometry, segment, reach, insert);
+  if (piece.shadow) {
+    low = low.min(-piece.shadow_range);
+    high = high.max(piece.shadow_range);
+  }
+  const double room = 2.0 * reach + geometry.blockSize();
+  const Eigen::Array3d first = ((low - room + beams.origin.array()) / geometry.blockSize()).floor();
+  const Eigen::Array3d size =
+      ((high + room + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
+  if (size.prod() > kMostMarks) {
+    for (std::size_t b = 0; b < beams.ends.size(); ++b) {
+      forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
+        blocks.insert({x, y, z});
+      });
+    }
     return;
   }
-  BlockMarks marks(first.cast<int>(), count.cast<int>());
-  const auto mark = [&](int x, int y, int z) { marks.mark(x, y, z); };
-  for (const Segment& segment : segments) forEachBlockAlong(geometry, segment, reach, mark);
-  marks.insertInto(blocks);
+  const Box box{first.cast<int>(), size.cast<int>()};
+  clearMarks(static_cast<std::size_t>(size.prod()));
+  const Chunks chunks(beams.ends.size());
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
+      forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
+        // Several threads may mark a block; reading first keeps its cache line shared.
+        std::atomic<std::uint8_t>& mark = marks_[box.place(x, y, z)];
+        if (!mark.load(std::memory_order_relaxed)) mark.store(1, std::memory_order_relaxed);
+      });
+    }
+  });
+  insertMarked(box, blocks);
 }
 
 void insertMappedBlocks(const SemanticMap& map, const Eigen::Vector3d& point, double range,
                         IndexNumbering& blocks) {
   const GridGeometry& geometry = map.geometry();
   const double radius = range + 0.5 * std::sqrt(3.0) * geometry.blockSize();
-  for (const auto& entry : map.entries()) {
-    if ((geometry.blockCentre(entry.index) - point).squaredNorm() < radius * radius)
-      blocks.insert(entry.index);
-  }
+  map.forEachBlockNear(point, radius, [&](const BlockIndex& index) {
+    if ((geometry.blockCentre(index) - point).squaredNorm() < radius * radius) blocks.insert(index);
+  });
 }
 
 }  // namespace bki_mapping

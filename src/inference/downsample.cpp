@@ -1,72 +1,137 @@
 #include "bki_mapping/inference/downsample.h"
 
-#include "bki_mapping/core/grid_geometry.h"
-#include "bki_mapping/inference/index_numbering.h"
+#include <algorithm>
 
 namespace bki_mapping {
 namespace {
 
-constexpr std::uint32_t kEnd = 0xffffffffu;
+constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr std::uint32_t kPartitionBits = 6, kCellBits = 32 - kPartitionBits;
 
-/// Votes of one cell for one label; `next` chains the labels of a cell.
-struct Votes {
-  ClassId label;
-  std::uint32_t count;
-  std::uint32_t next;
-};
+std::size_t partitionOf(std::size_t hash) {
+  return hash >> (64 - kPartitionBits);
+}
 
-struct Cell {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  std::uint32_t count = 0;
-  std::uint32_t votes = kEnd;
-};
+}  // namespace
 
-void vote(Cell& cell, ClassId label, std::vector<Votes>& votes) {
-  for (std::uint32_t v = cell.votes; v != kEnd; v = votes[v].next) {
+void Downsampler::start(const Eigen::Vector3d& origin, double cell, std::size_t chunks) {
+  static_assert(kPartitions == 1u << kPartitionBits);
+  origin_ = origin;
+  cell_ = cell;
+  grid_ = GridGeometry(cell > 0.0 ? cell : 1.0);
+  used_ = chunks;
+  if (chunks_.size() < chunks) chunks_.resize(chunks);
+  for (std::size_t c = 0; c < used_; ++c) {
+    for (auto& records : chunks_[c].records) records.clear();
+    chunks_[c].cell_of.clear();
+  }
+}
+
+void Downsampler::add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label) {
+  Chunk& into = chunks_[chunk];
+  const GridIndex cell = grid_.voxelAt(origin_ + point.cast<double>());
+  const std::size_t partition = cell_ == 0.0 ? 0 : partitionOf(GridIndexHash()(cell));
+  into.records[partition].push_back({point, cell, static_cast<std::uint32_t>(into.cell_of.size()), label});
+  into.cell_of.push_back(kNone);
+}
+
+void Downsampler::vote(Cell& cell, ClassId label, std::vector<Votes>& votes) {
+  if (label == cell.label) {
+    ++cell.votes;
+    return;
+  }
+  for (std::uint32_t v = cell.more; v != kNone; v = votes[v].next) {
     if (votes[v].label == label) {
       ++votes[v].count;
       return;
     }
   }
-  votes.push_back({label, 1, cell.votes});
-  cell.votes = static_cast<std::uint32_t>(votes.size() - 1);
+  votes.push_back({label, 1, cell.more});
+  cell.more = static_cast<std::uint32_t>(votes.size() - 1);
 }
 
-ClassId majority(const Cell& cell, const std::vector<Votes>& votes) {
-  Votes best{0, 0, kEnd};
-  for (std::uint32_t v = cell.votes; v != kEnd; v = votes[v].next) {
-    const bool wins =
-        votes[v].count > best.count || (votes[v].count == best.count && votes[v].label < best.label);
-    if (wins) best = votes[v];
+ClassId Downsampler::majority(const Cell& cell, const std::vector<Votes>& votes) {
+  ClassId label = cell.label;
+  std::uint32_t most = cell.votes;
+  for (std::uint32_t v = cell.more; v != kNone; v = votes[v].next) {
+    if (votes[v].count > most || (votes[v].count == most && votes[v].label < label)) {
+      most = votes[v].count;
+      label = votes[v].label;
+    }
   }
-  return best.label;
+  return label;
 }
 
-}  // namespace
+std::uint32_t Downsampler::mergeRecord(const Record& record, Partition& partition) const {
+  const GridIndex& index = record.cell;
+  const std::size_t mask = partition.slots.size() - 1;
+  std::size_t s = GridIndexHash()(index) & mask;
+  while (partition.slots[s].cell != kNone && partition.slots[s].index != index) s = (s + 1) & mask;
+  Slot& slot = partition.slots[s];
+  const Eigen::Vector3d point = record.point.cast<double>();
+  if (slot.cell == kNone) {
+    slot = {index, static_cast<std::uint32_t>(partition.cells.size())};
+    partition.cells.push_back({point, 1, 1, kNone, record.label});
+    return slot.cell;
+  }
+  Cell& cell = partition.cells[slot.cell];
+  cell.sum += point;
+  ++cell.count;
+  vote(cell, record.label, partition.votes);
+  return kNone;
+}
 
-LabelledPoints downsample(const Eigen::Vector3d& origin, const LabelledPoints& input, double cell_size) {
-  if (cell_size == 0.0) return input;
-  const GridGeometry grid(cell_size);
-  IndexNumbering numbering;
-  std::vector<Cell> cells;
-  std::vector<Votes> votes;
-  for (std::size_t i = 0; i < input.points.size(); ++i) {
-    const Eigen::Vector3d offset = input.points[i].cast<double>();
-    const std::uint32_t number = numbering.insert(grid.voxelAt(origin + offset));
-    if (number == cells.size()) cells.emplace_back();
-    Cell& cell = cells[number];
-    cell.sum += offset;
-    ++cell.count;
-    vote(cell, input.labels[i], votes);
+void Downsampler::merge(std::size_t p) {
+  Partition& partition = partitions_[p];
+  std::size_t records = 0, slots = 64;
+  for (std::size_t c = 0; c < used_; ++c) records += chunks_[c].records[p].size();
+  while (slots < 2 * records) slots *= 2;
+  partition.slots.assign(slots, {{}, kNone});
+  partition.cells.clear();
+  partition.votes.clear();
+  for (std::size_t c = 0; c < used_; ++c) {
+    Chunk& chunk = chunks_[c];
+    for (const Record& record : chunk.records[p]) {
+      const std::uint32_t cell = mergeRecord(record, partition);
+      if (cell != kNone) chunk.cell_of[record.place] = static_cast<std::uint32_t>(p) << kCellBits | cell;
+    }
   }
-  LabelledPoints output;
-  output.points.reserve(cells.size());
-  output.labels.reserve(cells.size());
-  for (const Cell& cell : cells) {
-    output.points.push_back((cell.sum / cell.count).cast<float>());
-    output.labels.push_back(majority(cell, votes));
+}
+
+void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
+  std::size_t place = chunk.begin;
+  for (const std::uint32_t code : chunk.cell_of) {
+    if (code == kNone) continue;
+    const Partition& partition = partitions_[code >> kCellBits];
+    const Cell& cell = partition.cells[code & ((1u << kCellBits) - 1)];
+    output.points[place] = (cell.sum * (1.0 / cell.count)).cast<float>();
+    output.labels[place++] = majority(cell, partition.votes);
   }
-  return output;
+}
+
+void Downsampler::copy(LabelledPoints& output) const {
+  output.points.clear();
+  output.labels.clear();
+  for (std::size_t c = 0; c < used_; ++c) {
+    for (const Record& record : chunks_[c].records[0]) {
+      output.points.push_back(record.point);
+      output.labels.push_back(record.label);
+    }
+  }
+}
+
+void Downsampler::finish(Workers& workers, LabelledPoints& output) {
+  if (cell_ == 0.0) return copy(output);
+  workers.forEach(kPartitions, [&](std::size_t p, std::size_t) { merge(p); });
+  std::size_t cells = 0;
+  for (std::size_t c = 0; c < used_; ++c) {
+    const auto& cell_of = chunks_[c].cell_of;
+    chunks_[c].begin = cells;
+    cells += cell_of.size() - static_cast<std::size_t>(std::count(cell_of.begin(), cell_of.end(), kNone));
+  }
+  output.points.resize(cells);
+  output.labels.resize(cells);
+  workers.forEach(used_, [&](std::size_t c, std::size_t) { write(chunks_[c], output); });
 }
 
 }  // namespace bki_mapping

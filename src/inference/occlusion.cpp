@@ -1,20 +1,12 @@
 #include "bki_mapping/inference/occlusion.h"
 
-#include "bki_mapping/inference/block_walk.h"
-
 namespace bki_mapping {
 
-void Occlusion::collectBlocks(const SemanticMap& map, IndexNumbering& touched) const {
-  const Beams& beams = field_->beams();
-  insertMappedBlocks(map, beams.origin, range_ + field_->reachMetres(), touched);
+void Occlusion::collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) {
+  const double reach = field_->reachMetres();
+  insertMappedBlocks(map, field_->origin(), range_ + reach, touched);
   if (extent_ != OcclusionExtent::kAll) return;
-  std::vector<Segment> segments;
-  segments.reserve(beams.ends.size());
-  for (const Eigen::Vector3f& end : beams.ends) {
-    const Eigen::Vector3d e = end.cast<double>();
-    segments.push_back({beams.origin + e, beams.origin + e * (range_ / e.norm())});
-  }
-  insertBlocksAlong(field_->geometry(), segments, field_->reachMetres(), touched);
+  walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, workers, touched);
 }
 
 void Occlusion::addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {

@@ -1,38 +1,103 @@
 #include "bki_mapping/inference/parallel_for.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
-#include <mutex>
-#include <thread>
-#include <vector>
+#include <chrono>
+#include <utility>
 
 namespace bki_mapping {
+namespace {
+
+/// How long a thread stays awake for the next piece of work: longer than the serial pieces of a scan, far
+/// shorter than the time between scans.
+constexpr auto kAwake = std::chrono::microseconds(200);
+
+/// Waits awake until ready() or until the time is up. @return ready().
+template <typename Ready>
+bool awaitAwake(Ready&& ready) {
+  const auto end = std::chrono::steady_clock::now() + kAwake;
+  for (;;) {
+    for (int n = 0; n < 64; ++n) {
+      if (ready()) return true;
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    }
+    if (std::chrono::steady_clock::now() > end) return ready();
+    std::this_thread::yield();  // a core that somebody else needs is not worth holding
+  }
+}
+
+}  // namespace
 
 int threadCount(int setting) {
   return setting > 0 ? setting : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-void parallelFor(std::size_t jobs, int threads,
-                 const std::function<void(std::size_t job, std::size_t worker)>& job) {
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto work = [&](std::size_t worker) {
-    try {
-      for (std::size_t j = next++; j < jobs; j = next++) job(j, worker);
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(failure_mutex);
-      if (!failure) failure = std::current_exception();
-      next = jobs;
+Workers::Workers(int setting) {
+  for (int worker = 1; worker < threadCount(setting); ++worker) {
+    helpers_.emplace_back([this, worker] { help(static_cast<std::size_t>(worker)); });
+  }
+}
+
+Workers::~Workers() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  begun_.notify_all();
+  for (std::thread& helper : helpers_) helper.join();
+}
+
+void Workers::work(std::size_t worker) {
+  try {
+    for (std::size_t j = next_++; j < jobs_; j = next_++) call_(callable_, j, worker);
+  } catch (...) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!failure_) failure_ = std::current_exception();
+    next_ = jobs_;
+  }
+}
+
+void Workers::help(std::size_t worker) {
+  for (std::uint64_t seen = 0;;) {
+    const auto ready = [&] { return stop_ || round_ != seen; };
+    if (!awaitAwake(ready)) {
+      std::unique_lock<std::mutex> lock(mutex_);
+      begun_.wait(lock, ready);
     }
-  };
-  std::vector<std::thread> helpers;
-  const std::size_t workers = std::min(jobs, static_cast<std::size_t>(std::max(threads, 1)));
-  for (std::size_t worker = 1; worker < workers; ++worker) helpers.emplace_back(work, worker);
-  work(0);
-  for (std::thread& helper : helpers) helper.join();
-  if (failure) std::rethrow_exception(failure);
+    if (stop_) return;
+    seen = round_;
+    work(worker);
+    if (--busy_ == 0) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      finished_.notify_one();
+    }
+  }
+}
+
+void Workers::run(std::size_t jobs, Call call, void* callable) {
+  if (jobs == 0) return;
+  call_ = call;
+  callable_ = callable;
+  jobs_ = jobs;
+  next_ = 0;
+  if (jobs > 1 && !helpers_.empty()) {
+    busy_ = helpers_.size();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++round_;
+    }
+    begun_.notify_all();
+    work(0);
+    const auto done = [&] { return busy_ == 0; };
+    if (!awaitAwake(done)) {
+      std::unique_lock<std::mutex> lock(mutex_);
+      finished_.wait(lock, done);
+    }
+  } else {
+    work(0);
+  }
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
 }  // namespace bki_mapping

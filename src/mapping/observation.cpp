@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/inference/chunks.h"
 
 namespace bki_mapping {
 namespace {
@@ -43,23 +44,25 @@ void appendBeams(const std::vector<Eigen::Vector3f>& ends, Beams& beams) {
 
 }  // namespace
 
-Observation observe(const Scan& scan, const ClassTable& classes, const MapperConfig& config) {
-  if (scan.labels.size() != scan.points.size()) {
-    throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
-                                std::to_string(scan.labels.size()) + " labels; give one label a point");
+PointCounts& PointCounts::operator+=(const PointCounts& other) {
+  for (const auto count :
+       {&PointCounts::points, &PointCounts::used, &PointCounts::not_finite, &PointCounts::at_sensor,
+        &PointCounts::too_near, &PointCounts::beyond_max, &PointCounts::outside_map,
+        &PointCounts::unknown_label, &PointCounts::unlabelled, &PointCounts::labels_not_in_table}) {
+    this->*count += other.*count;
   }
-  const double cell = config.downsample_resolution;
-  const GridGeometry geometry(cell > 0.0 ? std::min(cell, config.resolution) : config.resolution);
-  const SensorModelConfig& sensor = config.sensor_model;
+  return *this;
+}
+
+void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t chunk, std::size_t first,
+                          std::size_t last, PointCounts& counts) {
+  const double cell = config_.downsample_resolution;
+  const GridGeometry geometry(cell > 0.0 ? std::min(cell, config_.resolution) : config_.resolution);
+  const SensorModelConfig& sensor = config_.sensor_model;
   const bool limited = sensor.max_range > 0.0;
-  Observation seen;
-  LabelledPoints hits, cut;
-  hits.points.reserve(scan.points.size());
-  hits.labels.reserve(scan.points.size());
-  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+  for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3f& point = scan.points[i];
     const float range = point.norm();
-    PointCounts& counts = seen.counts;
     ++counts.points;
     if (!point.allFinite()) {
       ++counts.not_finite;
@@ -69,23 +72,39 @@ Observation observe(const Scan& scan, const ClassTable& classes, const MapperCon
       ++counts.too_near;
     } else if (limited && range > sensor.max_range) {
       ++counts.beyond_max;
-      if (config.clear_beyond_max_range) {
-        cut.points.push_back(point * (static_cast<float>(sensor.max_range) / range));
+      if (config_.clear_beyond_max_range) {
+        cut_.add(chunk, point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
       }
     } else if (!geometry.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
-    } else if (const auto id = classOf(scan.labels[i], classes, config, counts)) {
+    } else if (const auto id = classOf(scan.labels[i], classes, config_, counts)) {
       ++counts.used;
-      hits.points.push_back(point);
-      hits.labels.push_back(*id);
+      hits_.add(chunk, point, *id);
     }
   }
-  cut.labels.assign(cut.points.size(), kFreeClass);
-  seen.hits = downsample(scan.origin, hits, config.downsample_resolution);
-  seen.beams.origin = scan.origin;
-  appendBeams(seen.hits.points, seen.beams);
-  appendBeams(downsample(scan.origin, cut, config.downsample_resolution).points, seen.beams);
-  return seen;
+}
+
+const Observation& Observer::observe(const Scan& scan, const ClassTable& classes, Workers& workers) {
+  if (scan.labels.size() != scan.points.size()) {
+    throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
+                                std::to_string(scan.labels.size()) + " labels; give one label a point");
+  }
+  const Chunks chunks(scan.points.size());
+  hits_.start(scan.origin, config_.downsample_resolution, chunks.count());
+  cut_.start(scan.origin, config_.downsample_resolution, chunks.count());
+  counts_.assign(chunks.count(), {});
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    sortPoints(scan, classes, c, chunks.begin(c), chunks.end(c), counts_[c]);
+  });
+  seen_.counts = {};
+  for (const PointCounts& counts : counts_) seen_.counts += counts;
+  hits_.finish(workers, seen_.hits);
+  cut_.finish(workers, cut_points_);
+  seen_.beams.origin = scan.origin;
+  seen_.beams.ends.clear();
+  appendBeams(seen_.hits.points, seen_.beams);
+  appendBeams(cut_points_.points, seen_.beams);
+  return seen_;
 }
 
 }  // namespace bki_mapping

@@ -7,9 +7,6 @@
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/core/stopwatch.h"
 #include "bki_mapping/free_space/registry.h"
-#include "bki_mapping/inference/map_updater.h"
-#include "bki_mapping/inference/occlusion.h"
-#include "bki_mapping/inference/point_evidence.h"
 
 namespace bki_mapping {
 namespace {
@@ -32,8 +29,13 @@ MapperConfig checked(const MapperConfig& config, const ClassTable& classes) {
 SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
     : config_(checked(config, *classes)),
       classes_(std::move(classes)),
+      map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
+      workers_(config_.threads),
+      observer_(config_),
+      hits_(map_.geometry(), config_.kernel),
+      beams_(map_.geometry(), config_.kernel, config_.free_space.beam_index),
       free_space_(makeFreeSpaceModel(config_)),
-      map_(GridGeometry(config_.resolution), config_.prior, classes_->size()) {}
+      occlusion_(config_.occlusion) {}
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
   if (!map_.geometry().contains(scan.origin)) {
@@ -41,27 +43,26 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
   }
   ScanStats stats;
   Stopwatch watch;
-  const Observation seen = observe(scan, *classes_, config_);
+  const Observation& seen = observer_.observe(scan, *classes_, workers_);
   stats.counts = seen.counts;
   stats.hits = seen.hits.points.size();
   stats.observe_ms = watch.lap();
 
-  LazyBeamField beams(map_.geometry(), config_.kernel, config_.free_space.beam_index, seen.beams);
-  const PointEvidence hits(map_.geometry(), config_.kernel, scan.origin, seen.hits);
-  const FreeSpaceEvidence free = free_space_->observe(beams, scan.stamp);
-  std::unique_ptr<Evidence> occlusion;
+  hits_.setPoints(scan.origin, seen.hits, workers_);
+  beams_.setBeams(seen.beams);
+  const FreeSpaceEvidence free = free_space_->observe(beams_, scan.stamp, workers_);
+  evidence_.assign(1, &hits_);
+  if (free.evidence) evidence_.push_back(free.evidence);
   if (config_.occlusion != OcclusionExtent::kNone) {
     const double max_range = config_.sensor_model.max_range;
-    const double range = max_range > 0.0 ? max_range : beams.field()->longest();
-    occlusion = std::make_unique<Occlusion>(beams.field(), config_.occlusion, range);
+    const BeamField& field = beams_.field(workers_);
+    occlusion_.setField(field, max_range > 0.0 ? max_range : field.longest());
+    evidence_.push_back(&occlusion_);
   }
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  std::vector<const Evidence*> evidence = {&hits};
-  if (free.evidence) evidence.push_back(free.evidence.get());
-  if (occlusion) evidence.push_back(occlusion.get());
-  const MapUpdateStats update = updateMap(map_, evidence, config_.threads);
+  const MapUpdateStats update = updater_.update(map_, evidence_, workers_);
   stats.blocks = update.blocks;
   stats.collect_ms = update.collect_ms;
   stats.update_ms = update.update_ms;

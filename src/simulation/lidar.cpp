@@ -69,7 +69,8 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
     return Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
                            std::sin(elevation));
   };
-  parallelFor(columns, threadCount(0), [&](std::size_t column, std::size_t) {
+  Workers workers(0);
+  workers.forEach(columns, [&](std::size_t column, std::size_t) {
     const auto world = [&](std::size_t beam) -> Eigen::Vector3d {
       return T_world_sensor.linear() * directionOf(column, beam);
     };

@@ -7,6 +7,13 @@
 
 namespace bki_mapping {
 
+/// The largest whole number not above x. @param x within the range of an int. Unlike std::floor it needs no
+/// instruction beyond the basic set of a processor.
+inline std::int32_t floorToInt(double x) {
+  const auto towards_zero = static_cast<std::int32_t>(x);
+  return towards_zero - static_cast<std::int32_t>(x < towards_zero);
+}
+
 /// A grid of cubic voxels of edge `resolution` [m]; voxel (0,0,0) spans [0, resolution) on each axis.
 /// Blocks hold 8 x 8 x 8 voxels.
 class GridGeometry {
@@ -15,7 +22,7 @@ class GridGeometry {
   static constexpr double kMaxCoordinate = 1 << 28;
 
   /// @param resolution edge of a voxel [m], > 0.
-  explicit GridGeometry(double resolution) : resolution_(resolution) {}
+  explicit GridGeometry(double resolution) : resolution_(resolution), per_metre_(1.0 / resolution) {}
 
   double resolution() const { return resolution_; }
   double blockSize() const { return resolution_ * kBlockEdge; }  ///< [m]
@@ -53,13 +60,18 @@ class GridGeometry {
 
  private:
   std::int32_t cell(double metres) const {
-    return static_cast<std::int32_t>(std::floor(metres / resolution_));
+    // The quotient, but for rounding, without a division; near a face between two cells rounding matters.
+    const double quotient = metres * per_metre_;
+    const std::int32_t floor = floorToInt(quotient);
+    const double above = quotient - floor;
+    return above > 1e-6 && above < 1.0 - 1e-6 ? floor : floorToInt(metres / resolution_);
   }
   static std::int32_t floorDivide(std::int32_t i) {
-    return i >= 0 ? i / kBlockEdge : -((-i + kBlockEdge - 1) / kBlockEdge);
+    static_assert(kBlockEdge == 8 && -1 >> 1 == -1, "a shift divides by the edge, towards minus infinity");
+    return i >> 3;
   }
 
-  double resolution_;
+  double resolution_, per_metre_;
 };
 
 }  // namespace bki_mapping

@@ -3,11 +3,11 @@
 
 #include <cstddef>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "bki_mapping/core/block.h"
 #include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/core/grid_table.h"
 
 namespace bki_mapping {
 
@@ -18,6 +18,7 @@ class SemanticMap {
   struct Entry {
     BlockIndex index;
     std::unique_ptr<Block> block;
+    std::uint32_t place_in_region;
   };
 
   /// @param prior concentration alpha0 of each class before any scan, > 0.
@@ -41,6 +42,30 @@ class SemanticMap {
   void erase(const BlockIndex& index);
   void clear();
 
+  /// Calls visit(index) for every block whose box comes within `radius` of a point, and for some around
+  /// those. Costs as much as there are blocks near the point, however large the map.
+  /// @param point map frame [m]. @param radius [m].
+  template <typename Visit>
+  void forEachBlockNear(const Eigen::Vector3d& point, double radius, Visit&& visit) const {
+    const double edge = kRegionEdge * geometry_.blockSize();
+    const Eigen::Array3d low = ((point.array() - radius) / edge).floor();
+    const Eigen::Array3d high = ((point.array() + radius) / edge).floor();
+    if (!((high - low + 1.0).prod() < static_cast<double>(regions_.size()))) {
+      for (const Entry& entry : entries_) visit(entry.index);
+      return;
+    }
+    const Eigen::Array3i first = low.cast<int>(), last = high.cast<int>();
+    for (int z = first.z(); z <= last.z(); ++z) {
+      for (int y = first.y(); y <= last.y(); ++y) {
+        for (int x = first.x(); x <= last.x(); ++x) {
+          const std::uint32_t number = region_number_.find({x, y, z});
+          if (number == GridTable::kNone) continue;
+          for (const std::uint32_t place : regions_[number]) visit(entries_[place].index);
+        }
+      }
+    }
+  }
+
   /// Adds another map's evidence: the posterior of both sets of scans.
   /// @throws std::invalid_argument if resolution, prior or number of classes differ.
   void add(const SemanticMap& other);
@@ -49,11 +74,20 @@ class SemanticMap {
   std::size_t bytes() const;
 
  private:
+  /// Blocks are also listed by region, a cube of this many blocks a side.
+  static constexpr int kRegionEdge = 8;
+
+  static GridIndex regionOf(const BlockIndex& block);
+  std::vector<std::uint32_t>& regionAt(const BlockIndex& block);
+
   GridGeometry geometry_;
   double prior_;
   std::size_t class_count_;
   std::vector<Entry> entries_;
-  std::unordered_map<BlockIndex, std::size_t, GridIndexHash> place_;
+  GridTable place_;                                  ///< of each block in entries_
+  std::vector<std::vector<std::uint32_t>> regions_;  ///< places of their blocks in entries_
+  GridTable region_number_;
+  std::vector<std::unique_ptr<Block>> spare_;  ///< empty blocks, for use again
 };
 
 }  // namespace bki_mapping

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cmath>
-#include <utility>
 
 #include "bki_mapping/free_space/free_space_model.h"
+#include "bki_mapping/inference/chunks.h"
 #include "bki_mapping/inference/downsample.h"
 #include "bki_mapping/inference/point_evidence.h"
 
@@ -20,25 +20,38 @@ inline double linearDistance(double u, double length) {
   return std::sqrt(u) * length;
 }
 
-/// Evidence of the points at the given distances along each beam, down-sampled like hits.
-/// @param forEachDistance called as forEachDistance(beam number, length [m], add) shall call add(distance
-/// [m]) for each sample, 0 < distance < length.
-template <typename ForEachDistance>
-FreeSpaceEvidence sampleBeams(const MapperConfig& config, const Beams& beams,
-                              ForEachDistance&& forEachDistance) {
-  LabelledPoints samples;
-  for (std::size_t b = 0; b < beams.ends.size(); ++b) {
-    const Eigen::Vector3d end = beams.ends[b].cast<double>();
-    const double length = end.norm();
-    forEachDistance(b, length, [&](double distance) {
-      samples.points.push_back((end * (distance / length)).cast<float>());
+/// Evidence of points on each beam, down-sampled like hits.
+class BeamSamples {
+ public:
+  explicit BeamSamples(const MapperConfig& config)
+      : cell_(config.downsample_resolution), evidence_(GridGeometry(config.resolution), config.kernel) {}
+
+  /// @param forEachDistance called as forEachDistance(beam number, length [m], add) shall call add(distance
+  /// [m]) for each sample, 0 <= distance < length; from several threads at once.
+  template <typename ForEachDistance>
+  FreeSpaceEvidence sample(const Beams& beams, Workers& workers, ForEachDistance&& forEachDistance) {
+    const Chunks chunks(beams.ends.size());
+    downsampler_.start(beams.origin, cell_, chunks.count());
+    workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+      for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
+        const Eigen::Vector3d end = beams.ends[b].cast<double>();
+        const double length = end.norm();
+        const Eigen::Vector3d direction = end / length;
+        forEachDistance(b, length, [&](double distance) {
+          downsampler_.add(c, (direction * distance).cast<float>(), kFreeClass);
+        });
+      }
     });
+    downsampler_.finish(workers, samples_);
+    evidence_.setPoints(beams.origin, samples_, workers);
+    return {&evidence_, samples_.points.size()};
   }
-  samples.labels.assign(samples.points.size(), kFreeClass);
-  samples = downsample(beams.origin, samples, config.downsample_resolution);
-  const GridGeometry geometry(config.resolution);
-  return {std::make_unique<PointEvidence>(geometry, config.kernel, beams.origin, samples),
-          samples.points.size()};
-}
+
+ private:
+  double cell_;
+  Downsampler downsampler_;
+  LabelledPoints samples_;
+  PointEvidence evidence_;
+};
 
 }  // namespace bki_mapping

@@ -1,12 +1,11 @@
 /// @file Free space as whole beam lines.
 #pragma once
 
-#include <memory>
 #include <string>
-#include <utility>
 
 #include "bki_mapping/inference/beam_field.h"
-#include "bki_mapping/inference/beam_rows.h"
+#include "bki_mapping/inference/block_walk.h"
+#include "bki_mapping/inference/inner_loops.h"
 
 namespace bki_mapping {
 
@@ -15,24 +14,21 @@ namespace bki_mapping {
 class BeamEvidence : public Evidence {
  public:
   /// @param instruction_set one of instructionSets(); the best there is if empty.
-  BeamEvidence(std::shared_ptr<const BeamField> field, BeamWeight weight, FreeSpaceExtent extent,
-               const std::string& instruction_set = "")
-      : field_(std::move(field)),
-        weight_(weight),
-        extent_(extent),
-        add_rows_(addBeamRowsFor(instruction_set.empty() ? instructionSets().back() : instruction_set)) {}
+  BeamEvidence(BeamWeight weight, FreeSpaceExtent extent, const std::string& instruction_set = "")
+      : weight_(weight), extent_(extent), loops_(innerLoopsFor(instruction_set)) {}
 
-  void collectBlocks(const SemanticMap& map, IndexNumbering& touched) const override;
+  /// Replaces the beams. @param field must stay where it is until the scan is done.
+  void setField(const BeamField& field) { field_ = &field; }
+
+  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
   void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
 
  private:
-  /// Adds the sparse kernel's values to scratch.sums.
-  void addLines(const BlockIndex& index, EvidenceScratch& scratch) const;
-
-  std::shared_ptr<const BeamField> field_;
+  const BeamField* field_ = nullptr;
   BeamWeight weight_;
   FreeSpaceExtent extent_;
-  AddBeamRows add_rows_;
+  const InnerLoops& loops_;
+  BlockWalk walk_;
 };
 
 }  // namespace bki_mapping

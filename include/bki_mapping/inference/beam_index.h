@@ -7,13 +7,9 @@
 #include <Eigen/Core>
 
 #include "bki_mapping/core/config.h"
+#include "bki_mapping/inference/beam_cells.h"
 
 namespace bki_mapping {
-
-/// Beams first to before last of a list.
-struct BeamRange {
-  std::uint32_t first, last;
-};
 
 /// Finds beams by direction. Beams are half-lines from the sensor here; where they end is the caller's
 /// matter.
@@ -27,24 +23,32 @@ class BeamIndex {
   virtual void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const = 0;
 };
 
-/// The order in which beams must be listed for makeBeamIndex: by elevation row, then azimuth column, of
-/// BeamTable.
-/// @param directions unit vectors. @return numbers of the directions, first to last.
-std::vector<std::uint32_t> sortedByDirection(const std::vector<Eigen::Vector3f>& directions);
-
-/// @param directions unit vectors, one a beam, in the order of sortedByDirection.
-std::unique_ptr<BeamIndex> makeBeamIndex(BeamIndexType type, const std::vector<Eigen::Vector3f>& directions);
-
-/// Beams bucketed by elevation and azimuth; a query names a few contiguous slices.
+/// Beams bucketed by elevation and azimuth; a query names a few contiguous slices. Keeps its memory from scan
+/// to scan.
 class BeamTable : public BeamIndex {
  public:
-  explicit BeamTable(const std::vector<Eigen::Vector3f>& directions);
+  /// The cell of a direction. @param u unit vector.
+  static std::uint32_t cellOf(const Eigen::Vector3f& u);
+
+  /// Replaces the beams.
+  /// @param cells of all beams. @param[out] order their numbers, sorted by cell: what a query's numbers
+  /// count.
+  void build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order);
+
   void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const override;
+
+  /// Of each cell's beams in the order, row by row; one more than cells.
+  const std::vector<std::uint32_t>& begin() const { return begin_; }
 
  private:
   void appendCells(int row, int first_column, int last_column, std::vector<BeamRange>& ranges) const;
 
-  std::vector<std::uint32_t> begin_;  ///< of each cell's beams, row by row; one more than cells
+  std::vector<std::uint32_t> begin_, next_;
 };
+
+/// The same from an R-tree (Boost.Geometry) over unit direction vectors, which has neither seam nor pole:
+/// what the table is tested against.
+/// @param directions unit vectors, one a beam.
+std::unique_ptr<BeamIndex> makeBeamRtree(const std::vector<Eigen::Vector3f>& directions);
 
 }  // namespace bki_mapping

@@ -1,9 +1,11 @@
 /// @file One point a cell.
 #pragma once
 
+#include <array>
 #include <vector>
 
-#include "bki_mapping/core/types.h"
+#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/inference/parallel_for.h"
 
 namespace bki_mapping {
 
@@ -14,8 +16,71 @@ struct LabelledPoints {
 };
 
 /// Merges the points of each cubic cell of the map frame into their centroid, labelled by the majority
-/// (ties: the smaller id). Cells come in the order in which they are first hit.
-/// @param origin of the points in the map frame [m]. @param cell edge [m]; 0 returns the input.
-LabelledPoints downsample(const Eigen::Vector3d& origin, const LabelledPoints& input, double cell);
+/// (ties: the smaller id). Cells come in the order in which they are first hit. Points are added in chunks,
+/// which several threads may fill side by side; the points' order is chunk by chunk. Keeps its memory from
+/// scan to scan.
+class Downsampler {
+ public:
+  /// Forgets all points.
+  /// @param origin of the points in the map frame [m]. @param cell edge [m]; 0 merges nothing.
+  void start(const Eigen::Vector3d& origin, double cell, std::size_t chunks);
+
+  /// Adds a point relative to the origin. Two threads must not add to the same chunk at once.
+  void add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label);
+
+  void finish(Workers& workers, LabelledPoints& output);
+
+ private:
+  /// Cells are spread over this many partitions by a hash, so that each can be merged by one thread, in a
+  /// table that fits its cache.
+  static constexpr std::size_t kPartitions = 64;
+
+  struct Record {
+    Eigen::Vector3f point;
+    GridIndex cell;
+    std::uint32_t place;  ///< in the chunk
+    ClassId label;
+  };
+  struct Chunk {
+    std::array<std::vector<Record>, kPartitions> records;
+    std::vector<std::uint32_t> cell_of;  ///< partition and cell of each point that is its cell's first
+    std::size_t begin = 0;               ///< of these cells in the output
+  };
+  struct Cell {
+    Eigen::Vector3d sum;
+    std::uint32_t count;
+    std::uint32_t votes;  ///< for `label`
+    std::uint32_t more;   ///< first of the votes for other labels
+    ClassId label;
+  };
+  struct Votes {
+    ClassId label;
+    std::uint32_t count, next;
+  };
+  struct Slot {
+    GridIndex index;
+    std::uint32_t cell;
+  };
+  struct Partition {
+    std::vector<Slot> slots;
+    std::vector<Cell> cells;
+    std::vector<Votes> votes;
+  };
+
+  void merge(std::size_t partition);
+  /// @return the cell's number if the record is its first.
+  std::uint32_t mergeRecord(const Record& record, Partition& partition) const;
+  void write(const Chunk& chunk, LabelledPoints& output) const;
+  void copy(LabelledPoints& output) const;
+  static void vote(Cell& cell, ClassId label, std::vector<Votes>& votes);
+  static ClassId majority(const Cell& cell, const std::vector<Votes>& votes);
+
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  double cell_ = 0.0;
+  GridGeometry grid_{1.0};
+  std::size_t used_ = 0;  ///< chunks of this scan
+  std::vector<Chunk> chunks_;
+  std::array<Partition, kPartitions> partitions_;
+};
 
 }  // namespace bki_mapping

@@ -8,12 +8,15 @@
 #include "bki_mapping/inference/beam_index.h"
 #include "bki_mapping/inference/beam_raster.h"
 #include "bki_mapping/inference/index_numbering.h"
+#include "bki_mapping/inference/local_point.h"
+#include "bki_mapping/inference/parallel_for.h"
 
 namespace bki_mapping {
 
 /// Working memory of one thread.
 struct EvidenceScratch {
   alignas(64) std::array<float, kBlockVoxels> sums{};
+  std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
   std::array<std::vector<LocalBeam>, 3> local_beams;  ///< by the axis that comes first
@@ -27,7 +30,7 @@ class Evidence {
 
   /// Names the blocks to which addTo may add; naming too many is allowed. `map` already has the blocks of the
   /// evidence that stands before this one in the update.
-  virtual void collectBlocks(const SemanticMap& map, IndexNumbering& touched) const = 0;
+  virtual void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) = 0;
 
   /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
   virtual void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const = 0;

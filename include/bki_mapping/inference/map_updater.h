@@ -13,9 +13,26 @@ struct MapUpdateStats {
   double update_ms = 0.0;   ///< adding to them
 };
 
-/// Adds all pieces of evidence of one scan, in the order given. The result does not depend on `threads`, to
-/// the bit. Blocks about which nothing is known afterwards are not kept.
-/// @param evidence at most 32 pieces.
-MapUpdateStats updateMap(SemanticMap& map, const std::vector<const Evidence*>& evidence, int threads);
+/// Adds evidence to maps. Keeps its memory from scan to scan.
+class MapUpdater {
+ public:
+  /// Adds all pieces of evidence of one scan, in the order given. The result does not depend on the number of
+  /// workers, to the bit. Blocks about which nothing is known afterwards are not kept.
+  /// @param evidence at most 32 pieces.
+  MapUpdateStats update(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
+
+ private:
+  struct Job {
+    BlockIndex index;
+    Block* block;
+    std::uint32_t pieces;  ///< bit e: evidence e touches the block
+  };
+
+  void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
+
+  IndexNumbering touched_, numbering_;
+  std::vector<Job> jobs_;
+  std::vector<EvidenceScratch> scratch_;  ///< one a worker
+};
 
 }  // namespace bki_mapping

@@ -1,9 +1,8 @@
 /// @file Which voxels a scan saw only behind its hits.
 #pragma once
 
-#include <memory>
-
 #include "bki_mapping/inference/beam_field.h"
+#include "bki_mapping/inference/block_walk.h"
 
 namespace bki_mapping {
 
@@ -11,17 +10,23 @@ namespace bki_mapping {
 /// (0 < rho < 1). Voxels that this scan does not reach keep the mark of an earlier one.
 class Occlusion : public Evidence {
  public:
-  /// @param range how far from the sensor shadows are followed [m].
-  Occlusion(std::shared_ptr<const BeamField> field, OcclusionExtent extent, double range)
-      : field_(std::move(field)), extent_(extent), range_(range) {}
+  explicit Occlusion(OcclusionExtent extent) : extent_(extent) {}
 
-  void collectBlocks(const SemanticMap& map, IndexNumbering& touched) const override;
+  /// Replaces the beams. @param field must stay where it is until the scan is done. @param range how far from
+  /// the sensor shadows are followed [m].
+  void setField(const BeamField& field, double range) {
+    field_ = &field;
+    range_ = range;
+  }
+
+  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
   void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
 
  private:
-  std::shared_ptr<const BeamField> field_;
   OcclusionExtent extent_;
-  double range_;
+  const BeamField* field_ = nullptr;
+  double range_ = 0.0;
+  BlockWalk walk_;
 };
 
 }  // namespace bki_mapping

@@ -1,18 +1,67 @@
 /// @file Independent jobs on several threads; the only place that starts threads in the core.
 #pragma once
 
+#include <atomic>
+#include <condition_variable>
 #include <cstddef>
-#include <functional>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
 
 namespace bki_mapping {
 
 /// @return the number of threads meant by a setting: itself, or all cores if it is 0.
 int threadCount(int setting);
 
-/// Calls job(j, worker) for each j in [0, jobs), on `threads` threads, the caller's among them; returns when
-/// all are done. Jobs must not depend on each other. `worker` in [0, threads) tells threads apart.
-/// @throws what the first failing job threw; jobs not yet begun are then left out.
-void parallelFor(std::size_t jobs, int threads,
-                 const std::function<void(std::size_t job, std::size_t worker)>& job);
+/// Threads that wait for work. Between two pieces of work they stay awake for a moment, then sleep.
+class Workers {
+ public:
+  /// @param setting number of threads, the caller's among them; 0 means all cores.
+  explicit Workers(int setting);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  /// Threads that take jobs, the caller's among them.
+  std::size_t count() const { return helpers_.size() + 1; }
+
+  /// Calls job(j, worker) for each j in [0, jobs); returns when all are done. Jobs must not depend on each
+  /// other. `worker` in [0, count()) tells threads apart. Allocates no memory. Not to be called from two
+  /// threads at once, nor from a job.
+  /// @throws what the first failing job threw; jobs not yet begun are then left out.
+  template <typename Job>
+  void forEach(std::size_t jobs, Job&& job) {
+    using Callable = std::remove_reference_t<Job>;
+    run(
+        jobs,
+        [](void* callable, std::size_t j, std::size_t worker) {
+          (*static_cast<Callable*>(callable))(j, worker);
+        },
+        const_cast<void*>(static_cast<const void*>(&job)));
+  }
+
+ private:
+  using Call = void (*)(void* callable, std::size_t job, std::size_t worker);
+
+  void run(std::size_t jobs, Call call, void* callable);
+  void work(std::size_t worker);
+  void help(std::size_t worker);
+
+  // Of the work at hand; written before `round_` goes up.
+  Call call_ = nullptr;
+  void* callable_ = nullptr;
+  std::size_t jobs_ = 0;
+
+  std::atomic<std::size_t> next_{0};     ///< first job that nobody has taken
+  std::atomic<std::size_t> busy_{0};     ///< helpers that have not finished this round
+  std::atomic<std::uint64_t> round_{0};  ///< goes up with each piece of work
+  std::atomic<bool> stop_{false};
+  std::mutex mutex_;  ///< of the two conditions and of `failure_`
+  std::condition_variable begun_, finished_;
+  std::exception_ptr failure_;
+  std::vector<std::thread> helpers_;
+};
 
 }  // namespace bki_mapping

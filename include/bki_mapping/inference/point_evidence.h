@@ -1,41 +1,65 @@
 /// @file Evidence of points: hits, or samples of free space.
 #pragma once
 
+#include <array>
+#include <string>
 #include <vector>
 
 #include "bki_mapping/inference/downsample.h"
 #include "bki_mapping/inference/evidence.h"
+#include "bki_mapping/inference/inner_loops.h"
 #include "bki_mapping/inference/kernel.h"
+#include "bki_mapping/inference/local_point.h"
 
 namespace bki_mapping {
 
 /// Adds k(|x - c|) to the class of each point x, for every voxel centre c within the kernel's length; with
-/// the counting kernel 1 for the voxel that holds the point.
+/// the counting kernel 1 for the voxel that holds the point. Keeps its memory from scan to scan.
 class PointEvidence : public Evidence {
  public:
-  /// @param origin of the points in the map frame [m].
-  PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, const Eigen::Vector3d& origin,
-                const LabelledPoints& points);
+  /// @param instruction_set one of instructionSets(); the best there is if empty.
+  PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
+                const std::string& instruction_set = "")
+      : geometry_(geometry),
+        per_metre_(1.0 / geometry.resolution()),
+        kernel_(kernel, geometry.resolution()),
+        loops_(innerLoopsFor(instruction_set)) {}
+
+  /// Replaces the points. @param origin of the points in the map frame [m].
+  void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers);
 
   /// Exactly the blocks with a voxel centre within reach of a point.
-  void collectBlocks(const SemanticMap& map, IndexNumbering& touched) const override;
+  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
   void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
 
  private:
-  /// A point in the coordinates of one block it reaches: [voxels], from the block's first voxel centre.
-  struct Entry {
-    float x, y, z;
-    ClassId label;
+  /// Blocks are spread over this many partitions by a hash, so that each can be sorted by one thread.
+  static constexpr std::size_t kPartitions = 64;
+
+  struct Record {
+    GridIndex block;
+    LocalPoint point;
+  };
+  using Chunk = std::array<std::vector<Record>, kPartitions>;
+  struct Partition {
+    IndexNumbering blocks;
+    std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
+    std::vector<LocalPoint> points;    ///< by block, then in the order of the scan
+    std::vector<std::uint32_t> block_of_record;
   };
 
-  void binPoint(const GridGeometry& geometry, const Eigen::Vector3d& point, ClassId label,
-                std::vector<std::uint32_t>& bins, std::vector<Entry>& entries);
-  void sortByBin(const std::vector<std::uint32_t>& bins, const std::vector<Entry>& entries);
+  static std::size_t partitionOf(const GridIndex& block) { return GridIndexHash()(block) >> 58; }
+  void bin(const Eigen::Vector3d& point, ClassId label, Chunk& chunk) const;
+  void sort(std::size_t partition, std::size_t chunks);
+  /// The sums of points of one class.
+  void addPoints(const LocalPoint* points, std::size_t count, float* sums) const;
 
+  GridGeometry geometry_;
+  double per_metre_;  ///< voxels
   VoxelKernel kernel_;
-  IndexNumbering blocks_;
-  std::vector<std::size_t> begin_;  ///< of each block's entries; one more than blocks
-  std::vector<Entry> entries_;      ///< by block, then class, then order of the points
+  const InnerLoops& loops_;
+  std::vector<Chunk> chunks_;
+  std::array<Partition, kPartitions> partitions_;
 };
 
 }  // namespace bki_mapping

@@ -24,6 +24,8 @@ struct PointCounts {
   std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
   /// Labels not in the class table, whatever became of them (not part of the sum).
   std::size_t labels_not_in_table = 0;
+
+  PointCounts& operator+=(const PointCounts& other);
 };
 
 /// A scan after filtering and down-sampling.
@@ -33,7 +35,25 @@ struct Observation {
   PointCounts counts;
 };
 
-/// @throws std::invalid_argument if the scan's labels are not as many as its points.
-Observation observe(const Scan& scan, const ClassTable& classes, const MapperConfig& config);
+/// Turns scans into observations. Keeps its memory from scan to scan.
+class Observer {
+ public:
+  explicit Observer(const MapperConfig& config) : config_(config) {}
+
+  /// @return what was seen; stays until the next call.
+  /// @throws std::invalid_argument if the scan's labels are not as many as its points.
+  const Observation& observe(const Scan& scan, const ClassTable& classes, Workers& workers);
+
+ private:
+  /// Sorts points first to before last into hits, cut beams and counts.
+  void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t chunk, std::size_t first,
+                  std::size_t last, PointCounts& counts);
+
+  MapperConfig config_;
+  std::vector<PointCounts> counts_;  ///< of each chunk
+  Downsampler hits_, cut_;
+  LabelledPoints cut_points_;
+  Observation seen_;
+};
 
 }  // namespace bki_mapping

@@ -8,6 +8,9 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/core/semantic_map.h"
 #include "bki_mapping/free_space/free_space_model.h"
+#include "bki_mapping/inference/map_updater.h"
+#include "bki_mapping/inference/occlusion.h"
+#include "bki_mapping/inference/point_evidence.h"
 #include "bki_mapping/mapping/observation.h"
 
 namespace bki_mapping {
@@ -25,7 +28,8 @@ struct ScanStats {
   double totalMs() const { return observe_ms + evidence_ms + collect_ms + update_ms; }
 };
 
-/// Owns a map and adds scans to it. Not for several threads at once; each call may use several inside.
+/// Owns a map, adds scans to it, and keeps threads and working memory for that. Not for several threads at
+/// once; each call may use several inside.
 class SemanticMapper {
  public:
   /// @throws std::invalid_argument if a setting is not allowed, or needs an unlabelled class that the table
@@ -47,8 +51,15 @@ class SemanticMapper {
  private:
   MapperConfig config_;
   std::shared_ptr<const ClassTable> classes_;
-  std::unique_ptr<FreeSpaceModel> free_space_;
   SemanticMap map_;
+  Workers workers_;
+  Observer observer_;
+  PointEvidence hits_;
+  LazyBeamField beams_;
+  std::unique_ptr<FreeSpaceModel> free_space_;
+  Occlusion occlusion_;
+  MapUpdater updater_;
+  std::vector<Evidence*> evidence_;
 };
 
 }  // namespace bki_mapping

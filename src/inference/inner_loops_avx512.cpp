@@ -1,0 +1,12 @@
+#include "beam_loop.h"
+#include "bki_mapping/inference/inner_loops.h"
+#include "point_loop.h"
+
+namespace bki_mapping {
+
+const InnerLoops& innerLoopsAvx512() {
+  static const InnerLoops loops = {"avx512", addPointsLoop, addBeamsLoop, addSomeBeamsLoop};
+  return loops;
+}
+
+}  // namespace bki_mapping
