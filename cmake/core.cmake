@@ -29,7 +29,8 @@ target_include_directories(bki_mapping_core PUBLIC
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
 target_link_libraries(bki_mapping_core PUBLIC Eigen3::Eigen Threads::Threads PRIVATE Boost::headers)
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
-target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math -O3)
+target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math
+  $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> -O3)
 bki_mapping_warnings(bki_mapping_core)
 # The inner loops meet no infinities or NaN; without them a choice is a minimum or a maximum, one instruction.
 set(inner_loop_options -ffinite-math-only -fno-signed-zeros)
@@ -40,6 +41,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set_source_files_properties(src/inference/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
     "${inner_loop_options};-mavx2;-mfma")
   set_source_files_properties(src/inference/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
-    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl")
+    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl;-Wno-maybe-uninitialized")
+  # The last: GCC 12 warns of its own intrinsics (its bug 105593).
   target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_X86)
 endif()

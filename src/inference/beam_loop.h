@@ -12,19 +12,11 @@
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_cells.h"
 #include "bki_mapping/inference/kernel.h"
-#if defined(__AVX512F__)
-#include <immintrin.h>
-#endif
+#include "lanes.h"
 
 namespace bki_mapping {
 namespace {
 
-/// Beams that are added side by side.
-#if defined(__AVX512F__)
-constexpr int kLanes = 16;
-#else
-constexpr int kLanes = 8;
-#endif
 static_assert(kLanes <= static_cast<int>(kBeamPadding));
 
 /// Beams near a tile.
@@ -36,57 +28,63 @@ struct PickedBeams {
   int count = 0;
 };
 
-/// Appends those of kLanes beams that are to be kept.
+/// Appends those of kLanes beams that are to be kept. @param keep -1 or 0.
 [[gnu::always_inline]] inline void append(const std::int32_t* ux, const std::int32_t* uy,
-                                          const std::int32_t* uz, const float* inverse_length,
-                                          const std::int32_t* keep, PickedBeams& picked) {
-#if defined(__AVX512F__)
-  const __mmask16 mask = _mm512_test_epi32_mask(_mm512_loadu_si512(keep), _mm512_loadu_si512(keep));
+                                          const std::int32_t* uz, const float* inverse_length, IntLanes keep,
+                                          PickedBeams& picked) {
   const int n = picked.count;
+#if defined(__AVX512F__)
+  const __mmask16 mask = _mm512_movepi32_mask(reinterpret_cast<__m512i>(keep));
   _mm512_storeu_si512(picked.ux + n, _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(ux)));
   _mm512_storeu_si512(picked.uy + n, _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(uy)));
   _mm512_storeu_si512(picked.uz + n, _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(uz)));
   _mm512_storeu_ps(picked.inverse_length + n,
                    _mm512_maskz_compress_ps(mask, _mm512_loadu_ps(inverse_length)));
-  picked.count += __builtin_popcount(mask);
+  picked.count = n + __builtin_popcount(mask);
 #else
+  int end = n;
   for (int lane = 0; lane < kLanes; ++lane) {
-    const int n = picked.count;
-    picked.ux[n] = ux[lane];
-    picked.uy[n] = uy[lane];
-    picked.uz[n] = uz[lane];
-    picked.inverse_length[n] = inverse_length[lane];
-    picked.count += keep[lane] != 0;
+    picked.ux[end] = ux[lane];
+    picked.uy[end] = uy[lane];
+    picked.uz[end] = uz[lane];
+    picked.inverse_length[end] = inverse_length[lane];
+    end -= keep[lane];
   }
+  picked.count = end;
 #endif
 }
 
-/// Weight along a beam, 0 unless 0 < rho < 1.
+/// Weights along beams, 0 unless 0 < rho < 1.
 template <BeamWeight kWeight>
-[[gnu::always_inline]] inline float weightAt(float rho) {
-  if (kWeight == BeamWeight::kBilinear) {
-    const float least = rho < 1.0f - rho ? rho : 1.0f - rho;
-    return least > 0.0f ? least : 0.0f;
+[[gnu::always_inline]] inline FloatLanes weightAt(FloatLanes rho) {
+  if constexpr (kWeight == BeamWeight::kBilinear) {
+    return greater(lesser(rho, 1.0f - rho), FloatLanes{});
+  } else {
+    const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
+    return (rho > 0.0f) & (rho < 1.0f) ? weight : FloatLanes{};
   }
-  const float weight = kWeight == BeamWeight::kUniform ? 1.0f : rho;
-  return (rho > 0.0f) & (rho < 1.0f) ? weight : 0.0f;
 }
 
-/// A tile and one beam near it. Lengths are in units of the kernel's length, but for rho.
-struct TileAndBeam {
-  float px, py, pz, ux, uy, uz;
-  float constant;        ///< |p|^2 + |o|^2, the same for all eight voxels
-  float rho;             ///< of the tile's centre
-  float rho_per_length;  ///< change of rho along u
-  float half;            ///< half a voxel
+/// A tile and some beams near it. Lengths are in units of the kernel's length, but for rho.
+struct TileAndBeams {
+  FloatLanes constant;        ///< |p|^2 + |o|^2, the same for all eight voxels
+  FloatLanes rho;             ///< of the tile's centre
+  FloatLanes rho_per_length;  ///< change of rho along u
 };
 
-/// The value of one voxel of the tile; the signs say on which side of the centre it lies.
-template <BeamWeight kWeight, int kX, int kY, int kZ>
-[[gnu::always_inline]] inline float valueAt(const TileAndBeam& b) {
-  const float along = b.half * (kX * b.ux + kY * b.uy + kZ * b.uz);
-  const float t = b.constant + 2.0f * b.half * (kX * b.px + kY * b.py + kZ * b.pz) - along * along;
-  return weightAt<kWeight>(b.rho + along * b.rho_per_length) * sparseKernel(t > 0.0f ? t : 0.0f);
+/// Adds the values of two voxels on opposite sides of the tile's centre, at -o and o.
+/// @param ou o u. @param op2 2 o p.
+template <BeamWeight kWeight>
+[[gnu::always_inline]] inline void addPair(const TileAndBeams& b, FloatLanes ou, FloatLanes op2, float* before,
+                                           float* behind) {
+  const FloatLanes base = b.constant - ou * ou, step = ou * b.rho_per_length;
+  // Rounding may make squares negative.
+  const FloatLanes r0 = squareRoot(greater(base - op2, FloatLanes{})),
+                   r1 = squareRoot(greater(base + op2, FloatLanes{}));
+  const FloatLanes k0 = sparseKernel(r0, greater(1.0f - r0, FloatLanes{})),
+                   k1 = sparseKernel(r1, greater(1.0f - r1, FloatLanes{}));
+  store(before, load(before) + weightAt<kWeight>(b.rho - step) * k0);
+  store(behind, load(behind) + weightAt<kWeight>(b.rho + step) * k1);
 }
 
 /// Adds kLanes beams, from `first` on, to the sums of a tile's voxels, lane by lane: voxel v's lanes are
@@ -94,33 +92,25 @@ template <BeamWeight kWeight, int kX, int kY, int kZ>
 template <BeamWeight kWeight>
 [[gnu::always_inline]] inline void addPicked(const PickedBeams& picked, int first, const Tile& tile,
                                              float* lanes) {
-  const std::int32_t *ux = picked.ux + first, *uy = picked.uy + first, *uz = picked.uz + first;
-  const float* inverse_length = picked.inverse_length + first;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    TileAndBeam b;
-    const float dx = static_cast<float>(tile.cx - ux[lane]) * kDirectionStep,
-                dy = static_cast<float>(tile.cy - uy[lane]) * kDirectionStep,
-                dz = static_cast<float>(tile.cz - uz[lane]) * kDirectionStep;
-    b.ux = static_cast<float>(ux[lane]) * kDirectionStep;
-    b.uy = static_cast<float>(uy[lane]) * kDirectionStep;
-    b.uz = static_cast<float>(uz[lane]) * kDirectionStep;
-    const float half_chord2 = 0.5f * (dx * dx + dy * dy + dz * dz);  // 1 - cos
-    b.px = tile.r * (dx + half_chord2 * b.ux);
-    b.py = tile.r * (dy + half_chord2 * b.uy);
-    b.pz = tile.r * (dz + half_chord2 * b.uz);
-    b.half = tile.half;
-    b.constant = b.px * b.px + b.py * b.py + b.pz * b.pz + 3.0f * tile.half * tile.half;
-    b.rho_per_length = inverse_length[lane] * tile.length;
-    b.rho = tile.r * (1.0f - half_chord2) * b.rho_per_length;
-    lanes[lane] += valueAt<kWeight, -1, -1, -1>(b);
-    lanes[lane + kLanes] += valueAt<kWeight, 1, -1, -1>(b);
-    lanes[lane + 2 * kLanes] += valueAt<kWeight, -1, 1, -1>(b);
-    lanes[lane + 3 * kLanes] += valueAt<kWeight, 1, 1, -1>(b);
-    lanes[lane + 4 * kLanes] += valueAt<kWeight, -1, -1, 1>(b);
-    lanes[lane + 5 * kLanes] += valueAt<kWeight, 1, -1, 1>(b);
-    lanes[lane + 6 * kLanes] += valueAt<kWeight, -1, 1, 1>(b);
-    lanes[lane + 7 * kLanes] += valueAt<kWeight, 1, 1, 1>(b);
-  }
+  const float h = tile.half;
+  const IntLanes iux = load(picked.ux + first), iuy = load(picked.uy + first), iuz = load(picked.uz + first);
+  const FloatLanes dx = toFloat(tile.cx - iux) * kDirectionStep, dy = toFloat(tile.cy - iuy) * kDirectionStep,
+                   dz = toFloat(tile.cz - iuz) * kDirectionStep;
+  const FloatLanes half_chord2 = 0.5f * (dx * dx + dy * dy + dz * dz);  // 1 - cos
+  TileAndBeams b;
+  b.constant = 2.0f * tile.r * tile.r * half_chord2 * (1.0f - 0.5f * half_chord2) + 3.0f * h * h;
+  b.rho_per_length = load(picked.inverse_length + first) * tile.length;
+  b.rho = tile.r * (1.0f - half_chord2) * b.rho_per_length;
+  // h u and 2 h p, axis by axis.
+  const float step = kDirectionStep * h, scale = 2.0f * h * tile.r;
+  const FloatLanes x = toFloat(iux) * step, y = toFloat(iuy) * step, z = toFloat(iuz) * step;
+  const FloatLanes bend = 2.0f * tile.r * half_chord2;
+  const FloatLanes px = scale * dx + bend * x, py = scale * dy + bend * y, pz = scale * dz + bend * z;
+  const FloatLanes sum = y + x, difference = y - x, p_sum = py + px, p_difference = py - px;
+  addPair<kWeight>(b, z + sum, pz + p_sum, lanes, lanes + 7 * kLanes);
+  addPair<kWeight>(b, z + difference, pz + p_difference, lanes + kLanes, lanes + 6 * kLanes);
+  addPair<kWeight>(b, z - difference, pz - p_difference, lanes + 2 * kLanes, lanes + 5 * kLanes);
+  addPair<kWeight>(b, z - sum, pz - p_sum, lanes + 3 * kLanes, lanes + 4 * kLanes);
 }
 
 /// Adds all picked beams, and forgets them.
@@ -143,43 +133,23 @@ template <BeamWeight kWeight>
   const float most =
       (s2 < 1.0f ? 2.0f - 2.0f * std::sqrt(1.0f - s2) : 4.0f) * 1.0001f / (kDirectionStep * kDirectionStep);
   const float nearest = (tile.r - tile.radius) * tile.length;
+  const IntLanes lane_numbers = countUp();
   bool flushed = false;
   for (std::uint32_t first = range.first; first < range.last; first += kLanes) {
     const auto left = static_cast<std::int32_t>(range.last - first);
     const std::int32_t *ux = beams.ux + first, *uy = beams.uy + first, *uz = beams.uz + first;
     const float* inverse_length = beams.inverse_length + first;
-    alignas(64) std::int32_t keep[kLanes];
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto dx = static_cast<float>(tile.cx - ux[lane]), dy = static_cast<float>(tile.cy - uy[lane]),
-                 dz = static_cast<float>(tile.cz - uz[lane]);
-      const float chord2 = dx * dx + dy * dy + dz * dz;
-      keep[lane] = (chord2 < most) & (nearest * inverse_length[lane] < 1.0f) & (lane < left);
-    }
+    const FloatLanes dx = toFloat(tile.cx - load(ux)), dy = toFloat(tile.cy - load(uy)),
+                     dz = toFloat(tile.cz - load(uz));
+    const FloatLanes chord2 = dx * dx + dy * dy + dz * dz;
+    const IntLanes keep =
+        (chord2 < most) & (nearest * load(inverse_length) < 1.0f) & (lane_numbers < left);
     append(ux, uy, uz, inverse_length, keep, picked);
     if (picked.count < PickedBeams::kMost - kLanes) continue;
     flush<kWeight>(tile, picked, lanes);
     flushed = true;
   }
   return flushed;
-}
-
-template <int kCount>
-struct FloatVector {
-  using Type [[gnu::vector_size(kCount * sizeof(float))]] = float;
-};
-
-/// The sum of some lanes, in a tree.
-template <int kCount>
-[[gnu::always_inline]] inline float sumOf(const float* lanes) {
-  if constexpr (kCount == 1) {
-    return lanes[0];
-  } else {
-    typename FloatVector<kCount / 2>::Type low, high;
-    __builtin_memcpy(&low, lanes, sizeof(low));
-    __builtin_memcpy(&high, lanes + kCount / 2, sizeof(high));
-    low += high;
-    return sumOf<kCount / 2>(reinterpret_cast<const float*>(&low));
-  }
 }
 
 /// Adds the sums of a tile's voxels to those of its block.
@@ -190,17 +160,19 @@ void addTile(const Tile& tile, const float* lanes, float* sums) {
   }
 }
 
-/// Adds the beams of a block. @param pickAll called as pickAll(tile number, tile, pick) shall call
+/// Adds the beams of a block. @param pickAll called as pickAll(windows, tile number, tile, pick) shall call
 /// pick(range) for the ranges in which the tile's beams are.
 template <BeamWeight kWeight, typename PickAll>
 [[gnu::always_inline]] inline void addTiles(const BeamArrays& beams, const BeamBlock& block, float* sums,
                                             PickAll&& pickAll) {
   PickedBeams picked;
+  TileWindows windows;
+  findWindows(block, windows);
   for (int number = 0; number < kTiles; ++number) {
-    const Tile tile = tileOf(block, number);
+    const Tile tile = tileOf(block, windows, number);
     alignas(64) float lanes[8 * kLanes] = {};
     bool flushed = false;
-    pickAll(number, tile,
+    pickAll(windows, number, tile,
             [&](BeamRange range) { flushed |= pick<kWeight>(beams, range, tile, picked, lanes); });
     if (!flushed && picked.count == 0) continue;
     flush<kWeight>(tile, picked, lanes);
@@ -210,9 +182,7 @@ template <BeamWeight kWeight, typename PickAll>
 
 template <BeamWeight kWeight>
 void addWeightedBeams(const BeamArrays& beams, const BeamBlock& block, float* sums) {
-  TileWindows windows;
-  findWindows(block, windows);
-  addTiles<kWeight>(beams, block, sums, [&](int number, const Tile&, auto&& pick) {
+  addTiles<kWeight>(beams, block, sums, [&](const TileWindows& windows, int number, const Tile&, auto&& pick) {
     const int first = windows.first_column[number], last = windows.last_column[number];
     for (int row = windows.first_row[number]; row <= windows.last_row[number]; ++row) {
       const std::uint32_t* begin = beams.begin + row * kBeamColumns;
@@ -229,7 +199,7 @@ void addWeightedBeams(const BeamArrays& beams, const BeamBlock& block, float* su
 template <BeamWeight kWeight>
 void addSomeWeightedBeams(const BeamArrays& beams, const BeamRange* ranges, std::size_t count,
                           const BeamBlock& block, float* sums) {
-  addTiles<kWeight>(beams, block, sums, [&](int, const Tile&, auto&& pick) {
+  addTiles<kWeight>(beams, block, sums, [&](const TileWindows&, int, const Tile&, auto&& pick) {
     for (std::size_t n = 0; n < count; ++n) pick(ranges[n]);
   });
 }

@@ -40,16 +40,21 @@ struct TileCentre {
   return (block.length + 0.8660255f * static_cast<float>(block.resolution)) * 1.0001f;
 }
 
-[[gnu::always_inline]] inline Tile tileOf(const BeamBlock& block, int number) {
-  const TileCentre c = centreOf(block, number);
-  const double r2 = c.x * c.x + c.y * c.y + c.z * c.z;
-  const double r = std::sqrt(r2 > 1e-12 ? r2 : 1e-12), steps = 1.0 / (r * kDirectionStep);
+/// All tiles of a block: their directions, and the cells of the beams that come within reach.
+struct TileWindows {
+  float r[kTiles];                                    ///< distance from the sensor [m]
+  std::int32_t cx[kTiles], cy[kTiles], cz[kTiles];    ///< unit directions [kDirectionStep]
+  std::int32_t first_row[kTiles], last_row[kTiles];
+  std::int32_t first_column[kTiles], last_column[kTiles];  ///< first > last: over the seam
+};
+
+[[gnu::always_inline]] inline Tile tileOf(const BeamBlock& block, const TileWindows& windows, int number) {
   const float inverse_length = 1.0f / block.length;
   Tile tile;
-  tile.cx = static_cast<std::int32_t>(c.x * steps);
-  tile.cy = static_cast<std::int32_t>(c.y * steps);
-  tile.cz = static_cast<std::int32_t>(c.z * steps);
-  tile.r = static_cast<float>(r) * inverse_length;
+  tile.cx = windows.cx[number];
+  tile.cy = windows.cy[number];
+  tile.cz = windows.cz[number];
+  tile.r = windows.r[number] * inverse_length;
   tile.half = 0.5f * static_cast<float>(block.resolution) * inverse_length;
   tile.radius = radiusOf(block) * inverse_length;
   tile.length = block.length;
@@ -58,16 +63,23 @@ struct TileCentre {
   return tile;
 }
 
-/// The cells of the beams that come within reach of each tile.
-struct TileWindows {
-  std::int32_t first_row[kTiles], last_row[kTiles];
-  std::int32_t first_column[kTiles], last_column[kTiles];  ///< first > last: over the seam
-};
+void findDirections(const BeamBlock& block, TileWindows& windows) {
+  for (int number = 0; number < kTiles; ++number) {
+    const TileCentre c = centreOf(block, number);
+    const double r2 = c.x * c.x + c.y * c.y + c.z * c.z;
+    const double r = std::sqrt(r2 > 1e-12 ? r2 : 1e-12), steps = 1.0 / (r * kDirectionStep);
+    windows.r[number] = static_cast<float>(r);
+    windows.cx[number] = static_cast<std::int32_t>(c.x * steps);
+    windows.cy[number] = static_cast<std::int32_t>(c.y * steps);
+    windows.cz[number] = static_cast<std::int32_t>(c.z * steps);
+  }
+}
 
 /// The windows: a ball of radius l at distance r subtends delta = asin(l / r) in elevation theta, so that
 /// sin(theta +- delta) = sin(theta) cos(delta) +- cos(theta) sin(delta), and asin(l / rho) in azimuth, with
 /// rho its distance in the plane. A ball that covers a pole reaches up to it, over the whole circle.
 void findWindows(const BeamBlock& block, TileWindows& windows) {
+  findDirections(block, windows);
   const float l = radiusOf(block);
   for (int number = 0; number < kTiles; ++number) {
     const TileCentre centre = centreOf(block, number);

@@ -8,8 +8,9 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::uint32_t kPartitionBits = 6, kCellBits = 32 - kPartitionBits;
 
-std::size_t partitionOf(std::size_t hash) {
-  return hash >> (64 - kPartitionBits);
+/// Cells of a cube of 8 x 8 x 8 share a partition, so that the neighbours of which a scan is made mostly do.
+std::size_t partitionOf(const VoxelIndex& cell) {
+  return GridIndexHash()(GridGeometry::blockOf(cell)) >> (64 - kPartitionBits);
 }
 
 }  // namespace
@@ -29,8 +30,8 @@ void Downsampler::start(const Eigen::Vector3d& origin, double cell, std::size_t 
 
 void Downsampler::add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label) {
   Chunk& into = chunks_[chunk];
-  const GridIndex cell = grid_.voxelAt(origin_ + point.cast<double>());
-  const std::size_t partition = cell_ == 0.0 ? 0 : partitionOf(GridIndexHash()(cell));
+  const VoxelIndex cell = grid_.voxelAt(origin_ + point.cast<double>());
+  const std::size_t partition = cell_ == 0.0 ? 0 : partitionOf(cell);
   into.records[partition].push_back({point, cell, static_cast<std::uint32_t>(into.cell_of.size()), label});
   into.cell_of.push_back(kNone);
 }
@@ -62,39 +63,40 @@ ClassId Downsampler::majority(const Cell& cell, const std::vector<Votes>& votes)
   return label;
 }
 
-std::uint32_t Downsampler::mergeRecord(const Record& record, Partition& partition) const {
-  const GridIndex& index = record.cell;
-  const std::size_t mask = partition.slots.size() - 1;
-  std::size_t s = GridIndexHash()(index) & mask;
-  while (partition.slots[s].cell != kNone && partition.slots[s].index != index) s = (s + 1) & mask;
-  Slot& slot = partition.slots[s];
+std::uint32_t Downsampler::mergeRecord(const Record& record, Scratch& scratch) {
+  const std::size_t mask = scratch.slots.size() - 1;
+  std::size_t s = GridIndexHash()(record.cell) & mask;
+  while (scratch.slots[s] != kNone && scratch.cells[scratch.slots[s]].index != record.cell) s = (s + 1) & mask;
   const Eigen::Vector3d point = record.point.cast<double>();
-  if (slot.cell == kNone) {
-    slot = {index, static_cast<std::uint32_t>(partition.cells.size())};
-    partition.cells.push_back({point, 1, 1, kNone, record.label});
-    return slot.cell;
+  if (scratch.slots[s] == kNone) {
+    scratch.slots[s] = static_cast<std::uint32_t>(scratch.cells.size());
+    scratch.cells.push_back({record.cell, point, 1, 1, kNone, record.label});
+    return scratch.slots[s];
   }
-  Cell& cell = partition.cells[slot.cell];
+  Cell& cell = scratch.cells[scratch.slots[s]];
   cell.sum += point;
   ++cell.count;
-  vote(cell, record.label, partition.votes);
+  vote(cell, record.label, scratch.votes);
   return kNone;
 }
 
-void Downsampler::merge(std::size_t p) {
-  Partition& partition = partitions_[p];
+void Downsampler::merge(std::size_t p, Scratch& scratch) {
   std::size_t records = 0, slots = 64;
   for (std::size_t c = 0; c < used_; ++c) records += chunks_[c].records[p].size();
   while (slots < 2 * records) slots *= 2;
-  partition.slots.assign(slots, {{}, kNone});
-  partition.cells.clear();
-  partition.votes.clear();
+  scratch.slots.assign(slots, kNone);
+  scratch.cells.clear();
+  scratch.votes.clear();
   for (std::size_t c = 0; c < used_; ++c) {
     Chunk& chunk = chunks_[c];
     for (const Record& record : chunk.records[p]) {
-      const std::uint32_t cell = mergeRecord(record, partition);
+      const std::uint32_t cell = mergeRecord(record, scratch);
       if (cell != kNone) chunk.cell_of[record.place] = static_cast<std::uint32_t>(p) << kCellBits | cell;
     }
+  }
+  merged_[p].clear();
+  for (const Cell& cell : scratch.cells) {
+    merged_[p].push_back({(cell.sum * (1.0 / cell.count)).cast<float>(), majority(cell, scratch.votes)});
   }
 }
 
@@ -102,10 +104,9 @@ void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
   std::size_t place = chunk.begin;
   for (const std::uint32_t code : chunk.cell_of) {
     if (code == kNone) continue;
-    const Partition& partition = partitions_[code >> kCellBits];
-    const Cell& cell = partition.cells[code & ((1u << kCellBits) - 1)];
-    output.points[place] = (cell.sum * (1.0 / cell.count)).cast<float>();
-    output.labels[place++] = majority(cell, partition.votes);
+    const Merged& merged = merged_[code >> kCellBits][code & ((1u << kCellBits) - 1)];
+    output.points[place] = merged.point;
+    output.labels[place++] = merged.label;
   }
 }
 
@@ -122,7 +123,8 @@ void Downsampler::copy(LabelledPoints& output) const {
 
 void Downsampler::finish(Workers& workers, LabelledPoints& output) {
   if (cell_ == 0.0) return copy(output);
-  workers.forEach(kPartitions, [&](std::size_t p, std::size_t) { merge(p); });
+  scratch_.resize(workers.count());
+  workers.forEach(kPartitions, [&](std::size_t p, std::size_t worker) { merge(p, scratch_[worker]); });
   std::size_t cells = 0;
   for (std::size_t c = 0; c < used_; ++c) {
     const auto& cell_of = chunks_[c].cell_of;

@@ -1,23 +1,19 @@
 #include "bki_mapping/inference/point_evidence.h"
 
 #include <algorithm>
-#include <cmath>
+#include <stdexcept>
 
 #include "bki_mapping/inference/chunks.h"
 
 namespace bki_mapping {
 namespace {
 
-/// The blocks of one axis that a point may reach.
-struct AxisReach {
-  int first, last;
+/// A block that a point may reach, on one axis.
+struct AxisBlock {
+  int block;
+  double local;      ///< the point from the block's first voxel centre [voxels]
+  double distance2;  ///< to the block's nearest voxel centre on this axis, squared
 };
-
-AxisReach blocksWithin(double point, double reach) {
-  // Voxel centres are at i + 0.5 [voxels]; rounded outwards.
-  const int first = floorToInt(point - reach - 0.5), last = floorToInt(point + reach + 0.5);
-  return {GridGeometry::blockOf({{first, 0, 0}}).x, GridGeometry::blockOf({{last, 0, 0}}).x};
-}
 
 /// Distance from a coordinate to the nearest voxel centre of a block, both from its first centre [voxels].
 double distanceToCentres(double local) {
@@ -28,7 +24,47 @@ double distanceToCentres(double local) {
   return above < 0.5 ? above : 1.0 - above;
 }
 
+/// The blocks of one axis with a voxel centre within reach of a point.
+class AxisBlocks {
+ public:
+  /// @param home the block that holds the point. @param local the point from its first voxel centre [voxels].
+  AxisBlocks(int home, double local, double reach) {
+    const double at_home = distanceToCentres(local);
+    if (at_home < reach) append(home, local, at_home);
+    // The nearest centres of the blocks before and behind it are at -1, -9, ..., and at 8, 16, ...
+    double away = local + 1.0;
+    for (int n = 1; away < reach; ++n, away += kBlockEdge) append(home - n, local + n * kBlockEdge, away);
+    away = kBlockEdge - local;
+    for (int n = 1; away < reach; ++n, away += kBlockEdge) append(home + n, local - n * kBlockEdge, away);
+  }
+  const AxisBlock* begin() const { return blocks_.data(); }
+  const AxisBlock* end() const { return blocks_.data() + count_; }
+
+  static constexpr std::size_t kMost = 20;
+
+ private:
+  void append(int block, double local, double distance) {
+    if (count_ < kMost) blocks_[count_++] = {block, local, distance * distance};
+  }
+
+  std::array<AxisBlock, kMost> blocks_;  // not initialised
+  std::size_t count_ = 0;
+};
+
 }  // namespace
+
+PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
+                             const std::string& instruction_set)
+    : geometry_(geometry),
+      per_metre_(1.0 / geometry.resolution()),
+      kernel_(kernel, geometry.resolution()),
+      loops_(innerLoopsFor(instruction_set)) {
+  const double most = kBlockEdge * (AxisBlocks::kMost - 2) / 2.0;
+  if (!(kernel_.reach < most)) {
+    throw std::invalid_argument("kernel/length is more than " + std::to_string(static_cast<int>(most)) +
+                                " voxels; make it shorter, or resolution coarser");
+  }
+}
 
 void PointEvidence::bin(const Eigen::Vector3d& point, ClassId label, Chunk& chunk) const {
   const auto append = [&](const GridIndex& block, const Eigen::Vector3d& local) {
@@ -42,27 +78,23 @@ void PointEvidence::bin(const Eigen::Vector3d& point, ClassId label, Chunk& chun
     return;
   }
   const Eigen::Vector3d p = point * per_metre_;
-  const BlockIndex home = GridGeometry::blockOf({{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}});
   const double reach = kernel_.reach;
-  const auto localIn = [&p](int x, int y, int z) {
-    return Eigen::Vector3d(p.x() - x * kBlockEdge - 0.5, p.y() - y * kBlockEdge - 0.5,
-                           p.z() - z * kBlockEdge - 0.5);
-  };
-  const Eigen::Vector3d at_home = localIn(home.x, home.y, home.z);
-  if (reach >= 0.8661 && (at_home.array() - reach > -0.999).all() &&
-      (at_home.array() + reach < kBlockEdge - 0.001).all()) {
-    append(home, at_home);  // most points: the neighbours' nearest centres, at -1 and 8, are out of reach
+  // Most points keep to one block: the neighbours' nearest centres, at -1 and 8, are out of reach.
+  const BlockIndex home =
+      GridGeometry::blockOf({{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}});
+  const double x = p.x() - home.x * kBlockEdge - 0.5, y = p.y() - home.y * kBlockEdge - 0.5,
+               z = p.z() - home.z * kBlockEdge - 0.5;
+  const double low = reach - 0.999, high = kBlockEdge - 0.001 - reach;
+  if (reach >= 0.8661 && x > low && x < high && y > low && y < high && z > low && z < high) {
+    append(home, {x, y, z});
     return;
   }
-  const AxisReach xs = blocksWithin(p.x(), reach), ys = blocksWithin(p.y(), reach),
-                  zs = blocksWithin(p.z(), reach);
-  for (int z = zs.first; z <= zs.last; ++z) {
-    for (int y = ys.first; y <= ys.last; ++y) {
-      for (int x = xs.first; x <= xs.last; ++x) {
-        const Eigen::Vector3d local = localIn(x, y, z);
-        const double dx = distanceToCentres(local.x()), dy = distanceToCentres(local.y()),
-                     dz = distanceToCentres(local.z());
-        if (dx * dx + dy * dy + dz * dz < reach * reach) append({x, y, z}, local);
+  const AxisBlocks xs(home.x, x, reach), ys(home.y, y, reach), zs(home.z, z, reach);
+  for (const AxisBlock& bz : zs) {
+    for (const AxisBlock& by : ys) {
+      for (const AxisBlock& bx : xs) {
+        if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
+        append({bx.block, by.block, bz.block}, {bx.local, by.local, bz.local});
       }
     }
   }
@@ -73,9 +105,13 @@ void PointEvidence::sort(std::size_t p, std::size_t chunks) {
   partition.blocks.clear();
   partition.block_of_record.clear();
   partition.begin.assign(1, 0);
+  std::uint32_t block = IndexNumbering::kNone;
   for (std::size_t c = 0; c < chunks; ++c) {
     for (const Record& record : chunks_[c][p]) {
-      const std::uint32_t block = partition.blocks.insert(record.block);
+      // Neighbours in a scan are mostly neighbours in space.
+      if (block == IndexNumbering::kNone || partition.blocks.members()[block] != record.block) {
+        block = partition.blocks.insert(record.block);
+      }
       if (block + 1 == partition.begin.size()) partition.begin.push_back(0);
       ++partition.begin[block + 1];
       partition.block_of_record.push_back(block);

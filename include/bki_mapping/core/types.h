@@ -28,14 +28,13 @@ struct GridIndex {
 struct VoxelIndex : GridIndex {};
 struct BlockIndex : GridIndex {};
 
-/// Spreads the three coordinates over 64 bits (odd constants of the golden-ratio family, then a
-/// xor-shift finaliser).
+/// Spreads the three coordinates over 64 bits: sums of products with odd constants of the golden-ratio family.
+/// The high bits are mixed well; they are folded into the low ones.
 struct GridIndexHash {
   std::size_t operator()(const GridIndex& i) const {
-    std::uint64_t h = static_cast<std::uint32_t>(i.x) * 0x9E3779B97F4A7C15ull;
-    h ^= static_cast<std::uint32_t>(i.y) * 0xC2B2AE3D27D4EB4Full;
-    h ^= static_cast<std::uint32_t>(i.z) * 0x165667B19E3779F9ull;
-    h = (h ^ (h >> 29)) * 0xBF58476D1CE4E5B9ull;
+    const std::uint64_t h = static_cast<std::uint32_t>(i.x) * 0x9E3779B97F4A7C15ull +
+                            static_cast<std::uint32_t>(i.y) * 0xC2B2AE3D27D4EB4Full +
+                            static_cast<std::uint32_t>(i.z) * 0x165667B19E3779F9ull;
     return static_cast<std::size_t>(h ^ (h >> 32));
   }
 };

@@ -47,6 +47,7 @@ class Downsampler {
     std::size_t begin = 0;               ///< of these cells in the output
   };
   struct Cell {
+    GridIndex index;
     Eigen::Vector3d sum;
     std::uint32_t count;
     std::uint32_t votes;  ///< for `label`
@@ -57,19 +58,21 @@ class Downsampler {
     ClassId label;
     std::uint32_t count, next;
   };
-  struct Slot {
-    GridIndex index;
-    std::uint32_t cell;
+  /// A point of the output.
+  struct Merged {
+    Eigen::Vector3f point;
+    ClassId label;
   };
-  struct Partition {
-    std::vector<Slot> slots;
+  /// Working memory of one thread, for one partition at a time.
+  struct Scratch {
+    std::vector<std::uint32_t> slots;  ///< of a hash table: number of a cell, or kNone
     std::vector<Cell> cells;
     std::vector<Votes> votes;
   };
 
-  void merge(std::size_t partition);
+  void merge(std::size_t partition, Scratch& scratch);
   /// @return the cell's number if the record is its first.
-  std::uint32_t mergeRecord(const Record& record, Partition& partition) const;
+  static std::uint32_t mergeRecord(const Record& record, Scratch& scratch);
   void write(const Chunk& chunk, LabelledPoints& output) const;
   void copy(LabelledPoints& output) const;
   static void vote(Cell& cell, ClassId label, std::vector<Votes>& votes);
@@ -80,7 +83,8 @@ class Downsampler {
   GridGeometry grid_{1.0};
   std::size_t used_ = 0;  ///< chunks of this scan
   std::vector<Chunk> chunks_;
-  std::array<Partition, kPartitions> partitions_;
+  std::vector<Scratch> scratch_;
+  std::array<std::vector<Merged>, kPartitions> merged_;
 };
 
 }  // namespace bki_mapping

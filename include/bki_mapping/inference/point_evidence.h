@@ -18,12 +18,9 @@ namespace bki_mapping {
 class PointEvidence : public Evidence {
  public:
   /// @param instruction_set one of instructionSets(); the best there is if empty.
+  /// @throws std::invalid_argument if the kernel is longer than 72 voxels.
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
-                const std::string& instruction_set = "")
-      : geometry_(geometry),
-        per_metre_(1.0 / geometry.resolution()),
-        kernel_(kernel, geometry.resolution()),
-        loops_(innerLoopsFor(instruction_set)) {}
+                const std::string& instruction_set = "");
 
   /// Replaces the points. @param origin of the points in the map frame [m].
   void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers);
