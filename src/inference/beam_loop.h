@@ -1,6 +1,7 @@
 /// @file The innermost loop of line evidence; each instruction set's file includes it and gets a copy of its
-/// own. A block is cut into tiles of 2 x 2 x 2 voxels. For each tile the beams near it are picked from a few
-/// slices of the table, then added to its eight voxels, several beams side by side.
+/// own. A block is cut into eight octants of 4 x 4 x 4 voxels, and these into tiles of 2 x 2 x 2. The beams
+/// near an octant are picked from a few slices of the table, of these the beams near each of its tiles, and
+/// these are added to the tile's eight voxels, several beams side by side.
 ///
 /// With c the unit direction of a tile's centre, r its distance and u a beam's direction, D = c - u is exact
 /// (directions are whole numbers), and the offset of the centre from the beam's line is
@@ -19,9 +20,9 @@ namespace {
 
 static_assert(kLanes <= static_cast<int>(kBeamPadding));
 
-/// Beams near a tile.
+/// Beams near an octant or a tile.
 struct PickedBeams {
-  static constexpr int kMost = 512;
+  static constexpr int kMost = 1024;
 
   alignas(64) std::int32_t ux[kMost + kLanes], uy[kMost + kLanes], uz[kMost + kLanes];
   alignas(64) float inverse_length[kMost + kLanes];
@@ -75,8 +76,8 @@ struct TileAndBeams {
 /// Adds the values of two voxels on opposite sides of the tile's centre, at -o and o.
 /// @param ou o u. @param op2 2 o p.
 template <BeamWeight kWeight>
-[[gnu::always_inline]] inline void addPair(const TileAndBeams& b, FloatLanes ou, FloatLanes op2, float* before,
-                                           float* behind) {
+[[gnu::always_inline]] inline void addPair(const TileAndBeams& b, FloatLanes ou, FloatLanes op2,
+                                           float* before, float* behind) {
   const FloatLanes base = b.constant - ou * ou, step = ou * b.rho_per_length;
   // Rounding may make squares negative.
   const FloatLanes r0 = squareRoot(greater(base - op2, FloatLanes{})),
@@ -113,43 +114,18 @@ template <BeamWeight kWeight>
   addPair<kWeight>(b, z - sum, pz - p_sum, lanes + 3 * kLanes, lanes + 4 * kLanes);
 }
 
-/// Adds all picked beams, and forgets them.
-template <BeamWeight kWeight>
-void flush(const Tile& tile, PickedBeams& picked, float* lanes) {
-  for (int lane = 0; lane < kLanes; ++lane) picked.inverse_length[picked.count + lane] = 0.0f;  // no weight
-  for (int first = 0; first < picked.count; first += kLanes) {
-    addPicked<kWeight>(picked, first, tile, lanes);
-  }
-  picked.count = 0;
-}
-
-/// Picks the beams of a range that may reach a tile between the sensor and their end.
-/// @return whether beams had to be flushed to make room.
-template <BeamWeight kWeight>
-[[gnu::always_inline]] inline bool pick(const BeamArrays& beams, BeamRange range, const Tile& tile,
-                                        PickedBeams& picked, float* lanes) {
-  // The chord at which a line passes the tile's ball, [kDirectionStep^2].
-  const float s2 = tile.radius * tile.radius / (tile.r * tile.r);
-  const float most =
-      (s2 < 1.0f ? 2.0f - 2.0f * std::sqrt(1.0f - s2) : 4.0f) * 1.0001f / (kDirectionStep * kDirectionStep);
-  const float nearest = (tile.r - tile.radius) * tile.length;
-  const IntLanes lane_numbers = countUp();
-  bool flushed = false;
-  for (std::uint32_t first = range.first; first < range.last; first += kLanes) {
-    const auto left = static_cast<std::int32_t>(range.last - first);
-    const std::int32_t *ux = beams.ux + first, *uy = beams.uy + first, *uz = beams.uz + first;
-    const float* inverse_length = beams.inverse_length + first;
-    const FloatLanes dx = toFloat(tile.cx - load(ux)), dy = toFloat(tile.cy - load(uy)),
-                     dz = toFloat(tile.cz - load(uz));
-    const FloatLanes chord2 = dx * dx + dy * dy + dz * dz;
-    const IntLanes keep =
-        (chord2 < most) & (nearest * load(inverse_length) < 1.0f) & (lane_numbers < left);
-    append(ux, uy, uz, inverse_length, keep, picked);
-    if (picked.count < PickedBeams::kMost - kLanes) continue;
-    flush<kWeight>(tile, picked, lanes);
-    flushed = true;
-  }
-  return flushed;
+/// Picks those of kLanes beams that may reach a place between the sensor and their end.
+/// @param left number of the kLanes beams that count. @param most greatest squared chord [kDirectionStep^2].
+/// @param nearest distance from the sensor that they must have [m].
+[[gnu::always_inline]] inline void pick(const std::int32_t* ux, const std::int32_t* uy,
+                                        const std::int32_t* uz, const float* inverse_length,
+                                        std::int32_t left, const Place& place, PickedBeams& picked) {
+  const FloatLanes dx = toFloat(place.cx - load(ux)), dy = toFloat(place.cy - load(uy)),
+                   dz = toFloat(place.cz - load(uz));
+  const FloatLanes chord2 = dx * dx + dy * dy + dz * dz;
+  const IntLanes keep =
+      (chord2 < place.chord2) & (place.nearest * load(inverse_length) < 1.0f) & (countUp() < left);
+  append(ux, uy, uz, inverse_length, keep, picked);
 }
 
 /// Adds the sums of a tile's voxels to those of its block.
@@ -160,37 +136,67 @@ void addTile(const Tile& tile, const float* lanes, float* sums) {
   }
 }
 
-/// Adds the beams of a block. @param pickAll called as pickAll(windows, tile number, tile, pick) shall call
-/// pick(range) for the ranges in which the tile's beams are.
-template <BeamWeight kWeight, typename PickAll>
-[[gnu::always_inline]] inline void addTiles(const BeamArrays& beams, const BeamBlock& block, float* sums,
-                                            PickAll&& pickAll) {
-  PickedBeams picked;
-  TileWindows windows;
-  findWindows(block, windows);
-  for (int number = 0; number < kTiles; ++number) {
-    const Tile tile = tileOf(block, windows, number);
+/// Adds the beams picked for an octant to its tiles, and forgets them.
+template <BeamWeight kWeight>
+void addOctant(const BeamBlock& block, const Places& places, int octant, PickedBeams& near_octant,
+               float* sums) {
+  for (int lane = 0; lane < kLanes; ++lane) near_octant.inverse_length[near_octant.count + lane] = 0.0f;
+  PickedBeams near_tile;
+  for (int n = 0; n < 8; ++n) {
+    const int number = tileInOctant(octant, n);
+    const Place place = places.tile(number);
+    near_tile.count = 0;
+    for (int b = 0; b < near_octant.count; b += kLanes) {
+      pick(near_octant.ux + b, near_octant.uy + b, near_octant.uz + b, near_octant.inverse_length + b,
+           near_octant.count - b, place, near_tile);
+    }
+    if (near_tile.count == 0) continue;
+    const Tile tile = tileOf(block, places, number);
     alignas(64) float lanes[8 * kLanes] = {};
-    bool flushed = false;
-    pickAll(windows, number, tile,
-            [&](BeamRange range) { flushed |= pick<kWeight>(beams, range, tile, picked, lanes); });
-    if (!flushed && picked.count == 0) continue;
-    flush<kWeight>(tile, picked, lanes);
+    for (int lane = 0; lane < kLanes; ++lane)
+      near_tile.inverse_length[near_tile.count + lane] = 0.0f;  // no weight
+    for (int b = 0; b < near_tile.count; b += kLanes) addPicked<kWeight>(near_tile, b, tile, lanes);
     addTile(tile, lanes, sums);
+  }
+  near_octant.count = 0;
+}
+
+/// Adds the beams of a block. @param forEachRange called as forEachRange(octant, visit) shall call
+/// visit(range) for the ranges in which the octant's beams are.
+template <BeamWeight kWeight, typename ForEachRange>
+[[gnu::always_inline]] inline void addBlock(const BeamArrays& beams, const BeamBlock& block, float* sums,
+                                            ForEachRange&& forEachRange) {
+  Places places;
+  findPlaces(block, places);
+  PickedBeams near_octant;
+  for (int octant = 0; octant < 8; ++octant) {
+    const Place place = places.octant(octant);
+    forEachRange(octant, [&](BeamRange range) {
+      for (std::uint32_t b = range.first; b < range.last; b += kLanes) {
+        pick(beams.ux + b, beams.uy + b, beams.uz + b, beams.inverse_length + b,
+             static_cast<std::int32_t>(range.last - b), place, near_octant);
+        if (near_octant.count > PickedBeams::kMost - kLanes) {
+          addOctant<kWeight>(block, places, octant, near_octant, sums);
+        }
+      }
+    });
+    if (near_octant.count > 0) addOctant<kWeight>(block, places, octant, near_octant, sums);
   }
 }
 
 template <BeamWeight kWeight>
 void addWeightedBeams(const BeamArrays& beams, const BeamBlock& block, float* sums) {
-  addTiles<kWeight>(beams, block, sums, [&](const TileWindows& windows, int number, const Tile&, auto&& pick) {
-    const int first = windows.first_column[number], last = windows.last_column[number];
-    for (int row = windows.first_row[number]; row <= windows.last_row[number]; ++row) {
+  Windows windows;
+  findWindows(block, windows);
+  addBlock<kWeight>(beams, block, sums, [&](int octant, auto&& visit) {
+    const int first = windows.first_column[octant], last = windows.last_column[octant];
+    for (int row = windows.first_row[octant]; row <= windows.last_row[octant]; ++row) {
       const std::uint32_t* begin = beams.begin + row * kBeamColumns;
       if (first <= last) {
-        if (begin[first] < begin[last + 1]) pick({begin[first], begin[last + 1]});
+        visit({begin[first], begin[last + 1]});
       } else {  // over the seam
-        pick({begin[first], begin[kBeamColumns]});
-        pick({begin[0], begin[last + 1]});
+        visit({begin[first], begin[kBeamColumns]});
+        visit({begin[0], begin[last + 1]});
       }
     }
   });
@@ -199,8 +205,8 @@ void addWeightedBeams(const BeamArrays& beams, const BeamBlock& block, float* su
 template <BeamWeight kWeight>
 void addSomeWeightedBeams(const BeamArrays& beams, const BeamRange* ranges, std::size_t count,
                           const BeamBlock& block, float* sums) {
-  addTiles<kWeight>(beams, block, sums, [&](const TileWindows&, int, const Tile&, auto&& pick) {
-    for (std::size_t n = 0; n < count; ++n) pick(ranges[n]);
+  addBlock<kWeight>(beams, block, sums, [&](int, auto&& visit) {
+    for (std::size_t n = 0; n < count; ++n) visit(ranges[n]);
   });
 }
 

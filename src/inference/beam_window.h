@@ -1,6 +1,8 @@
-/// @file The tiles of a block as seen from the sensor, and the cells of the beams near each; included by
-/// beam_loop.h alone.
+/// @file The octants and tiles of a block as seen from the sensor, and the cells of the beams near each
+/// octant; included by beam_loop.h alone.
 #pragma once
+
+#include <cmath>
 
 #include "bki_mapping/core/types.h"
 #include "bki_mapping/inference/beam_block.h"
@@ -9,80 +11,119 @@
 namespace bki_mapping {
 namespace {
 
-/// Tiles of 2 x 2 x 2 voxels: a side, and in all.
-constexpr int kTileEdge = kBlockEdge / 2;
-constexpr int kTiles = kTileEdge * kTileEdge * kTileEdge;
+/// Octants of 4 x 4 x 4 voxels and tiles of 2 x 2 x 2 voxels: a side, and in all.
+constexpr int kOctantEdge = 2, kOctants = 8;
+constexpr int kTileEdge = 4, kTiles = 64;
+static_assert(kBlockEdge == 8);
+
+/// The number of an octant's n-th tile in the block.
+[[gnu::always_inline]] inline int tileInOctant(int octant, int n) {
+  const int i = 2 * (octant & 1) + (n & 1), j = 2 * (octant >> 1 & 1) + (n >> 1 & 1),
+            k = 2 * (octant >> 2) + (n >> 2);
+  return i + kTileEdge * (j + kTileEdge * k);
+}
+
+/// A ball of voxels, and which beams reach it.
+struct Place {
+  std::int32_t cx, cy, cz;  ///< unit direction of its centre from the sensor [kDirectionStep]
+  float chord2;   ///< between that and the directions that pass it, squared, less than [kDirectionStep^2]
+  float nearest;  ///< its distance from the sensor [m]; negative where it holds the sensor
+};
+
+/// All octants and tiles of a block.
+struct Places {
+  std::int32_t cx[kOctants + kTiles], cy[kOctants + kTiles], cz[kOctants + kTiles];
+  float chord2[kOctants + kTiles], nearest[kOctants + kTiles];
+  float r[kOctants + kTiles];  ///< distances of their centres from the sensor [m]
+
+  Place octant(int n) const { return {cx[n], cy[n], cz[n], chord2[n], nearest[n]}; }
+  Place tile(int n) const { return octant(kOctants + n); }
+};
 
 /// A tile. Lengths are in units of the kernel's length.
 struct Tile {
   std::int32_t cx, cy, cz;  ///< unit direction of its centre from the sensor [kDirectionStep]
   float r;                  ///< distance of its centre from the sensor
   float half;               ///< half a voxel
-  float radius;             ///< about its centre, of the lines that reach any of its voxels
   float length;             ///< of the kernel [m]
   int first_voxel;          ///< place in the block
 };
 
-/// The centre of a tile relative to the sensor [m].
-struct TileCentre {
+/// The centre of one of edge^3 cubes into which a block is cut, relative to the sensor [m].
+struct Centre {
   double x, y, z;
 };
 
-[[gnu::always_inline]] inline TileCentre centreOf(const BeamBlock& block, int number) {
-  const int i = number % kTileEdge, j = number / kTileEdge % kTileEdge, k = number / (kTileEdge * kTileEdge);
-  return {block.first[0] + (2 * i + 0.5) * block.resolution,
-          block.first[1] + (2 * j + 0.5) * block.resolution,
-          block.first[2] + (2 * k + 0.5) * block.resolution};
+template <int kEdge>
+[[gnu::always_inline]] inline Centre centreOf(const BeamBlock& block, int n) {
+  constexpr double kWidth = kBlockEdge / kEdge, kFirst = 0.5 * (kWidth - 1.0);
+  const int i = n % kEdge, j = n / kEdge % kEdge, k = n / (kEdge * kEdge);
+  return {block.first[0] + (kWidth * i + kFirst) * block.resolution,
+          block.first[1] + (kWidth * j + kFirst) * block.resolution,
+          block.first[2] + (kWidth * k + kFirst) * block.resolution};
 }
 
-/// From a tile's centre to its voxel's centres, and the kernel's length beyond [m].
+/// From such a cube's centre to the centres of its voxels, and the kernel's length beyond [m].
+template <int kEdge>
 [[gnu::always_inline]] inline float radiusOf(const BeamBlock& block) {
-  return (block.length + 0.8660255f * static_cast<float>(block.resolution)) * 1.0001f;
+  constexpr float kToVoxel = 0.8660255f * (kBlockEdge / kEdge - 1);
+  return (block.length + kToVoxel * static_cast<float>(block.resolution)) * 1.0001f;
 }
 
-/// All tiles of a block: their directions, and the cells of the beams that come within reach.
-struct TileWindows {
-  float r[kTiles];                                    ///< distance from the sensor [m]
-  std::int32_t cx[kTiles], cy[kTiles], cz[kTiles];    ///< unit directions [kDirectionStep]
-  std::int32_t first_row[kTiles], last_row[kTiles];
-  std::int32_t first_column[kTiles], last_column[kTiles];  ///< first > last: over the seam
-};
+template <int kEdge>
+[[gnu::always_inline]] inline void findPlacesOf(const BeamBlock& block, int first, Places& places) {
+  const float radius = radiusOf<kEdge>(block);
+  for (int n = 0; n < kEdge * kEdge * kEdge; ++n) {
+    const Centre c = centreOf<kEdge>(block, n);
+    const double r2 = c.x * c.x + c.y * c.y + c.z * c.z;
+    const double r = std::sqrt(r2 > 1e-12 ? r2 : 1e-12), steps = 1.0 / (r * kDirectionStep);
+    const auto rf = static_cast<float>(r);
+    places.r[first + n] = rf;
+    places.cx[first + n] = static_cast<std::int32_t>(c.x * steps);
+    places.cy[first + n] = static_cast<std::int32_t>(c.y * steps);
+    places.cz[first + n] = static_cast<std::int32_t>(c.z * steps);
+    // The chord of asin(s) is sqrt(2 - 2 sqrt(1 - s^2)).
+    const float s2 = radius * radius / (rf * rf), c2 = s2 < 1.0f ? 1.0f - s2 : 0.0f;
+    const float chord2 = 2.0f * s2 / (1.0f + std::sqrt(c2));
+    places.chord2[first + n] = (s2 < 1.0f ? chord2 : 4.0f) * 1.0001f / (kDirectionStep * kDirectionStep);
+    places.nearest[first + n] = rf - radius;
+  }
+}
 
-[[gnu::always_inline]] inline Tile tileOf(const BeamBlock& block, const TileWindows& windows, int number) {
+void findPlaces(const BeamBlock& block, Places& places) {
+  findPlacesOf<kOctantEdge>(block, 0, places);
+  findPlacesOf<kTileEdge>(block, kOctants, places);
+}
+
+[[gnu::always_inline]] inline Tile tileOf(const BeamBlock& block, const Places& places, int n) {
   const float inverse_length = 1.0f / block.length;
+  const Place place = places.tile(n);
   Tile tile;
-  tile.cx = windows.cx[number];
-  tile.cy = windows.cy[number];
-  tile.cz = windows.cz[number];
-  tile.r = windows.r[number] * inverse_length;
+  tile.cx = place.cx;
+  tile.cy = place.cy;
+  tile.cz = place.cz;
+  tile.r = places.r[kOctants + n] * inverse_length;
   tile.half = 0.5f * static_cast<float>(block.resolution) * inverse_length;
-  tile.radius = radiusOf(block) * inverse_length;
   tile.length = block.length;
-  tile.first_voxel = 2 * (number % kTileEdge) + kBlockEdge * 2 * (number / kTileEdge % kTileEdge) +
-                     kBlockEdge * kBlockEdge * 2 * (number / (kTileEdge * kTileEdge));
+  tile.first_voxel =
+      2 *
+      (n % kTileEdge + kBlockEdge * (n / kTileEdge % kTileEdge + kBlockEdge * (n / (kTileEdge * kTileEdge))));
   return tile;
 }
 
-void findDirections(const BeamBlock& block, TileWindows& windows) {
-  for (int number = 0; number < kTiles; ++number) {
-    const TileCentre c = centreOf(block, number);
-    const double r2 = c.x * c.x + c.y * c.y + c.z * c.z;
-    const double r = std::sqrt(r2 > 1e-12 ? r2 : 1e-12), steps = 1.0 / (r * kDirectionStep);
-    windows.r[number] = static_cast<float>(r);
-    windows.cx[number] = static_cast<std::int32_t>(c.x * steps);
-    windows.cy[number] = static_cast<std::int32_t>(c.y * steps);
-    windows.cz[number] = static_cast<std::int32_t>(c.z * steps);
-  }
-}
+/// The cells of the beams that come within reach of each octant.
+struct Windows {
+  std::int32_t first_row[kOctants], last_row[kOctants];
+  std::int32_t first_column[kOctants], last_column[kOctants];  ///< first > last: over the seam
+};
 
 /// The windows: a ball of radius l at distance r subtends delta = asin(l / r) in elevation theta, so that
 /// sin(theta +- delta) = sin(theta) cos(delta) +- cos(theta) sin(delta), and asin(l / rho) in azimuth, with
 /// rho its distance in the plane. A ball that covers a pole reaches up to it, over the whole circle.
-void findWindows(const BeamBlock& block, TileWindows& windows) {
-  findDirections(block, windows);
-  const float l = radiusOf(block);
-  for (int number = 0; number < kTiles; ++number) {
-    const TileCentre centre = centreOf(block, number);
+void findWindows(const BeamBlock& block, Windows& windows) {
+  const float l = radiusOf<kOctantEdge>(block);
+  for (int n = 0; n < kOctants; ++n) {
+    const Centre centre = centreOf<kOctantEdge>(block, n);
     const auto x = static_cast<float>(centre.x), y = static_cast<float>(centre.y),
                z = static_cast<float>(centre.z);
     const float rho2 = x * x + y * y, r2 = rho2 + z * z;
@@ -90,14 +131,14 @@ void findWindows(const BeamBlock& block, TileWindows& windows) {
     const float a = z * std::sqrt(inverse_r2 * (s2 < 1.0f ? 1.0f - s2 : 0.0f)),
                 b = std::sqrt(rho2 * inverse_r2 * s2);
     const bool pole = !(rho2 > l * l), all = !(s2 < 1.0f);
-    windows.first_row[number] = beamRow(all || (pole && z < 0.0f) ? -1.0f : a - b);
-    windows.last_row[number] = beamRow(all || (pole && z > 0.0f) ? 1.0f : a + b);
+    windows.first_row[n] = beamRow(all || (pole && z < 0.0f) ? -1.0f : a - b);
+    windows.last_row[n] = beamRow(all || (pole && z > 0.0f) ? 1.0f : a + b);
     const float sine2 = pole ? 1.0f : l * l / rho2;
     const float s = std::sqrt(sine2), c = std::sqrt(1.0f - sine2);
     const int low = beamColumn(pseudoAngle(x * c + y * s, y * c - x * s)),
               high = beamColumn(pseudoAngle(x * c - y * s, y * c + x * s));
-    windows.first_column[number] = pole ? 0 : low;
-    windows.last_column[number] = pole ? kBeamColumns - 1 : high;
+    windows.first_column[n] = pole ? 0 : low;
+    windows.last_column[n] = pole ? kBeamColumns - 1 : high;
   }
 }
 

@@ -22,32 +22,51 @@ Segment segmentOf(const Beams& beams, std::size_t b, const BeamPiece& piece) {
   return {beams.origin + end, beams.origin + end * (piece.shadow_range / end.norm())};
 }
 
+/// Block coordinates with 32 binary places: sums and floors of these are cheap and exact.
+using Fixed = std::int64_t;
+
+Fixed toFixed(double blocks) {
+  return static_cast<Fixed>(blocks * 0x1.0p32);
+}
+int floorOf(Fixed blocks) {
+  return static_cast<int>(blocks >> 32);
+}
+
+/// Where a segment is on one of its two lesser axes, from slab to slab of its main axis.
+struct SideWalk {
+  SideWalk(double at_first, double slope, double margin)
+      : step(toFixed(slope)),
+        low(toFixed(at_first + std::min(slope, 0.0) - margin * (1.0 + std::abs(slope)))),
+        high(toFixed(at_first + std::max(slope, 0.0) + margin * (1.0 + std::abs(slope)))) {}
+  void advance() {
+    low += step;
+    high += step;
+  }
+  Fixed step, low, high;  ///< low to high: all of the segment in the slab, and the margin
+};
+
 /// Calls visit(x, y, z) for every block with a voxel centre within `reach` of a segment, and for some around
 /// those.
 template <typename Visit>
 void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, double reach, Visit&& visit) {
   // In units of blocks. Voxel centres keep half a voxel from the block's faces.
   const double per_metre = 1.0 / geometry.blockSize();
-  const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-9;
+  const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-6;
   const Eigen::Vector3d a = segment.from * per_metre, d = (segment.to - segment.from) * per_metre;
   int main = 0;
   d.cwiseAbs().maxCoeff(&main);
   const int side1 = (main + 1) % 3, side2 = (main + 2) % 3;
-  const double a0 = a[main], a1 = a[side1], a2 = a[side2], d0 = d[main], d1 = d[side1], d2 = d[side2];
-  const double inverse = d0 != 0.0 ? 1.0 / d0 : 0.0;
-  const double reach1 = margin * (1.0 + std::abs(d1 * inverse)),
-               reach2 = margin * (1.0 + std::abs(d2 * inverse));
-  const int last = floorToInt(std::max(a0, a0 + d0) + margin);
+  const double inverse = d[main] != 0.0 ? 1.0 / d[main] : 0.0;
+  const int first = floorToInt(std::min(a[main], a[main] + d[main]) - margin),
+            last = floorToInt(std::max(a[main], a[main] + d[main]) + margin);
+  const double slope1 = d[side1] * inverse, slope2 = d[side2] * inverse, to_first = first - a[main];
+  SideWalk walk1(a[side1] + to_first * slope1, slope1, margin),
+      walk2(a[side2] + to_first * slope2, slope2, margin);
   int block[3];
-  for (block[main] = floorToInt(std::min(a0, a0 + d0) - margin); block[main] <= last; ++block[main]) {
-    // The piece of the segment in this slab of blocks; margins at its two ends are in reach1 and reach2.
-    const double t0 = (block[main] - a0) * inverse, t1 = t0 + inverse;
-    const double s0 = std::clamp(t0, 0.0, 1.0), s1 = std::clamp(t1, 0.0, 1.0);
-    const double p1 = a1 + s0 * d1, q1 = a1 + s1 * d1, p2 = a2 + s0 * d2, q2 = a2 + s1 * d2;
-    const int first1 = floorToInt(std::min(p1, q1) - reach1), last1 = floorToInt(std::max(p1, q1) + reach1);
-    const int first2 = floorToInt(std::min(p2, q2) - reach2), last2 = floorToInt(std::max(p2, q2) + reach2);
-    for (block[side1] = first1; block[side1] <= last1; ++block[side1]) {
-      for (block[side2] = first2; block[side2] <= last2; ++block[side2]) {
+  for (block[main] = first; block[main] <= last; ++block[main], walk1.advance(), walk2.advance()) {
+    const int last1 = floorOf(walk1.high), last2 = floorOf(walk2.high);
+    for (block[side1] = floorOf(walk1.low); block[side1] <= last1; ++block[side1]) {
+      for (block[side2] = floorOf(walk2.low); block[side2] <= last2; ++block[side2]) {
         visit(block[0], block[1], block[2]);
       }
     }
@@ -89,7 +108,7 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
     low = low.min(-piece.shadow_range);
     high = high.max(piece.shadow_range);
   }
-  const double room = 2.0 * reach + geometry.blockSize();
+  const double room = 3.0 * reach + 3.0 * geometry.blockSize();  // slabs are walked to their ends
   const Eigen::Array3d first = ((low - room + beams.origin.array()) / geometry.blockSize()).floor();
   const Eigen::Array3d size =
       ((high + room + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
