@@ -12,34 +12,23 @@
 #include "bki_mapping/io/report.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/tools/options.h"
+#include "cases.h"
+#include "curves.h"
 
 namespace {
 
 using namespace bki_mapping;
 namespace po = tools::po;
-
-/// Settings to time, with the name under which they are listed.
-struct Case {
-  std::string name;
-  std::map<std::string, std::string> settings;
-};
+using benchmark::Case;
 
 struct Timing {
   double median_ms, p99_ms;
   std::size_t map_bytes;
 };
 
-const std::vector<Case>& cases() {
-  static const std::vector<Case> all = {
-      {"none", {{"free_space/mode", "none"}}},
-      {"linear, 1 sample", {{"free_space/mode", "linear"}}},
-      {"linear, 5 samples", {{"free_space/mode", "linear"}, {"free_space/samples_per_beam", "5"}}},
-      {"uniform, 1 sample", {{"free_space/mode", "uniform"}}},
-      {"even, gap 1 m", {{"free_space/mode", "even"}}},
-      {"line, bilinear, mapped", {{"free_space/extent", "mapped"}}},
-      {"line, bilinear, observed", {{"free_space/extent", "observed"}}},
-      {"line, bilinear, mapped", {{"free_space/extent", "mapped"}, {"resolution", "0.1"}}},
-  };
+std::vector<Case> cases() {
+  std::vector<Case> all = benchmark::modeCases();
+  all.push_back({"line, bilinear, mapped", {{"free_space/extent", "mapped"}, {"resolution", "0.1"}}});
   return all;
 }
 
@@ -48,7 +37,11 @@ po::options_description options() {
   options.add(tools::sequenceOptions());
   options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "table to write")(
       "warm-up", po::value<std::size_t>()->value_name("N")->default_value(3),
-      "first scans that are not timed");
+      "first scans that are not timed")(
+      "curves", po::value<std::string>()->value_name("DIR"),
+      "measure simulated drives too, and write curves as CSV and PNG into this folder")(
+      "curve-scans", po::value<std::size_t>()->value_name("N")->default_value(2000),
+      "length of the drive over which the map grows");
   return options;
 }
 
@@ -90,7 +83,7 @@ Timing timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& fr
   return {quantile(times, 0.5), quantile(times, 0.99), mapper.map().bytes()};
 }
 
-int benchmark(const po::variables_map& given) {
+int measure(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const std::size_t warm_up = given["warm-up"].as<std::size_t>();
@@ -100,23 +93,31 @@ int benchmark(const po::variables_map& given) {
   const auto classes = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
 
   std::string csv = "mode,resolution,threads,median_ms,p99_ms,ratio_to_y,map_bytes\n";
-  std::printf("%-26s %10s %7s %9s %9s %8s %8s\n", "mode", "resolution", "threads", "median ms", "p99 ms",
-              "ratio", "map MB");
+  std::printf("%-26s %10s %7s %9s %9s %8s %8s %8s\n", "mode", "resolution", "threads", "median ms", "p99 ms",
+              "ratio", "map MB", "speed-up");
   for (const Case& c : cases()) {
+    double one_thread_ms = 0.0;
     for (const int threads : {1, 2}) {
       // The yardstick is taken again for each row, so that both sides of a ratio meet the same machine.
       const double y = yardstick(frames, warm_up);
       const Timing t = timeCase(c, threads, frames, warm_up, classes);
       const auto set = c.settings.find("resolution");
       const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
-      std::printf("%-26s %10s %7d %9.1f %9.1f %8.2f %8.1f\n", c.name.c_str(), edge.c_str(), threads,
-                  t.median_ms, t.p99_ms, t.median_ms / y, static_cast<double>(t.map_bytes) / 1e6);
+      if (threads == 1) one_thread_ms = t.median_ms;
+      std::printf("%-26s %10s %7d %9.1f %9.1f %8.2f %8.1f %8.2f\n", c.name.c_str(), edge.c_str(), threads,
+                  t.median_ms, t.p99_ms, t.median_ms / y, static_cast<double>(t.map_bytes) / 1e6,
+                  one_thread_ms / t.median_ms);
+      std::fflush(stdout);
       csv += '"' + c.name + "\"," + edge + "," + std::to_string(threads) + "," + std::to_string(t.median_ms) +
              "," + std::to_string(t.p99_ms) + "," + std::to_string(t.median_ms / y) + "," +
              std::to_string(t.map_bytes) + "\n";
     }
   }
+  std::printf("peak memory of the whole run: %.0f MB\n", static_cast<double>(peakResidentBytes()) / 1e6);
   if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);
+  if (given.count("curves")) {
+    benchmark::measureCurves(given["curves"].as<std::string>(), given["curve-scans"].as<std::size_t>());
+  }
   return 0;
 }
 
@@ -127,6 +128,6 @@ int main(int argc, char** argv) {
     const auto given = tools::parse(
         argc, argv, "Times every mode on a sequence, in ratios to pcl::VoxelGrid at 0.1 m in the same run.",
         options());
-    return given ? benchmark(*given) : 0;
+    return given ? measure(*given) : 0;
   });
 }

@@ -38,4 +38,5 @@ install(TARGETS benchmark_sequence map_sequence mapping_node play_sequence seque
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(PROGRAMS scripts/plot_curves.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
 catkin_install_python(PROGRAMS scripts/mapping_summary.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -1,0 +1,162 @@
+#include "curves.h"
+
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/core/stopwatch.h"
+#include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/report.h"
+#include "bki_mapping/io/share_path.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/simulation/lidar.h"
+#include "cases.h"
+
+namespace bki_mapping::benchmark {
+namespace {
+
+constexpr double kSpeed = 8.0;                   // of the simulated drives [m/s]
+constexpr std::size_t kWarmUp = 3, kTimed = 12;  // scans of a short drive
+
+std::unique_ptr<SemanticMapper> mapperOf(std::map<std::string, std::string> settings) {
+  settings["threads"] = "2";
+  MapperConfig config;
+  setParameters(config, settings);
+  return std::make_unique<SemanticMapper>(
+      config, std::make_shared<const ClassTable>(loadClassTable("semantic_kitti")));
+}
+
+/// A short drive, mapped with some settings.
+struct ShortRun {
+  std::size_t points = 0, hits = 0;  ///< of the last scan
+  double median_ms = 0.0, worst_ms = 0.0;
+};
+
+ShortRun run(const std::vector<Scan>& scans, const std::map<std::string, std::string>& settings) {
+  const auto mapper = mapperOf(settings);
+  ShortRun result;
+  std::vector<double> times;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    Stopwatch watch;
+    const ScanStats stats = mapper->integrate(scans[i]);
+    if (i >= kWarmUp) times.push_back(watch.lap());
+    result.points = stats.counts.points;
+    result.hits = stats.hits;
+  }
+  result.median_ms = quantile(times, 0.5);
+  result.worst_ms = quantile(times, 1.0);
+  return result;
+}
+
+std::vector<Scan> shortDrive(int beams, int columns) {
+  simulation::LidarConfig lidar;
+  lidar.beams = beams;
+  lidar.columns = columns;
+  const simulation::Drive drive(kWarmUp + kTimed, lidar, kSpeed, 1);
+  std::vector<Scan> scans;
+  for (std::size_t i = 0; i < drive.size(); ++i) scans.push_back(drive.frame(i).scan());
+  return scans;
+}
+
+const std::vector<Case>& curveCases() {
+  static const std::vector<Case> cases = {
+      {"none", {{"free_space/mode", "none"}}},
+      {"linear, 1 sample", {{"free_space/mode", "linear"}}},
+      {"line, bilinear, observed", {{"free_space/extent", "observed"}}},
+  };
+  return cases;
+}
+
+/// Time against the size of the map: all modes see each scan, one after the other.
+std::string growth(std::size_t count) {
+  const simulation::Drive drive(count, simulation::LidarConfig(), kSpeed, 1);
+  std::string csv = "mode,scan,blocks,map_bytes,ms\n";
+  std::vector<std::unique_ptr<SemanticMapper>> all;
+  for (const Case& c : curveCases()) {
+    all.push_back(mapperOf(c.settings));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Scan scan = drive.frame(i).scan();
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      Stopwatch watch;
+      all[c]->integrate(scan);
+      const double ms = watch.lap();
+      csv += '"' + curveCases()[c].name + "\"," + std::to_string(i) + "," +
+             std::to_string(all[c]->map().size()) + "," + std::to_string(all[c]->map().bytes()) + "," +
+             std::to_string(ms) + "\n";
+    }
+  }
+  return csv;
+}
+
+std::string points() {
+  std::string csv = "mode,points,hits,median_ms\n";
+  for (const int columns : {450, 900, 1800, 3600}) {
+    const std::vector<Scan> scans = shortDrive(64, columns);
+    for (const Case& c : curveCases()) {
+      const ShortRun r = run(scans, c.settings);
+      csv += '"' + c.name + "\"," + std::to_string(r.points) + "," + std::to_string(r.hits) + "," +
+             std::to_string(r.median_ms) + "\n";
+    }
+  }
+  return csv;
+}
+
+std::string resolution() {
+  std::string csv = "mode,resolution,median_ms\n";
+  const std::vector<Scan> scans = shortDrive(64, 1800);
+  for (const char* edge : {"0.1", "0.15", "0.2", "0.3", "0.4", "0.6"}) {
+    for (Case c : curveCases()) {
+      c.settings["resolution"] = edge;
+      csv += '"' + c.name + "\"," + edge + "," + std::to_string(run(scans, c.settings).median_ms) + "\n";
+    }
+  }
+  return csv;
+}
+
+/// A sensor of 128 beams with 2100 columns: 260 thousand points a scan.
+std::string sensor() {
+  std::string csv = "mode,points,hits,median_ms,worst_ms\n";
+  const std::vector<Scan> scans = shortDrive(128, 2100);
+  for (const Case& c : modeCases()) {
+    const ShortRun r = run(scans, c.settings);
+    std::printf("128 beams, %zu points, %-26s %8.1f ms, at most %8.1f ms\n", r.points, c.name.c_str(),
+                r.median_ms, r.worst_ms);
+    csv += '"' + c.name + "\"," + std::to_string(r.points) + "," + std::to_string(r.hits) + "," +
+           std::to_string(r.median_ms) + "," + std::to_string(r.worst_ms) + "\n";
+  }
+  return csv;
+}
+
+}  // namespace
+
+void measureCurves(const std::string& folder, std::size_t scans) {
+  std::filesystem::create_directories(folder);
+  const auto write = [&folder](const char* name, const std::string& csv) {
+    writeTextFile(folder + "/" + name, csv);
+    std::printf("%s/%s\n", folder.c_str(), name);
+    std::fflush(stdout);
+  };
+  write("sensor.csv", sensor());
+  write("points.csv", points());
+  write("resolution.csv", resolution());
+  write("growth.csv", growth(scans));
+  const std::string program = sharePath() + "/scripts/plot_curves.py";
+  const auto quoted = [](const std::string& text) {
+    std::string result = "'";
+    for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return result + "'";
+  };
+  const int status = std::system(("/usr/bin/python3 " + quoted(program) + " " + quoted(folder)).c_str());
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw std::runtime_error("the curves were measured but not drawn: " + program +
+                             " failed; it needs python3-matplotlib");
+  }
+}
+
+}  // namespace bki_mapping::benchmark
