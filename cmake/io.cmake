@@ -36,3 +36,8 @@ add_executable(simulate_drive src/tools/simulate_drive.cpp)
 bki_mapping_tool(simulate_drive)
 add_executable(benchmark_sequence benchmark/benchmark_sequence.cpp benchmark/curves.cpp)
 bki_mapping_tool(benchmark_sequence pcl_filters)
+find_package(benchmark QUIET)  # Google Benchmark: for developers
+if(benchmark_FOUND)
+  add_executable(benchmark_parts benchmark/benchmark_parts.cpp)
+  bki_mapping_tool(benchmark_parts benchmark::benchmark)
+endif()

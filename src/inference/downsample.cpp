@@ -13,6 +13,11 @@ std::size_t partitionOf(const VoxelIndex& cell) {
   return GridIndexHash()(GridGeometry::blockOf(cell)) >> (64 - kPartitionBits);
 }
 
+/// A partition and a cell in it, in one number.
+std::uint32_t codeOf(std::size_t partition, std::size_t cell) {
+  return static_cast<std::uint32_t>(partition << kCellBits | cell);
+}
+
 }  // namespace
 
 void Downsampler::start(const Eigen::Vector3d& origin, double cell, std::size_t chunks) {
@@ -31,7 +36,7 @@ void Downsampler::start(const Eigen::Vector3d& origin, double cell, std::size_t 
 void Downsampler::add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label) {
   Chunk& into = chunks_[chunk];
   const VoxelIndex cell = grid_.voxelAt(origin_ + point.cast<double>());
-  const std::size_t partition = cell_ == 0.0 ? 0 : partitionOf(cell);
+  const std::size_t partition = partitionOf(cell);
   into.records[partition].push_back({point, cell, static_cast<std::uint32_t>(into.cell_of.size()), label});
   into.cell_of.push_back(kNone);
 }
@@ -66,7 +71,8 @@ ClassId Downsampler::majority(const Cell& cell, const std::vector<Votes>& votes)
 std::uint32_t Downsampler::mergeRecord(const Record& record, Scratch& scratch) {
   const std::size_t mask = scratch.slots.size() - 1;
   std::size_t s = GridIndexHash()(record.cell) & mask;
-  while (scratch.slots[s] != kNone && scratch.cells[scratch.slots[s]].index != record.cell) s = (s + 1) & mask;
+  while (scratch.slots[s] != kNone && scratch.cells[scratch.slots[s]].index != record.cell)
+    s = (s + 1) & mask;
   const Eigen::Vector3d point = record.point.cast<double>();
   if (scratch.slots[s] == kNone) {
     scratch.slots[s] = static_cast<std::uint32_t>(scratch.cells.size());
@@ -81,6 +87,17 @@ std::uint32_t Downsampler::mergeRecord(const Record& record, Scratch& scratch) {
 }
 
 void Downsampler::merge(std::size_t p, Scratch& scratch) {
+  merged_[p].clear();
+  if (cell_ == 0.0) {  // each point is its own cell
+    for (std::size_t c = 0; c < used_; ++c) {
+      Chunk& chunk = chunks_[c];
+      for (const Record& record : chunk.records[p]) {
+        chunk.cell_of[record.place] = codeOf(p, merged_[p].size());
+        merged_[p].push_back({record.point, record.label});
+      }
+    }
+    return;
+  }
   std::size_t records = 0, slots = 64;
   for (std::size_t c = 0; c < used_; ++c) records += chunks_[c].records[p].size();
   while (slots < 2 * records) slots *= 2;
@@ -91,10 +108,9 @@ void Downsampler::merge(std::size_t p, Scratch& scratch) {
     Chunk& chunk = chunks_[c];
     for (const Record& record : chunk.records[p]) {
       const std::uint32_t cell = mergeRecord(record, scratch);
-      if (cell != kNone) chunk.cell_of[record.place] = static_cast<std::uint32_t>(p) << kCellBits | cell;
+      if (cell != kNone) chunk.cell_of[record.place] = codeOf(p, cell);
     }
   }
-  merged_[p].clear();
   for (const Cell& cell : scratch.cells) {
     merged_[p].push_back({(cell.sum * (1.0 / cell.count)).cast<float>(), majority(cell, scratch.votes)});
   }
@@ -110,21 +126,13 @@ void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
   }
 }
 
-void Downsampler::copy(LabelledPoints& output) const {
-  output.points.clear();
-  output.labels.clear();
-  for (std::size_t c = 0; c < used_; ++c) {
-    for (const Record& record : chunks_[c].records[0]) {
-      output.points.push_back(record.point);
-      output.labels.push_back(record.label);
-    }
-  }
+void Downsampler::finish(Workers& workers) {
+  scratch_.resize(workers.count());
+  workers.forEach(kPartitions, [&](std::size_t p, std::size_t worker) { merge(p, scratch_[worker]); });
 }
 
 void Downsampler::finish(Workers& workers, LabelledPoints& output) {
-  if (cell_ == 0.0) return copy(output);
-  scratch_.resize(workers.count());
-  workers.forEach(kPartitions, [&](std::size_t p, std::size_t worker) { merge(p, scratch_[worker]); });
+  finish(workers);
   std::size_t cells = 0;
   for (std::size_t c = 0; c < used_; ++c) {
     const auto& cell_of = chunks_[c].cell_of;

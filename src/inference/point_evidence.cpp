@@ -80,8 +80,7 @@ void PointEvidence::bin(const Eigen::Vector3d& point, ClassId label, Chunk& chun
   const Eigen::Vector3d p = point * per_metre_;
   const double reach = kernel_.reach;
   // Most points keep to one block: the neighbours' nearest centres, at -1 and 8, are out of reach.
-  const BlockIndex home =
-      GridGeometry::blockOf({{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}});
+  const BlockIndex home = GridGeometry::blockOf({{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}});
   const double x = p.x() - home.x * kBlockEdge - 0.5, y = p.y() - home.y * kBlockEdge - 0.5,
                z = p.z() - home.z * kBlockEdge - 0.5;
   const double low = reach - 0.999, high = kBlockEdge - 0.001 - reach;
@@ -130,16 +129,34 @@ void PointEvidence::sort(std::size_t p, std::size_t chunks) {
   partition.begin.front() = 0;
 }
 
+void PointEvidence::start(std::size_t points, std::size_t chunks) {
+  size_ = points;
+  if (chunks_.size() < chunks) chunks_.resize(chunks);
+  for (std::size_t c = 0; c < chunks; ++c) {
+    for (auto& records : chunks_[c]) records.clear();
+  }
+}
+
 void PointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers) {
   const Chunks chunks(points.points.size());
-  if (chunks_.size() < chunks.count()) chunks_.resize(chunks.count());
+  start(points.points.size(), chunks.count());
   workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-    for (auto& records : chunks_[c]) records.clear();
     for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
       bin(origin + points.points[i].cast<double>(), points.labels[i], chunks_[c]);
     }
   });
   workers.forEach(kPartitions, [&](std::size_t p, std::size_t) { sort(p, chunks.count()); });
+}
+
+void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers) {
+  std::size_t count = 0;
+  for (std::size_t p = 0; p < Downsampler::partitions(); ++p) count += points.merged(p).size();
+  start(count, Downsampler::partitions());
+  workers.forEach(Downsampler::partitions(), [&](std::size_t c, std::size_t) {
+    for (const Downsampler::Merged& m : points.merged(c))
+      bin(origin + m.point.cast<double>(), m.label, chunks_[c]);
+  });
+  workers.forEach(kPartitions, [&](std::size_t p, std::size_t) { sort(p, Downsampler::partitions()); });
 }
 
 void PointEvidence::collectBlocks(const SemanticMap&, Workers&, IndexNumbering& touched) {

@@ -42,15 +42,14 @@ class BeamSamples {
         });
       }
     });
-    downsampler_.finish(workers, samples_);
-    evidence_.setPoints(beams.origin, samples_, workers);
-    return {&evidence_, samples_.points.size()};
+    downsampler_.finish(workers);
+    evidence_.setPoints(beams.origin, downsampler_, workers);
+    return {&evidence_, evidence_.size()};
   }
 
  private:
   double cell_;
   Downsampler downsampler_;
-  LabelledPoints samples_;
   PointEvidence evidence_;
 };
 

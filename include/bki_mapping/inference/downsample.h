@@ -28,7 +28,19 @@ class Downsampler {
   /// Adds a point relative to the origin. Two threads must not add to the same chunk at once.
   void add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label);
 
+  /// Merges the points. @param[out] output one point a cell, in the order promised.
   void finish(Workers& workers, LabelledPoints& output);
+  /// Merges the points; the result stays here, partition by partition, in an order that does not depend on
+  /// the number of workers. Cheaper than finish.
+  void finish(Workers& workers);
+
+  /// A point of the result.
+  struct Merged {
+    Eigen::Vector3f point;
+    ClassId label;
+  };
+  static constexpr std::size_t partitions() { return kPartitions; }
+  const std::vector<Merged>& merged(std::size_t partition) const { return merged_[partition]; }
 
  private:
   /// Cells are spread over this many partitions by a hash, so that each can be merged by one thread, in a
@@ -58,11 +70,6 @@ class Downsampler {
     ClassId label;
     std::uint32_t count, next;
   };
-  /// A point of the output.
-  struct Merged {
-    Eigen::Vector3f point;
-    ClassId label;
-  };
   /// Working memory of one thread, for one partition at a time.
   struct Scratch {
     std::vector<std::uint32_t> slots;  ///< of a hash table: number of a cell, or kNone
@@ -74,7 +81,6 @@ class Downsampler {
   /// @return the cell's number if the record is its first.
   static std::uint32_t mergeRecord(const Record& record, Scratch& scratch);
   void write(const Chunk& chunk, LabelledPoints& output) const;
-  void copy(LabelledPoints& output) const;
   static void vote(Cell& cell, ClassId label, std::vector<Votes>& votes);
   static ClassId majority(const Cell& cell, const std::vector<Votes>& votes);
 

@@ -24,6 +24,9 @@ class PointEvidence : public Evidence {
 
   /// Replaces the points. @param origin of the points in the map frame [m].
   void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers);
+  /// The same, of points that a down-sampler has merged.
+  void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers);
+  std::size_t size() const { return size_; }  ///< number of points
 
   /// Exactly the blocks with a voxel centre within reach of a point.
   void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
@@ -47,6 +50,8 @@ class PointEvidence : public Evidence {
 
   static std::size_t partitionOf(const GridIndex& block) { return GridIndexHash()(block) >> 58; }
   void bin(const Eigen::Vector3d& point, ClassId label, Chunk& chunk) const;
+  /// Clears the given number of chunks for bin.
+  void start(std::size_t points, std::size_t chunks);
   void sort(std::size_t partition, std::size_t chunks);
   /// The sums of points of one class.
   void addPoints(const LocalPoint* points, std::size_t count, float* sums) const;
@@ -55,6 +60,7 @@ class PointEvidence : public Evidence {
   double per_metre_;  ///< voxels
   VoxelKernel kernel_;
   const InnerLoops& loops_;
+  std::size_t size_ = 0;
   std::vector<Chunk> chunks_;
   std::array<Partition, kPartitions> partitions_;
 };

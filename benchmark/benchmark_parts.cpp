@@ -1,0 +1,147 @@
+// The parts of the mapper, one by one, on a simulated scan. Google Benchmark's options apply, for instance
+// --benchmark_filter=Lines.
+#include <benchmark/benchmark.h>
+
+#include "bki_mapping/core/map_query.h"
+#include "bki_mapping/inference/beam_evidence.h"
+#include "bki_mapping/inference/downsample.h"
+#include "bki_mapping/inference/map_updater.h"
+#include "bki_mapping/inference/point_evidence.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/voxel_pcl.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/simulation/lidar.h"
+
+namespace {
+
+using namespace bki_mapping;
+
+/// A scan of 64 beams, what was seen of it, and a map that holds it.
+struct Fixture {
+  Fixture() : workers(1), observer(config), mapper(config, classes) {
+    seen = observer.observe(scan, *classes, workers);
+    mapper.integrate(scan);
+  }
+
+  MapperConfig config;
+  GridGeometry geometry{config.resolution};
+  std::shared_ptr<const ClassTable> classes =
+      std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
+  Scan scan = simulation::Drive(5, simulation::LidarConfig(), 8.0, 1).frame(4).scan();
+  Workers workers;
+  Observer observer;
+  Observation seen;
+  SemanticMapper mapper;
+};
+
+Fixture& fixture() {
+  static Fixture instance;
+  return instance;
+}
+
+void observing(benchmark::State& state) {
+  Fixture& f = fixture();
+  for (auto _ : state) benchmark::DoNotOptimize(&f.observer.observe(f.scan, *f.classes, f.workers));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.scan.points.size()));
+}
+
+void binning(benchmark::State& state) {
+  Fixture& f = fixture();
+  PointEvidence evidence(f.geometry, f.config.kernel);
+  for (auto _ : state) evidence.setPoints(f.scan.origin, f.seen.hits, f.workers);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
+}
+
+void hits(benchmark::State& state, const std::string& instruction_set) {
+  Fixture& f = fixture();
+  PointEvidence evidence(f.geometry, f.config.kernel, instruction_set);
+  evidence.setPoints(f.scan.origin, f.seen.hits, f.workers);
+  SemanticMap map(f.geometry, f.config.prior, f.classes->size());
+  MapUpdater updater;
+  for (auto _ : state) updater.update(map, {&evidence}, f.workers);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
+}
+
+void beamField(benchmark::State& state, BeamIndexType index) {
+  Fixture& f = fixture();
+  BeamField field(f.geometry, f.config.kernel, index);
+  for (auto _ : state) field.setBeams(f.seen.beams, f.workers);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
+}
+
+/// Asks for the beams near each block of the map.
+void retrieval(benchmark::State& state, BeamIndexType index) {
+  Fixture& f = fixture();
+  BeamField field(f.geometry, f.config.kernel, index);
+  field.setBeams(f.seen.beams, f.workers);
+  EvidenceScratch scratch;
+  for (auto _ : state) {
+    for (const auto& entry : f.mapper.map().entries()) {
+      field.findRangesNear(entry.index, scratch);
+      benchmark::DoNotOptimize(scratch.ranges.data());
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.mapper.map().size()));
+}
+
+void lines(benchmark::State& state, BeamIndexType index, const std::string& instruction_set) {
+  Fixture& f = fixture();
+  BeamField field(f.geometry, f.config.kernel, index);
+  field.setBeams(f.seen.beams, f.workers);
+  BeamEvidence evidence(BeamWeight::kBilinear, FreeSpaceExtent::kObserved, instruction_set);
+  evidence.setField(field);
+  SemanticMap map(f.geometry, f.config.prior, f.classes->size());
+  MapUpdater updater;
+  for (auto _ : state) updater.update(map, {&evidence}, f.workers);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
+}
+
+/// State, class and probability of every voxel of the map.
+void queries(benchmark::State& state) {
+  Fixture& f = fixture();
+  std::int64_t voxels = 0;
+  for (auto _ : state) {
+    for (const auto& entry : f.mapper.map().entries()) {
+      for (int v = 0; v < kBlockVoxels; ++v) {
+        benchmark::DoNotOptimize(viewVoxel(f.mapper.map(), *entry.block, v));
+        ++voxels;
+      }
+    }
+  }
+  state.SetItemsProcessed(voxels);
+}
+
+/// The cloud that the topic voxel_cloud carries.
+void voxelCloud(benchmark::State& state) {
+  Fixture& f = fixture();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        toPcl(collectVoxels(f.mapper.map(), *f.classes, {VoxelState::kOccupied, VoxelState::kFree})));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto add = [](const std::string& name, auto&& body) {
+    benchmark::RegisterBenchmark(name.c_str(), body)->Unit(benchmark::kMillisecond);
+  };
+  add("Observe", observing);
+  add("Bin", binning);
+  add("BeamTable", [](auto& state) { beamField(state, BeamIndexType::kTable); });
+  add("BeamRtree", [](auto& state) { beamField(state, BeamIndexType::kRtree); });
+  add("RetrieveFromTable", [](auto& state) { retrieval(state, BeamIndexType::kTable); });
+  add("RetrieveFromRtree", [](auto& state) { retrieval(state, BeamIndexType::kRtree); });
+  for (const std::string& set : instructionSets()) {
+    add("Hits/" + set, [set](auto& state) { hits(state, set); });
+    add("LinesFromTable/" + set, [set](auto& state) { lines(state, BeamIndexType::kTable, set); });
+  }
+  add("LinesFromRtree", [](auto& state) { lines(state, BeamIndexType::kRtree, ""); });
+  add("Query", queries);
+  add("VoxelCloud", voxelCloud);
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
