@@ -57,9 +57,9 @@ def draw_growth(folder):
 
 def draw_points(folder):
     figure, axes = new_axes('Time of a scan against its points (64 beams, 450 to 3600 columns)',
-                            'points after down-sampling')
+                            'points of the scan')
     for mode, rows in read(folder, 'points.csv').items():
-        axes.plot([row['hits'] for row in rows], [row['median_ms'] for row in rows], 'o-', label=mode)
+        axes.plot([row['points'] for row in rows], [row['median_ms'] for row in rows], 'o-', label=mode)
     axes.set_xlim(left=0)
     finish(figure, axes, os.path.join(folder, 'points.png'))
 
