@@ -190,5 +190,18 @@ TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
   EXPECT_EQ(mapper.map().size(), 0u);
 }
 
+TEST(Laws, GainsFollowTheFlagsOfClasses) {
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();
+  classes[2].dynamic = true;
+  MapperConfig config;
+  config.free_gain.dynamic_classes = 30.0;
+  config.free_gain.static_classes = 0.1;
+  const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
+  EXPECT_EQ(mapper.map().freeGain(0), 1.0f);  // unlabelled
+  EXPECT_EQ(mapper.map().freeGain(1), 0.1f);
+  EXPECT_EQ(mapper.map().freeGain(2), 30.0f);
+  EXPECT_EQ(mapper.map().freeGain(kFreeClass), 1.0f);
+}
+
 }  // namespace
 }  // namespace bki_mapping

@@ -46,6 +46,28 @@ TEST(MapQuery, FreeVoxelAndTies) {
   EXPECT_EQ(viewOf({{1, 0.2f}, {2, 0.2f}}).label, 1);
 }
 
+TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
+  SemanticMap map = mapWith({{1, 0.4f}, {2, 0.3f}, {kFreeClass, 0.5f}}, 77);
+  const auto view = [&map] { return viewVoxel(map, *map.find({{0, 0, 0}}), 77); };
+  const double sum = 1.2 + 4 * kPrior;
+  EXPECT_EQ(view().state, VoxelState::kFree);
+  EXPECT_NEAR(view().probability, (0.5 + kPrior) / sum, 1e-6);
+  map.setFreeGain(1, 0.1);
+  EXPECT_EQ(view().state, VoxelState::kOccupied);
+  EXPECT_EQ(view().label, 1);
+  EXPECT_NEAR(view().probability, (0.4 + kPrior) / sum, 1e-6);
+  EXPECT_NEAR(view().occupancy, 1.0 - (0.5 + kPrior) / sum, 1e-6);
+  map.setFreeGain(1, 1.0);
+  map.setFreeGain(2, 0.1);  // not the likeliest class
+  EXPECT_EQ(view().state, VoxelState::kFree);
+}
+
+TEST(MapQuery, GainsAloneMakeNothingFree) {
+  SemanticMap map = mapWith({{1, 0.4f}}, 77);
+  map.setFreeGain(1, 1000.0);
+  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
+}
+
 TEST(MapQuery, UnknownVoxelHasThePrior) {
   const SemanticMap map = mapWith({{1, 1.0f}}, 0);
   for (const VoxelView& view :

@@ -57,6 +57,20 @@ std::vector<Parameter> mapperParameters() {
           "free_space/beam_index", {"table", "rtree"},
           "How beams near a block are found; the map is the same, table is faster.",
           [](MapperConfig & c) -> auto& { return c.free_space.beam_index; }),
+      choiceParameter<MapperConfig>(
+          "free_space/hits_before_misses", {"false", "true"},
+          "Whether a voxel that holds a hit of a scan takes no evidence for free from the same scan.",
+          [](MapperConfig & c) -> auto& { return c.free_space.hits_before_misses; }),
+      realParameter<MapperConfig>(
+          "free_gain/dynamic", "a number > 0", "",
+          "Gain on the evidence for free when the state of a voxel is decided whose likeliest class is "
+          "flagged "
+          "dynamic; above 1, what moved is cleared sooner.",
+          [](MapperConfig & c) -> auto& { return c.free_gain.dynamic_classes; }, positive),
+      realParameter<MapperConfig>(
+          "free_gain/static", "a number > 0", "",
+          "The same for classes not flagged dynamic; below 1, beams that graze a surface do not eat it.",
+          [](MapperConfig & c) -> auto& { return c.free_gain.static_classes; }, positive),
       realParameter<MapperConfig>(
           "sensor_model/min_range", "a number >= 0", "m", "Nearer hits are dropped.",
           [](MapperConfig & c) -> auto& { return c.sensor_model.min_range; }, notNegative),

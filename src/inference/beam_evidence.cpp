@@ -41,6 +41,7 @@ void BeamEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch&
     loops_.add_some_beams(field_->arrays(), scratch.ranges.data(), scratch.ranges.size(),
                           field_->blockAt(index), weight_, sums);
   }
+  scratch.leaveHeldAlone();
   float most = 0.0f;
   for (int v = 0; v < kBlockVoxels; ++v) {
     sums[v] *= field_->kernel().scale;

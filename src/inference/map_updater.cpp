@@ -40,6 +40,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
     const std::size_t end = std::min(jobs_.size(), (j + 1) * kBlocksAJob);
     for (std::size_t n = j * kBlocksAJob; n < end; ++n) {
       const Job& job = jobs_[n];
+      scratch_[worker].held.reset();
       for (std::size_t e = 0; e < evidence.size(); ++e) {
         if (job.pieces >> e & 1u) evidence[e]->addTo(job.index, *job.block, scratch_[worker]);
       }

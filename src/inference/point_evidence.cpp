@@ -8,6 +8,10 @@
 namespace bki_mapping {
 namespace {
 
+bool isZero(float x) {
+  return x == 0.0f;
+}
+
 /// A block that a point may reach, on one axis.
 struct AxisBlock {
   int block;
@@ -67,36 +71,44 @@ PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& k
 }
 
 void PointEvidence::bin(const Eigen::Vector3d& point, ClassId label, Chunk& chunk) const {
-  const auto append = [&](const GridIndex& block, const Eigen::Vector3d& local) {
+  const auto append = [&](const GridIndex& block, const Eigen::Vector3d& local, int voxel) {
     const Eigen::Vector3f l = local.cast<float>();
-    chunk[partitionOf(block)].push_back({block, {l.x(), l.y(), l.z(), label}});
+    const LocalPoint entry{l.x(), l.y(), l.z(), label, static_cast<std::uint16_t>(voxel)};
+    chunk[partitionOf(block)].push_back({block, entry});
   };
   if (kernel_.type == KernelType::kCounting) {
     const VoxelIndex voxel = geometry_.voxelAt(point);
     const int offset = GridGeometry::offsetInBlock(voxel);
-    append(GridGeometry::blockOf(voxel), Eigen::Vector3d(offset, 0.0, 0.0));
+    append(GridGeometry::blockOf(voxel), Eigen::Vector3d::Zero(), offset);
     return;
   }
   const Eigen::Vector3d p = point * per_metre_;
   const double reach = kernel_.reach;
   // Most points keep to one block: the neighbours' nearest centres, at -1 and 8, are out of reach.
-  const BlockIndex home = GridGeometry::blockOf({{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}});
+  const VoxelIndex voxel{{floorToInt(p.x()), floorToInt(p.y()), floorToInt(p.z())}};
+  const BlockIndex home = GridGeometry::blockOf(voxel);
+  const int offset = GridGeometry::offsetInBlock(voxel);
   const double x = p.x() - home.x * kBlockEdge - 0.5, y = p.y() - home.y * kBlockEdge - 0.5,
                z = p.z() - home.z * kBlockEdge - 0.5;
   const double low = reach - 0.999, high = kBlockEdge - 0.001 - reach;
   if (reach >= 0.8661 && x > low && x < high && y > low && y < high && z > low && z < high) {
-    append(home, {x, y, z});
+    append(home, {x, y, z}, offset);
     return;
   }
   const AxisBlocks xs(home.x, x, reach), ys(home.y, y, reach), zs(home.z, z, reach);
+  bool at_home = false;
   for (const AxisBlock& bz : zs) {
     for (const AxisBlock& by : ys) {
       for (const AxisBlock& bx : xs) {
         if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
-        append({bx.block, by.block, bz.block}, {bx.local, by.local, bz.local});
+        const GridIndex block{bx.block, by.block, bz.block};
+        append(block, {bx.local, by.local, bz.local}, block == home ? offset : int{LocalPoint::kOutside});
+        at_home |= block == home;
       }
     }
   }
+  // A kernel shorter than half a voxel's diagonal may reach no centre, but the point is in its voxel still.
+  if (protect_ && !at_home) append(home, {x, y, z}, offset);
 }
 
 void PointEvidence::sort(std::size_t p, std::size_t chunks) {
@@ -167,7 +179,7 @@ void PointEvidence::collectBlocks(const SemanticMap&, Workers&, IndexNumbering& 
 
 void PointEvidence::addPoints(const LocalPoint* points, std::size_t count, float* sums) const {
   if (kernel_.type == KernelType::kCounting) {
-    for (std::size_t i = 0; i < count; ++i) sums[static_cast<std::size_t>(points[i].x)] += 1.0f;
+    for (std::size_t i = 0; i < count; ++i) sums[points[i].voxel] += 1.0f;
     return;
   }
   loops_.add_points(points, count, kernel_.reach, sums);
@@ -180,6 +192,9 @@ void PointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch
   if (number == IndexNumbering::kNone) return;
   const LocalPoint* points = partition.points.data() + partition.begin[number];
   const std::size_t count = partition.begin[number + 1] - partition.begin[number];
+  for (std::size_t i = 0; protect_ && i < count; ++i) {
+    if (points[i].voxel != LocalPoint::kOutside) scratch.held.set(points[i].voxel);
+  }
   // A counting sort by class; most blocks see two or three.
   std::array<std::uint32_t, kMaxClasses + 3> begin{};
   for (std::size_t i = 0; i < count; ++i) ++begin[points[i].label + 1];
@@ -195,7 +210,9 @@ void PointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch
     std::size_t end = one_class ? count : begin[label];
     scratch.sums.fill(0.0f);
     addPoints(points + i, end - i, scratch.sums.data());
-    block.add(static_cast<ClassId>(label), scratch.sums.data());
+    if (label == kFreeClass) scratch.leaveHeldAlone();
+    const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(), isZero);
+    if (!nothing) block.add(static_cast<ClassId>(label), scratch.sums.data());
     i = end;
   }
 }

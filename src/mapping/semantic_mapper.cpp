@@ -35,7 +35,13 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
       hits_(map_.geometry(), config_.kernel),
       beams_(map_.geometry(), config_.kernel, config_.free_space.beam_index),
       free_space_(makeFreeSpaceModel(config_)),
-      occlusion_(config_.occlusion) {}
+      occlusion_(config_.occlusion) {
+  hits_.protectVoxels(config_.free_space.hits_before_misses);
+  for (const SemanticClass& c : classes_->classes()) {
+    const FreeGainConfig& gain = config_.free_gain;
+    if (!c.unlabelled) map_.setFreeGain(c.id, c.dynamic ? gain.dynamic_classes : gain.static_classes);
+  }
+}
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
   if (!map_.geometry().contains(scan.origin)) {

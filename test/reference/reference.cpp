@@ -186,7 +186,15 @@ Value ScanReference::lineEvidence(const VoxelIndex& voxel) const {
 
 Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   if (label != kFreeClass) return pointEvidence(hits_, voxel, label);
-  return config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
+  Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
+  if (!config_.free_space.hits_before_misses) return value;
+  const Eigen::Vector3d centre = relativeCentre(voxel);
+  for (const Point& hit : hits_) {
+    const double outside = ((hit.p - centre) / config_.resolution).cwiseAbs().maxCoeff() - 0.5;
+    if (outside < -kClose) return Value();
+    if (outside <= kClose) value.slack += value.sum;
+  }
+  return value;
 }
 
 int ScanReference::occluded(const VoxelIndex& voxel, double range) const {

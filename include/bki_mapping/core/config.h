@@ -24,6 +24,14 @@ struct FreeSpaceConfig {
   BeamWeight weight = BeamWeight::kBilinear;            ///< mode line
   FreeSpaceExtent extent = FreeSpaceExtent::kObserved;  ///< mode line
   BeamIndexType beam_index = BeamIndexType::kTable;     ///< mode line, and occlusion
+  bool hits_before_misses = false;  ///< voxels that hold a hit are not cleared by its scan
+};
+
+/// Gains on the evidence for `free` when the state of a voxel is decided, by its likeliest class; 1 is the
+/// posterior's own verdict. Voxels of the unlabelled class have 1.
+struct FreeGainConfig {
+  double dynamic_classes = 1.0;  ///< classes flagged dynamic
+  double static_classes = 1.0;   ///< the others
 };
 
 struct SensorModelConfig {
@@ -43,6 +51,7 @@ struct MapperConfig {
   int threads = 0;                     ///< 0: all cores
   KernelConfig kernel;
   FreeSpaceConfig free_space;
+  FreeGainConfig free_gain;
   SensorModelConfig sensor_model;
   bool clear_beyond_max_range = true;  ///< hits beyond max_range clear as beams cut there
   OcclusionExtent occlusion = OcclusionExtent::kNone;

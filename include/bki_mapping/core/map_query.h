@@ -11,8 +11,8 @@ namespace bki_mapping {
 /// The numbers are those of files and messages.
 enum class VoxelState : std::uint8_t {
   kUnknown = 0,   ///< no evidence
-  kFree = 1,      ///< `free` has the largest alpha
-  kOccupied = 2,  ///< a class has the largest alpha; it wins a tie with `free`
+  kFree = 1,      ///< `free` has more evidence, times the class's gain, than any class
+  kOccupied = 2,  ///< a class has as much or more; with a gain of 1, the largest alpha
   kOccluded = 3,  ///< no evidence, and behind a hit in the last scan that reached it
 };
 

@@ -1,6 +1,7 @@
 /// @file The map: blocks by index.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -24,13 +25,19 @@ class SemanticMap {
   /// @param prior concentration alpha0 of each class before any scan, > 0.
   /// @param class_count number of classes in the table, `free` not counted, 1 to 254.
   SemanticMap(const GridGeometry& geometry, double prior, std::size_t class_count)
-      : geometry_(geometry), prior_(prior), class_count_(class_count) {}
+      : geometry_(geometry), prior_(prior), class_count_(class_count) {
+    free_gains_.fill(1.0f);
+  }
 
   const GridGeometry& geometry() const { return geometry_; }
   double prior() const { return prior_; }
   std::size_t classCount() const { return class_count_; }
   /// Sum of a voxel's concentrations before any scan.
   double priorSum() const { return prior_ * static_cast<double>(class_count_ + 1); }
+
+  /// Gain on the evidence for `free` when the state of a voxel of this class is decided; 1 unless set.
+  float freeGain(ClassId id) const { return free_gains_[id]; }
+  void setFreeGain(ClassId id, double gain) { free_gains_[id] = static_cast<float>(gain); }
 
   /// All blocks, in no promised order.
   const std::vector<Entry>& entries() const { return entries_; }
@@ -83,6 +90,7 @@ class SemanticMap {
   GridGeometry geometry_;
   double prior_;
   std::size_t class_count_;
+  std::array<float, 256> free_gains_;
   std::vector<Entry> entries_;
   GridTable place_;                                  ///< of each block in entries_
   std::vector<std::vector<std::uint32_t>> regions_;  ///< places of their blocks in entries_

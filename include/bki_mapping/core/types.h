@@ -28,8 +28,8 @@ struct GridIndex {
 struct VoxelIndex : GridIndex {};
 struct BlockIndex : GridIndex {};
 
-/// Spreads the three coordinates over 64 bits: sums of products with odd constants of the golden-ratio family.
-/// The high bits are mixed well; they are folded into the low ones.
+/// Spreads the three coordinates over 64 bits: sums of products with odd constants of the golden-ratio
+/// family. The high bits are mixed well; they are folded into the low ones.
 struct GridIndexHash {
   std::size_t operator()(const GridIndex& i) const {
     const std::uint64_t h = static_cast<std::uint32_t>(i.x) * 0x9E3779B97F4A7C15ull +

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <vector>
 
 #include "bki_mapping/core/semantic_map.h"
@@ -19,8 +20,13 @@ struct EvidenceScratch {
   std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
-  std::array<std::vector<LocalBeam>, 3> local_beams;  ///< by the axis that comes first
-  alignas(64) std::array<float, kBlockVoxels> turned_sums{};
+  /// Voxels of the block at hand that evidence for `free` leaves alone.
+  std::bitset<kBlockVoxels> held;
+
+  void leaveHeldAlone() {
+    if (held.none()) return;
+    for (std::size_t v = 0; v < sums.size(); ++v) sums[v] = held[v] ? 0.0f : sums[v];
+  }
 };
 
 /// Answers two questions: which blocks do you touch, and add yourself to this block.

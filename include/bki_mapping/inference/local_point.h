@@ -7,8 +7,11 @@ namespace bki_mapping {
 
 /// A labelled point: [voxels], from the centre of the block's first voxel.
 struct LocalPoint {
+  static constexpr std::uint16_t kOutside = 0xffff;
+
   float x, y, z;
-  std::uint32_t label;
+  std::uint16_t label;
+  std::uint16_t voxel;  ///< that holds it, or kOutside if that is in another block
 };
 
 }  // namespace bki_mapping

@@ -28,6 +28,9 @@ class PointEvidence : public Evidence {
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers);
   std::size_t size() const { return size_; }  ///< number of points
 
+  /// Whether evidence for `free` that stands behind this one leaves the voxels alone that hold a point.
+  void protectVoxels(bool protect) { protect_ = protect; }
+
   /// Exactly the blocks with a voxel centre within reach of a point.
   void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
   void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
@@ -60,6 +63,7 @@ class PointEvidence : public Evidence {
   double per_metre_;  ///< voxels
   VoxelKernel kernel_;
   const InnerLoops& loops_;
+  bool protect_ = false;
   std::size_t size_ = 0;
   std::vector<Chunk> chunks_;
   std::array<Partition, kPartitions> partitions_;
