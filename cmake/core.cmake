@@ -22,6 +22,7 @@ add_library(bki_mapping_core SHARED
   src/free_space/no_free_space.cpp
   src/free_space/random_samples.cpp
   src/free_space/registry.cpp
+  src/mapping/dynamics_quality.cpp
   src/mapping/observation.cpp
   src/mapping/semantic_mapper.cpp
 )

@@ -33,10 +33,13 @@ install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_node
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS benchmark_sequence map_sequence mapping_node play_sequence sequence_to_bag simulate_drive
+install(TARGETS benchmark_sequence evaluate_map map_sequence mapping_node play_sequence sequence_to_bag simulate_drive
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+if(TARGET benchmark_parts)
+  install(TARGETS benchmark_parts RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endif()
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(PROGRAMS scripts/plot_curves.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
+install(FILES scripts/plot_curves.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
 catkin_install_python(PROGRAMS scripts/mapping_summary.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

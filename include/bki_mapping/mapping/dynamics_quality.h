@@ -1,0 +1,67 @@
+/// @file How well a map keeps what stands and forgets what moved.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/grid_table.h"
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/core/semantic_map.h"
+
+namespace bki_mapping {
+
+/// The accuracies of the DynamicMap benchmark (Zhang et al., ITSC 2023), point by point of the input.
+struct DynamicsQuality {
+  std::size_t static_points = 0;   ///< labelled points of things that stand, of all scans
+  std::size_t static_kept = 0;     ///< of these, in voxels that the map calls occupied
+  std::size_t moving_points = 0;   ///< points of things that move, of the first half of the scans, in voxels
+                                   ///< that no point of the last scans hits
+  std::size_t moving_removed = 0;  ///< of these, in voxels that the map does not call occupied
+
+  double staticAccuracy() const { return share(static_kept, static_points); }          ///< SA
+  double dynamicAccuracy() const { return share(moving_removed, moving_points); }      ///< DA
+  double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
+
+ private:
+  /// NaN if there is nothing to share.
+  static double share(std::size_t part, std::size_t whole) {
+    return static_cast<double>(part) / static_cast<double>(whole);
+  }
+};
+
+/// Collects the labelled points of a drive, voxel by voxel, and compares a map with them.
+class DynamicsEvaluation {
+ public:
+  /// Raw labels of moving things in SemanticKITTI, 252 to 259.
+  static std::set<std::uint32_t> movingOfSemanticKitti();
+
+  /// @param scans how many will be added. @param late number of last scans whose hits excuse a voxel.
+  DynamicsEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving, std::size_t scans,
+                     std::size_t late)
+      : geometry_(geometry), moving_(std::move(moving)), scans_(scans), late_(late) {}
+
+  /// Adds the next scan. Points that are not finite, or whose class is none or the unlabelled one, do not
+  /// count.
+  void add(const Scan& scan, const ClassTable& classes);
+
+  DynamicsQuality compare(const SemanticMap& map) const;
+
+ private:
+  struct Voxel {
+    VoxelIndex index;
+    std::uint32_t static_points = 0, early_moving_points = 0;
+    bool hit_late = false;
+  };
+
+  GridGeometry geometry_;
+  std::set<std::uint32_t> moving_;
+  std::size_t scans_, late_, added_ = 0;
+  GridTable number_;
+  std::vector<Voxel> voxels_;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,45 @@
+#include "bki_mapping/mapping/dynamics_quality.h"
+
+#include "bki_mapping/core/map_query.h"
+
+namespace bki_mapping {
+
+std::set<std::uint32_t> DynamicsEvaluation::movingOfSemanticKitti() {
+  return {252, 253, 254, 255, 256, 257, 258, 259};
+}
+
+void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
+  const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
+    const auto id = classes.classOfRaw(scan.labels[i]);
+    if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
+    const VoxelIndex index = geometry_.voxelAt(point);
+    const auto fresh = static_cast<std::uint32_t>(voxels_.size());
+    const std::uint32_t number = number_.insert(index, fresh);
+    if (number == fresh) voxels_.push_back({index});
+    Voxel& voxel = voxels_[number];
+    const bool moving = moving_.count(scan.labels[i]) > 0;
+    voxel.static_points += !moving;
+    voxel.early_moving_points += moving && early;
+    voxel.hit_late |= late;
+  }
+  ++added_;
+}
+
+DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
+  DynamicsQuality quality;
+  for (const Voxel& voxel : voxels_) {
+    const Block* block = map.find(GridGeometry::blockOf(voxel.index));
+    const bool occupied = block && viewVoxel(map, *block, GridGeometry::offsetInBlock(voxel.index)).state ==
+                                       VoxelState::kOccupied;
+    quality.static_points += voxel.static_points;
+    if (occupied) quality.static_kept += voxel.static_points;
+    if (voxel.hit_late) continue;
+    quality.moving_points += voxel.early_moving_points;
+    if (!occupied) quality.moving_removed += voxel.early_moving_points;
+  }
+  return quality;
+}
+
+}  // namespace bki_mapping
