@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The programs that need no ROS, called as a user calls them."""
+import csv
 import json
 import os
 import shutil
@@ -61,6 +62,36 @@ class Tools(unittest.TestCase):
         with open(self.path('map.ply'), 'rb') as file:
             vertices = report['voxels']['free'] + report['voxels']['occupied']
             self.assertIn(f'element vertex {vertices}\n'.encode(), file.read(400))
+
+    def evaluation(self, *settings):
+        arguments = [word for setting in settings for word in ('--set', setting)]
+        result = call('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
+                      *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.path('figures.json')) as file:
+            return json.load(file)
+
+    def test_evaluation(self):
+        hits_alone = self.evaluation('free_space/mode=none')
+        self.assertEqual(hits_alone['sa'], 1.0)
+        self.assertEqual(hits_alone['da'], 0.0)
+        lines = self.evaluation()
+        self.assertLess(lines['sa'], 1.0)
+        self.assertGreater(lines['sa'], 0.5)
+        self.assertGreater(lines['da'], 0.0)
+        self.assertGreater(self.evaluation('free_space/hits_before_misses=true')['sa'], lines['sa'])
+        self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
+        self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
+
+    def test_benchmark(self):
+        result = call('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--csv', self.path('times.csv'))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.path('times.csv'), newline='') as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(list(rows[0]),
+                         ['mode', 'resolution', 'threads', 'median_ms', 'p99_ms', 'ratio_to_y', 'map_bytes'])
+        self.assertEqual(len(rows), 16)
+        self.assertTrue(all(float(row['median_ms']) > 0 for row in rows))
 
     def test_threads_do_not_show(self):
         maps = []

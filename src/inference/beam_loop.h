@@ -62,7 +62,7 @@ template <BeamWeight kWeight>
     return greater(lesser(rho, 1.0f - rho), FloatLanes{});
   } else {
     const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
-    return (rho > 0.0f) & (rho < 1.0f) ? weight : FloatLanes{};
+    return ((rho > 0.0f) & (rho < 1.0f)) ? weight : FloatLanes{};
   }
 }
 

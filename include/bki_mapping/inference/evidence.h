@@ -7,7 +7,6 @@
 
 #include "bki_mapping/core/semantic_map.h"
 #include "bki_mapping/inference/beam_index.h"
-#include "bki_mapping/inference/beam_raster.h"
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/local_point.h"
 #include "bki_mapping/inference/parallel_for.h"
