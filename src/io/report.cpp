@@ -101,6 +101,18 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
   return report.dump(2) + "\n";
 }
 
+std::string qualityJson(const DynamicsQuality& q, double median_ms) {
+  const nlohmann::json figures = {{"static_points", q.static_points},
+                                  {"static_kept", q.static_kept},
+                                  {"moving_points", q.moving_points},
+                                  {"moving_removed", q.moving_removed},
+                                  {"sa", q.staticAccuracy()},
+                                  {"da", q.dynamicAccuracy()},
+                                  {"aa", q.accuracy()},
+                                  {"median_ms", median_ms}};
+  return figures.dump(2) + "\n";
+}
+
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans) {
   const VoxelCounts counts = countVoxels(mapper.map());
   std::ostringstream out;

@@ -1,7 +1,6 @@
 // Maps a sequence with labels of moving things, and measures what the map kept and what it forgot.
 #include <iomanip>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/report.h"
@@ -22,17 +21,6 @@ po::options_description options() {
       "voxels hit in the last N scans need not be cleared");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
-}
-
-nlohmann::json toJson(const DynamicsQuality& q, double median_ms) {
-  return {{"static_points", q.static_points},
-          {"static_kept", q.static_kept},
-          {"moving_points", q.moving_points},
-          {"moving_removed", q.moving_removed},
-          {"sa", q.staticAccuracy()},
-          {"da", q.dynamicAccuracy()},
-          {"aa", q.accuracy()},
-          {"median_ms", median_ms}};
 }
 
 void print(const char* name, double share, const char* meaning) {
@@ -64,7 +52,7 @@ int evaluate(const po::variables_map& given) {
     std::cout << "there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known\n";
   }
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(), toJson(quality, median_ms).dump(2) + "\n");
+    writeTextFile(given["json"].as<std::string>(), qualityJson(quality, median_ms));
   }
   return 0;
 }
