@@ -190,6 +190,15 @@ TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
   EXPECT_EQ(mapper.map().size(), 0u);
 }
 
+TEST(Laws, AKernelOfTooManyVoxelsIsRefused) {
+  MapperConfig config;
+  config.resolution = 0.1;
+  config.kernel.length = 7.1;
+  EXPECT_NO_THROW(SemanticMapper(config, reference::smallTable()));
+  config.kernel.length = 7.3;
+  EXPECT_THROW(SemanticMapper(config, reference::smallTable()), std::invalid_argument);
+}
+
 TEST(Laws, GainsFollowTheFlagsOfClasses) {
   std::vector<SemanticClass> classes = reference::smallTable()->classes();
   classes[2].dynamic = true;

@@ -93,6 +93,21 @@ class Tools(unittest.TestCase):
         self.assertEqual(len(rows), 16)
         self.assertTrue(all(float(row['median_ms']) > 0 for row in rows))
 
+    def test_curves_are_drawn(self):
+        folder = self.path('curves')
+        os.mkdir(folder)
+        tables = {'growth': 'mode,scan,blocks,map_bytes,ms\n"none",0,10,1000,5.0\n"none",1,20,2000,6.0\n',
+                  'points': 'mode,points,hits,median_ms\n"none",100,50,1.0\n"none",200,90,2.0\n',
+                  'resolution': 'mode,resolution,median_ms\n"none",0.3,1.0\n"none",0.1,9.0\n'}
+        for name, table in tables.items():
+            with open(os.path.join(folder, name + '.csv'), 'w') as file:
+                file.write(table)
+        script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'scripts', 'plot_curves.py')
+        subprocess.run(['/usr/bin/python3', script, folder], check=True, capture_output=True, timeout=120)
+        for name in tables:
+            with open(os.path.join(folder, name + '.png'), 'rb') as file:
+                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+
     def test_threads_do_not_show(self):
         maps = []
         for threads in ('1', '2', '7'):

@@ -59,7 +59,9 @@ std::vector<Parameter> mapperParameters() {
           [](MapperConfig & c) -> auto& { return c.free_space.beam_index; }),
       choiceParameter<MapperConfig>(
           "free_space/hits_before_misses", {"false", "true"},
-          "Whether a voxel that holds a hit of a scan takes no evidence for free from the same scan.",
+          "Whether a voxel that holds a hit of a scan, after down-sampling, takes no evidence for free from "
+          "the "
+          "same scan.",
           [](MapperConfig & c) -> auto& { return c.free_space.hits_before_misses; }),
       realParameter<MapperConfig>(
           "free_gain/dynamic", "a number > 0", "",

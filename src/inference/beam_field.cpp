@@ -50,12 +50,7 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
 }
 
 BeamArrays BeamField::arrays() const {
-  return {ux_.data(),
-          uy_.data(),
-          uz_.data(),
-          inverse_length_.data(),
-          table_.begin().data(),
-          static_cast<std::uint32_t>(beams_.ends.size())};
+  return {ux_.data(), uy_.data(), uz_.data(), inverse_length_.data(), table_.begin().data()};
 }
 
 BeamBlock BeamField::blockAt(const BlockIndex& index) const {

@@ -115,8 +115,7 @@ template <BeamWeight kWeight>
 }
 
 /// Picks those of kLanes beams that may reach a place between the sensor and their end.
-/// @param left number of the kLanes beams that count. @param most greatest squared chord [kDirectionStep^2].
-/// @param nearest distance from the sensor that they must have [m].
+/// @param left how many of them count.
 [[gnu::always_inline]] inline void pick(const std::int32_t* ux, const std::int32_t* uy,
                                         const std::int32_t* uz, const float* inverse_length,
                                         std::int32_t left, const Place& place, PickedBeams& picked) {
@@ -140,7 +139,6 @@ void addTile(const Tile& tile, const float* lanes, float* sums) {
 template <BeamWeight kWeight>
 void addOctant(const BeamBlock& block, const Places& places, int octant, PickedBeams& near_octant,
                float* sums) {
-  for (int lane = 0; lane < kLanes; ++lane) near_octant.inverse_length[near_octant.count + lane] = 0.0f;
   PickedBeams near_tile;
   for (int n = 0; n < 8; ++n) {
     const int number = tileInOctant(octant, n);

@@ -40,7 +40,6 @@ struct BeamArrays {
   const std::int32_t *ux, *uy, *uz;  ///< unit directions [kDirectionStep]
   const float* inverse_length;       ///< [1 / m]
   const std::uint32_t* begin;        ///< of each cell's beams, row by row; one more than cells
-  std::uint32_t count;
 };
 constexpr std::uint32_t kBeamPadding = 16;
 
