@@ -17,6 +17,7 @@ add_library(bki_mapping_core SHARED
   src/inference/occlusion.cpp
   src/inference/parallel_for.cpp
   src/inference/point_evidence.cpp
+  src/inference/soft_point_evidence.cpp
   src/free_space/beam_lines.cpp
   src/free_space/even_samples.cpp
   src/free_space/no_free_space.cpp
@@ -24,6 +25,7 @@ add_library(bki_mapping_core SHARED
   src/free_space/registry.cpp
   src/mapping/dynamics_quality.cpp
   src/mapping/observation.cpp
+  src/mapping/soft_merge.cpp
   src/mapping/semantic_mapper.cpp
 )
 target_include_directories(bki_mapping_core PUBLIC

@@ -18,6 +18,12 @@ std::pair<VoxelIndex, VoxelIndex> bounds(const Scan& scan, const GridGeometry& g
     low = low.cwiseMin(scan.origin + point.cast<double>());
     high = high.cwiseMax(scan.origin + point.cast<double>());
   }
+  for (const auto& direction : scan.no_returns) {
+    const Eigen::Vector3d end =
+        scan.origin + direction.cast<double>().normalized() * scan.sensor_model->max_range;
+    low = low.cwiseMin(end);
+    high = high.cwiseMax(end);
+  }
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(1.2);
   return {geometry.voxelAt(low - margin), geometry.voxelAt(high + margin)};
 }
@@ -99,6 +105,8 @@ TEST_P(EveryScene, HitsBeforeMissesEqualsBruteForce) {
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, " + mode);
       config.kernel.length = 0.2;  // may reach no voxel centre
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, short, " + mode);
+      config.free_space.extent = FreeSpaceExtent::kMapped;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, mapped, " + mode);
     }
   }
 }
@@ -147,6 +155,54 @@ TEST_P(EveryScene, RangeLimitsEqualBruteForce) {
   if (scene_.name != "seam" && scene_.name != "poles" && scene_.name != "cluster") {
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", not cut");
   }
+}
+
+/// The scene with one to three classes a point, in random shares; each point's label is its likeliest.
+Scan withSoftLabels(Scan scan) {
+  std::mt19937 random(17);
+  scan.labels_are_ids = true;
+  for (std::uint32_t& label : scan.labels) {
+    const auto first = static_cast<unsigned>(random() % 3);
+    scan.soft.startPoint();
+    float best = 0.0f, left = 1.0f;
+    for (unsigned id = first; id < 4; ++id) {
+      const float share = id == 3 ? left : left * static_cast<float>(random() % 90 + 5) / 100.0f;
+      left -= share;
+      scan.soft.add({static_cast<ClassId>(id), share});
+      if (share > best) label = id;
+      best = std::max(best, share);
+    }
+  }
+  return scan;
+}
+
+TEST_P(EveryScene, SoftLabelsEqualBruteForce) {
+  const Scan scan = withSoftLabels(scene_.scan);
+  for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+    for (const double length : {0.3, 0.2, 0.7}) {
+      MapperConfig config = withMode("line");
+      config.kernel.type = kernel;
+      config.kernel.length = length;
+      expectEqualsBruteForce(scan, config, scene_.name + ", soft labels");
+      config.free_space.hits_before_misses = true;
+      config.free_space.extent = FreeSpaceExtent::kMapped;
+      config.downsample_resolution = 0.0;
+      expectEqualsBruteForce(scan, config, scene_.name + ", soft labels, hits before misses");
+    }
+  }
+}
+
+TEST_P(EveryScene, NoReturnsEqualBruteForce) {
+  Scan scan = scene_.scan;
+  for (int i = 0; i < 40; ++i) {
+    scan.no_returns.emplace_back(std::cos(0.1f * static_cast<float>(i)),
+                                 std::sin(0.4f * static_cast<float>(i)),
+                                 0.02f * static_cast<float>(i) - 0.3f);
+  }
+  scan.sensor_model = SensorModelConfig();
+  scan.sensor_model->max_range = 2.5;
+  expectEqualsBruteForce(scan, withMode("line"), scene_.name + ", no returns, line");
+  expectEqualsBruteForce(scan, withMode("even"), scene_.name + ", no returns, even");
 }
 
 INSTANTIATE_TEST_SUITE_P(Nasty, EveryScene, testing::Range<std::size_t>(0, reference::nastyScenes(1).size()));

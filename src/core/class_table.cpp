@@ -44,4 +44,10 @@ std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
   return found->second;
 }
 
+std::optional<ClassId> ClassTable::classOf(std::uint32_t label, LabelValues values) const {
+  if (values == LabelValues::kRaw) return classOfRaw(label);
+  if (label < kMaxClasses && find(static_cast<ClassId>(label))) return static_cast<ClassId>(label);
+  return std::nullopt;
+}
+
 }  // namespace bki_mapping

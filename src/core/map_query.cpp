@@ -12,7 +12,7 @@ double plogp(double p) {
 
 }  // namespace
 
-VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
+VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset) {
   VoxelView view;
   double total = 0.0;
   float best = 0.0f, free = 0.0f;
@@ -36,16 +36,25 @@ VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
   if (view.state != VoxelState::kOccupied) view.label = kFreeClass;
 
   const double sum = total + map.priorSum();
+  const double p = (map.prior() + (view.state == VoxelState::kOccupied ? best : free)) / sum;
+  view.probability = static_cast<float>(p);
+  view.variance = static_cast<float>(p * (1.0 - p) / (sum + 1.0));
+  view.occupancy = static_cast<float>(1.0 - (map.prior() + free) / sum);
+  return view;
+}
+
+VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
+  VoxelView view = judgeVoxel(map, block, offset);
+  const auto& classes = block.classes();
+  double total = 0.0;
+  for (std::size_t i = 0; i < classes.size(); ++i) total += block.plane(i)[offset];
+  const double sum = total + map.priorSum();
   double entropy = 0.0;
   for (std::size_t i = 0; i < classes.size(); ++i) {
     entropy -= plogp((map.prior() + block.plane(i)[offset]) / sum);
   }
   entropy -= static_cast<double>(map.classCount() + 1 - classes.size()) * plogp(map.prior() / sum);
-  const double p = (map.prior() + (view.state == VoxelState::kOccupied ? best : free)) / sum;
-  view.probability = static_cast<float>(p);
-  view.variance = static_cast<float>(p * (1.0 - p) / (sum + 1.0));
   view.entropy = static_cast<float>(entropy);
-  view.occupancy = static_cast<float>(1.0 - (map.prior() + free) / sum);
   return view;
 }
 

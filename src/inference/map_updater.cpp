@@ -20,7 +20,11 @@ void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evi
     evidence[e]->collectBlocks(map, workers, touched_);
     for (const GridIndex& member : touched_.members()) {
       const std::uint32_t number = numbering_.insert(member);
-      if (number == jobs_.size()) jobs_.push_back({{member}, &map.getOrAllocate({member}), 0});
+      if (number == jobs_.size()) {
+        const std::size_t size = map.size();
+        Block& block = map.getOrAllocate({member});
+        jobs_.push_back({{member}, &block, 0, map.size() > size ? 0 : block.bytes()});
+      }
       jobs_[number].pieces |= 1u << e;
     }
   }
@@ -47,7 +51,10 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
     }
   });
   for (const Job& job : jobs_) {
-    if (job.block->empty()) map.erase(job.index);
+    const bool keep = !job.block->empty();
+    stats.bytes +=
+        static_cast<std::ptrdiff_t>(keep ? job.block->bytes() : 0) - static_cast<std::ptrdiff_t>(job.bytes);
+    if (!keep) map.erase(job.index);
   }
   stats.update_ms = watch.lap();
   return stats;

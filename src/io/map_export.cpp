@@ -71,17 +71,26 @@ std::set<VoxelState> parseStates(const std::string& list) {
   return states;
 }
 
-std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
-                                       const std::set<VoxelState>& states) {
-  std::vector<VoxelRecord> voxels;
-  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
-    if (states.count(view.state) == 0) return;
-    const Eigen::Vector3f centre = map.geometry().voxelCentre(index).cast<float>();
+void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::set<VoxelState>& states,
+                  const BlockIndex& index, const Block& block, std::vector<VoxelRecord>& voxels) {
+  for (int offset = 0; offset < kBlockVoxels; ++offset) {
+    if (states.count(judgeVoxel(map, block, offset).state) == 0) continue;
+    const VoxelView view = viewVoxel(map, block, offset);
+    const VoxelIndex voxel = GridGeometry::voxelOf(index, offset);
+    const Eigen::Vector3f centre = map.geometry().voxelCentre(voxel).cast<float>();
     const Color color = semanticColor(view, classes);
     voxels.push_back({centre.x(), centre.y(), centre.z(), color[0], color[1], color[2], view.label,
                       static_cast<std::uint8_t>(view.state), view.probability, view.variance, view.entropy,
                       view.evidence});
-  });
+  }
+}
+
+std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
+                                       const std::set<VoxelState>& states) {
+  std::vector<VoxelRecord> voxels;
+  for (const auto& [index, block] : sortedBlocks(map)) {
+    appendVoxels(map, classes, states, index, *block, voxels);
+  }
   return voxels;
 }
 

@@ -33,14 +33,21 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
       workers_(config_.threads),
       observer_(config_),
       hits_(map_.geometry(), config_.kernel),
+      soft_hits_(map_.geometry(), config_.kernel),
       beams_(map_.geometry(), config_.kernel, config_.free_space.beam_index),
       free_space_(makeFreeSpaceModel(config_)),
       occlusion_(config_.occlusion) {
   hits_.protectVoxels(config_.free_space.hits_before_misses);
+  soft_hits_.protectVoxels(config_.free_space.hits_before_misses);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     if (!c.unlabelled) map_.setFreeGain(c.id, c.dynamic ? gain.dynamic_classes : gain.static_classes);
   }
+}
+
+void SemanticMapper::reset() {
+  map_.clear();
+  block_bytes_ = 0;
 }
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
@@ -54,10 +61,15 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
   stats.hits = seen.hits.points.size();
   stats.observe_ms = watch.lap();
 
-  hits_.setPoints(scan.origin, seen.hits, workers_);
+  const bool soft = !seen.soft.empty();
+  if (soft) {
+    soft_hits_.setPoints(scan.origin, seen.hits, seen.soft);
+  } else {
+    hits_.setPoints(scan.origin, seen.hits, workers_);
+  }
   beams_.setBeams(seen.beams);
   const FreeSpaceEvidence free = free_space_->observe(beams_, scan.stamp, workers_);
-  evidence_.assign(1, &hits_);
+  evidence_.assign(1, soft ? static_cast<Evidence*>(&soft_hits_) : &hits_);
   if (free.evidence) evidence_.push_back(free.evidence);
   if (config_.occlusion != OcclusionExtent::kNone) {
     const double max_range = config_.sensor_model.max_range;
@@ -70,6 +82,7 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
 
   const MapUpdateStats update = updater_.update(map_, evidence_, workers_);
   stats.blocks = update.blocks;
+  block_bytes_ += static_cast<std::size_t>(update.bytes);  // two's complement: may be negative
   stats.collect_ms = update.collect_ms;
   stats.update_ms = update.update_ms;
   return stats;

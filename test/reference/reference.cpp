@@ -47,6 +47,11 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
         merged.label = label;
       }
     }
+    const int votes_for_it = most;
+    for (const Point& point : cells[key]) {
+      if (point.label != merged.label) continue;
+      for (const auto& [label, share] : point.shares) merged.shares[label] += share / votes_for_it;
+    }
     result.push_back(merged);
   }
   return result;
@@ -54,21 +59,31 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
 
 ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config)
     : config_(config), geometry_(config.resolution), origin_(scan.origin) {
-  const double max_range = config.sensor_model.max_range;
+  const SensorModelConfig sensor = scan.sensor_model.value_or(config.sensor_model);
+  const double max_range = sensor.max_range;
   std::vector<Point> raw, cut;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d p = scan.points[i].cast<double>();
     const double range = p.norm();
-    if (!p.allFinite() || range < 1e-3 || range < config.sensor_model.min_range) continue;
+    if (!p.allFinite() || range < 1e-3 || range < sensor.min_range) continue;
     if (max_range > 0.0 && range > max_range) {
       if (config.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
       continue;
     }
-    auto id = classes.classOfRaw(scan.labels[i]);
+    const LabelValues values = scan.labels_are_ids ? LabelValues::kId : config.label_values;
+    auto id = classes.classOf(scan.labels[i], values);
     if (!id && config.unknown_labels == UnknownLabels::kUnlabelled) id = classes.unlabelled();
     if (!id || (id == classes.unlabelled() && config.unlabelled_points == UnlabelledPoints::kIgnore))
       continue;
     raw.push_back({p, *id});
+    if (scan.soft.empty()) continue;
+    for (const ClassShare* s = scan.soft.begin(i); s != scan.soft.end(i); ++s) {
+      raw.back().shares[s->id] = s->share;
+    }
+    if (raw.back().shares.empty()) raw.back().shares[*id] = 1.0;
+  }
+  for (const Eigen::Vector3f& direction : scan.no_returns) {
+    cut.push_back({direction.cast<double>().normalized() * max_range, 255});
   }
   hits_ = downsample(origin_, raw, config.downsample_resolution);
   for (const Point& hit : hits_) beams_.push_back(hit.p);
@@ -104,16 +119,18 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
   const Eigen::Vector3d centre = relativeCentre(voxel);
   Value value;
   for (const Point& point : points) {
-    if (point.label != label) continue;
+    const double share = point.shareOf(label);
+    if (share == 0.0) continue;
     if (config_.kernel.type == KernelType::kSparse) {
-      value.sum += sparseKernel((point.p - centre).norm(), config_.kernel.length, config_.kernel.scale);
+      value.sum +=
+          share * sparseKernel((point.p - centre).norm(), config_.kernel.length, config_.kernel.scale);
       continue;
     }
     // The voxel holds the point if the offset from its centre is in [-half, half) on each axis.
     const Eigen::Array3d offset = (point.p - centre).array() / config_.resolution;
     const double outside = offset.abs().maxCoeff() - 0.5;
-    if (outside < -kClose) value.sum += 1.0;
-    if (std::abs(outside) <= kClose) value.slack += 1.0;
+    if (outside < -kClose) value.sum += share;
+    if (std::abs(outside) <= kClose) value.slack += share;
   }
   return value;
 }
@@ -151,6 +168,8 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
       const Eigen::Vector3d d = point.p - centre;
       hit = config_.kernel.type == KernelType::kSparse ? d.norm() < config_.kernel.length
                                                        : d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      // With hits_before_misses a block holds a hit even if the hit's kernel reaches no voxel centre.
+      hit |= config_.free_space.hits_before_misses && d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
       if (hit) break;
     }
   }

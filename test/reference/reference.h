@@ -22,6 +22,13 @@ struct Value {
 struct Point {
   Eigen::Vector3d p;  ///< relative to the sensor [m]
   int label;
+  std::map<int, double> shares = {};  ///< of classes, where the label is not sure
+
+  double shareOf(int id) const {
+    if (shares.empty()) return id == label ? 1.0 : 0.0;
+    const auto found = shares.find(id);
+    return found == shares.end() ? 0.0 : found->second;
+  }
 };
 
 /// k(d) in double precision. @param d, length [m].

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "bki_mapping/core/config.h"
 #include "bki_mapping/core/types.h"
 
 namespace bki_mapping {
@@ -37,6 +38,8 @@ class ClassTable {
   const SemanticClass* find(ClassId id) const;
   /// The class of a raw label number; none where the table does not list it.
   std::optional<ClassId> classOfRaw(std::uint32_t raw) const;
+  /// The class of a label of a cloud; none where the table does not list it.
+  std::optional<ClassId> classOf(std::uint32_t label, LabelValues values) const;
   /// The class of hits without a known class; none where the table has no such class.
   std::optional<ClassId> unlabelled() const { return unlabelled_; }
 

@@ -28,6 +28,8 @@ struct VoxelView {
 };
 
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
+/// The same, but with entropy 0: most of the time goes into its logarithms.
+VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset);
 /// @param point in the map frame [m].
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
 

@@ -3,8 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
+
+#include "bki_mapping/core/config.h"
+#include "bki_mapping/core/soft_labels.h"
 
 namespace bki_mapping {
 
@@ -15,8 +19,16 @@ struct Scan {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   /// Hits relative to `origin`, in the axes of the map frame [m].
   std::vector<Eigen::Vector3f> points;
-  /// The data set's own label number of each hit; as long as `points`.
+  /// The label of each hit, as `label_values` says; as long as `points`.
   std::vector<std::uint32_t> labels;
+  /// Whether `labels` are ids of the class table, whatever `label_values` says.
+  bool labels_are_ids = false;
+  /// Shares of the classes in each hit; empty where labels are all there is. Else `labels` holds ids.
+  SoftLabels soft;
+  /// Directions of beams that met nothing up to the sensor's range, in the axes of the map frame; any length.
+  std::vector<Eigen::Vector3f> no_returns;
+  /// Ranges of the sensor, where they are not those of the mapper's settings.
+  std::optional<SensorModelConfig> sensor_model;
   /// Time of the scan [ns]. Seeds the random free-space samples: scans drawn at the same time and with the
   /// same seed draw the same numbers, whatever their order.
   std::uint64_t stamp = 0;

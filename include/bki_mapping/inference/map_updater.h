@@ -8,9 +8,10 @@
 namespace bki_mapping {
 
 struct MapUpdateStats {
-  std::size_t blocks = 0;   ///< blocks that evidence may have touched
-  double collect_ms = 0.0;  ///< naming and allocating the blocks
-  double update_ms = 0.0;   ///< adding to them
+  std::size_t blocks = 0;    ///< blocks that evidence may have touched
+  std::ptrdiff_t bytes = 0;  ///< by which the map's blocks grew
+  double collect_ms = 0.0;   ///< naming and allocating the blocks
+  double update_ms = 0.0;    ///< adding to them
 };
 
 /// Adds evidence to maps. Keeps its memory from scan to scan.
@@ -21,11 +22,15 @@ class MapUpdater {
   /// @param evidence at most 32 pieces.
   MapUpdateStats update(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
 
+  /// The blocks that the last update may have changed, made or erased; each once.
+  const std::vector<GridIndex>& touched() const { return numbering_.members(); }
+
  private:
   struct Job {
     BlockIndex index;
     Block* block;
     std::uint32_t pieces;  ///< bit e: evidence e touches the block
+    std::size_t bytes;     ///< of the block before the update; 0 for new ones
   };
 
   void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);

@@ -22,6 +22,10 @@ struct VoxelRecord {
 /// The states named in a list like "occupied,free". @throws std::invalid_argument on any other word.
 std::set<VoxelState> parseStates(const std::string& list);
 
+/// Appends the voxels of one block that are in the given states.
+void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::set<VoxelState>& states,
+                  const BlockIndex& index, const Block& block, std::vector<VoxelRecord>& voxels);
+
 /// The voxels in the given states, blocks in sorted order.
 std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
                                        const std::set<VoxelState>& states);

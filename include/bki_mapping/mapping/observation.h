@@ -8,6 +8,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/inference/beams.h"
 #include "bki_mapping/inference/downsample.h"
+#include "bki_mapping/mapping/soft_merge.h"
 
 namespace bki_mapping {
 
@@ -22,6 +23,7 @@ struct PointCounts {
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
   std::size_t unknown_label = 0;  ///< not in the class table, and unknown_labels is ignore
   std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
+  std::size_t no_returns = 0;     ///< directions without a hit, which clear up to the sensor's range
   /// Labels not in the class table, whatever became of them (not part of the sum).
   std::size_t labels_not_in_table = 0;
 
@@ -31,7 +33,8 @@ struct PointCounts {
 /// A scan after filtering and down-sampling.
 struct Observation {
   LabelledPoints hits;
-  Beams beams;  ///< to each hit, then to the points where beams beyond max_range are cut
+  SoftLabels soft;  ///< of the hits; empty where each is of one class alone
+  Beams beams;      ///< to each hit, then to the points where beams beyond max_range are cut
   PointCounts counts;
 };
 
@@ -49,8 +52,12 @@ class Observer {
   void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t chunk, std::size_t first,
                   std::size_t last, PointCounts& counts);
 
+  /// Beams that met nothing, into the first chunk of the cut ones.
+  void addNoReturns(const Scan& scan);
+
   MapperConfig config_;
-  std::vector<PointCounts> counts_;  ///< of each chunk
+  std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels
+  std::vector<PointCounts> counts_;           ///< of each chunk
   Downsampler hits_, cut_;
   LabelledPoints cut_points_;
   Observation seen_;

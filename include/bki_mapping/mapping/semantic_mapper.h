@@ -11,6 +11,7 @@
 #include "bki_mapping/inference/map_updater.h"
 #include "bki_mapping/inference/occlusion.h"
 #include "bki_mapping/inference/point_evidence.h"
+#include "bki_mapping/inference/soft_point_evidence.h"
 #include "bki_mapping/mapping/observation.h"
 
 namespace bki_mapping {
@@ -42,7 +43,25 @@ class SemanticMapper {
   ScanStats integrate(const Scan& scan);
 
   /// Forgets all scans.
-  void reset() { map_.clear(); }
+  void reset();
+
+  /// Forgets the blocks for which forget(index) is true. @return their indices.
+  template <typename Forget>
+  std::vector<GridIndex> eraseBlocks(Forget&& forget) {
+    std::vector<GridIndex> gone;
+    for (const SemanticMap::Entry& entry : map_.entries()) {
+      if (!forget(entry.index)) continue;
+      gone.push_back(entry.index);
+      block_bytes_ -= entry.block->bytes();
+    }
+    for (const GridIndex& index : gone) map_.erase({index});
+    return gone;
+  }
+
+  /// The blocks that the last integrate() may have changed, made or erased; each once.
+  const std::vector<GridIndex>& touchedBlocks() const { return updater_.touched(); }
+  /// Memory of the map's blocks [bytes]; kept up from scan to scan, so asking costs nothing.
+  std::size_t blockBytes() const { return block_bytes_; }
 
   const SemanticMap& map() const { return map_; }
   const ClassTable& classes() const { return *classes_; }
@@ -55,11 +74,13 @@ class SemanticMapper {
   Workers workers_;
   Observer observer_;
   PointEvidence hits_;
+  SoftPointEvidence soft_hits_;
   LazyBeamField beams_;
   std::unique_ptr<FreeSpaceModel> free_space_;
   Occlusion occlusion_;
   MapUpdater updater_;
   std::vector<Evidence*> evidence_;
+  std::size_t block_bytes_ = 0;
 };
 
 }  // namespace bki_mapping
