@@ -1,18 +1,19 @@
 # catkin: dependencies, messages and what the package exports. Before any target, so that catkin places them.
 set(BKI_MAPPING_CATKIN_COMPONENTS
-  geometry_msgs message_generation nav_msgs nodelet pluginlib rosbag roscpp rosgraph_msgs sensor_msgs std_msgs
+  diagnostic_updater geometry_msgs message_generation nav_msgs nodelet pluginlib rosbag roscpp rosgraph_msgs sensor_msgs std_msgs
   std_srvs tf2 tf2_msgs tf2_ros visualization_msgs)
 find_package(catkin REQUIRED COMPONENTS ${BKI_MAPPING_CATKIN_COMPONENTS})
 find_package(pcl_conversions REQUIRED)  # headers only: its libraries are all of VTK
 
-add_message_files(FILES ClassInfo.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg)
+add_message_files(FILES BlockCoordinates.msg ClassInfo.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg
+  OccupancyUpdate.msg VoxelCloudUpdate.msg)
 add_service_files(FILES SaveMap.srv)
-generate_messages(DEPENDENCIES std_msgs)
+generate_messages(DEPENDENCIES sensor_msgs std_msgs)
 
 catkin_package(
   INCLUDE_DIRS include
   LIBRARIES bki_mapping_core bki_mapping_io bki_mapping_ros
-  CATKIN_DEPENDS geometry_msgs message_runtime nav_msgs nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs
+  CATKIN_DEPENDS diagnostic_updater geometry_msgs message_runtime nav_msgs nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs
     tf2 tf2_msgs tf2_ros visualization_msgs
   DEPENDS EIGEN3
 )

@@ -2,13 +2,26 @@
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 add_library(bki_mapping_ros SHARED
   src/ros/cloud_conversion.cpp
+  src/ros/color_reader.cpp
+  src/ros/input_config.cpp
+  src/ros/label_reader.cpp
+  src/ros/load_advice.cpp
+  src/ros/map_publishing.cpp
+  src/ros/mapping_diagnostics.cpp
   src/ros/mapping_server.cpp
+  src/ros/mapping_services.cpp
+  src/ros/no_returns.cpp
+  src/ros/point_field.cpp
+  src/ros/pose_source.cpp
   src/ros/publishers/cell_markers.cpp
   src/ros/publishers/occupancy.cpp
   src/ros/publishers/projected_map.cpp
   src/ros/publishers/registry.cpp
   src/ros/publishers/trajectory.cpp
   src/ros/publishers/voxel_cloud.cpp
+  src/ros/scan_ledger.cpp
+  src/ros/scan_reader.cpp
+  src/ros/score_reader.cpp
   src/ros/server_config.cpp
   src/tools/sequence_messages.cpp
 )

@@ -46,18 +46,55 @@ TEST(ServerConfig, SetsBothKindsAndRefusesBothKinds) {
 
 TEST(Documents, HaveARowForEachServerParameter) {
   const std::string document = textOf(kRoot / "docs/parameters.md");
-  for (const auto& p : serverParameters()) {
-    const std::string row = "| `" + p.name + "` | `" + p.get(ServerConfig()) + "` | " + p.unit + " | " +
-                            p.values + " | " + p.description + " |\n";
+  const auto expectRow = [&](const auto& p, const std::string& value) {
+    const std::string row = "| `" + p.name + "` | `" + value + "` | " + p.unit + " | " + p.values + " | " +
+                            p.description + " |\n";
     EXPECT_NE(document.find(row), std::string::npos) << "docs/parameters.md lacks\n" << row;
+  };
+  for (const auto& p : serverParameters()) expectRow(p, p.get(ServerConfig()));
+  for (const auto& p : inputParameters()) expectRow(p, p.get(InputConfig()));
+}
+
+TEST(ServerConfig, InputsTakeOverWhatTheyDoNotSet) {
+  ServerConfig server;
+  MapperConfig mapper;
+  setParameters({{"label_field", "class"}, {"sensor_model/max_range", "50"}}, server, mapper);
+  ASSERT_EQ(allInputs(server, mapper).size(), 1u);
+  EXPECT_EQ(allInputs(server, mapper)[0].topic, "cloud_in");
+  EXPECT_EQ(allInputs(server, mapper)[0].label_field, "class");
+  setParameters({{"inputs/front/topic", "/front/points"},
+                 {"inputs/front/max_range", "20"},
+                 {"inputs/rear/label_encoding", "bgr"},
+                 {"clear_no_returns", "true"}},
+                server, mapper);
+  const std::vector<InputConfig> inputs = allInputs(server, mapper);
+  ASSERT_EQ(inputs.size(), 2u);
+  EXPECT_EQ(inputs[0].topic, "/front/points");
+  EXPECT_EQ(inputs[0].sensor_model.max_range, 20.0);
+  EXPECT_EQ(inputs[0].label_field, "class");
+  EXPECT_EQ(inputs[1].topic, "rear");
+  EXPECT_EQ(inputs[1].sensor_model.max_range, 50.0);
+  EXPECT_EQ(inputs[1].label_encoding, LabelEncoding::kBgr);
+  EXPECT_TRUE(inputs[1].clear_no_returns);
+  try {
+    setParameters({{"inputs/front/label_encodin", "rgb"}, {"inputs/rear/max_range", "-2"}}, server, mapper);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    const std::string text = fault.what();
+    EXPECT_NE(text.find("did you mean 'inputs/front/label_encoding'"), std::string::npos) << text;
+    EXPECT_NE(text.find("-2"), std::string::npos) << text;
   }
+  ServerConfig unlimited;
+  EXPECT_THROW(
+      setParameters({{"clear_no_returns", "true"}, {"sensor_model/max_range", "-1"}}, unlimited, mapper),
+      std::invalid_argument);
 }
 
 /// Topics and services as the code names them: the first text in advertise, advertiseService and subscribe.
 std::set<std::string> namesInCode() {
   std::set<std::string> names;
   const std::regex call(
-      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>)\((?:context, )?"([\w/]+)")re");
+      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>)\( ?(?:context, )?"([\w/]+)")re");
   for (const auto& entry : fs::recursive_directory_iterator(kRoot / "src/ros")) {
     if (!entry.is_regular_file()) continue;
     const std::string text = std::regex_replace(textOf(entry.path()), std::regex("\\s+"), " ");
@@ -68,10 +105,12 @@ std::set<std::string> namesInCode() {
 
 TEST(Documents, NameEveryTopicAndService) {
   const std::string document = textOf(kRoot / "docs/ros.md");
-  const std::set<std::string> names = namesInCode();
-  EXPECT_EQ(names, (std::set<std::string>{"cloud_in", "free_cells_vis_array", "occupancy",
-                                          "occupied_cells_vis_array", "projected_map", "reset", "save_map",
-                                          "status", "trajectory", "voxel_cloud"}));
+  std::set<std::string> names = namesInCode();
+  EXPECT_EQ(names, (std::set<std::string>{"free_cells_vis_array", "occupancy", "occupancy_updates",
+                                          "occupied_cells_vis_array", "pause", "projected_map", "publish_map",
+                                          "reset", "resume", "save_map", "status", "trajectory",
+                                          "voxel_cloud", "voxel_cloud_updates"}));
+  names.insert(InputConfig().topic);
   for (const std::string& name : names) {
     const bool known = document.find("| `" + name + "` |") != std::string::npos ||
                        document.find("| `~" + name + "` |") != std::string::npos;

@@ -1,10 +1,6 @@
 #include "bki_mapping/ros/mapping_server.h"
 
-#include <algorithm>
-
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/ros/cloud_conversion.h"
 #include "bki_mapping/ros/pose_conversion.h"
 
 namespace bki_mapping::ros_shell {
@@ -25,173 +21,193 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   mapper_ = std::make_unique<SemanticMapper>(
       mapper_config, std::make_shared<const ClassTable>(loadClassTable(config_.classes)));
 
-  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node_);
-  publishers_ = makePublishers({node_, config_, [this] { publish_due_ = true; }});
+  poses_ = std::make_unique<PoseSource>(node_);
+  publishing_ =
+      std::make_unique<MapPublishing>(PublisherContext{node_, config_, [this] { return snapshot(); }});
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
-  reset_service_ = private_node_.advertiseService("reset", &MappingServer::onReset, this);
-  save_service_ = private_node_.advertiseService("save_map", &MappingServer::onSaveMap, this);
-  // No limit here: the queue that counts what it drops is waiting_, and it takes clouds over between scans.
-  cloud_subscriber_ = node_.subscribe("cloud_in", 0, &MappingServer::onCloud, this);
-  publishStatus(std_msgs::Header(), false);
-  ROS_INFO("Mapping %s into frame '%s' with free_space/mode %s, %g m voxels",
-           cloud_subscriber_.getTopic().c_str(), config_.frame_id.c_str(),
-           mapper_config.free_space.mode.c_str(), mapper_config.resolution);
+  diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
+  offerServices();
+  subscribe();
+  status_publisher_.publish(status());
   thread_ = std::thread(&MappingServer::work, this);
 }
 
 MappingServer::~MappingServer() {
   running_ = false;
   thread_.join();
-  ROS_INFO(
-      "Mapped %lu of %lu clouds; dropped: %lu without a transform, %lu bad, %lu empty, %lu from the full "
-      "queue",
-      status_.integrated, status_.received, status_.dropped_no_transform, status_.dropped_bad_cloud,
-      status_.dropped_empty, status_.dropped_queue_full);
+  ROS_INFO("%s", ledger_.summary().c_str());
+}
+
+void MappingServer::subscribe() {
+  for (const InputConfig& input : allInputs(config_, mapper_->config())) {
+    const std::size_t number = readers_.size();
+    readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
+    // No limit here: the queue that counts what it drops is waiting_, and it takes clouds over between scans.
+    const boost::function<void(const CloudEvent&)> call = [this, number](const CloudEvent& event) {
+      onCloud(number, event);
+    };
+    cloud_subscribers_.push_back(node_.subscribe<sensor_msgs::PointCloud2>(input.topic, 0, call));
+    ROS_INFO("Mapping %s into frame '%s' with free_space/mode %s, %g m voxels",
+             cloud_subscribers_.back().getTopic().c_str(), config_.frame_id.c_str(),
+             mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
+  }
+  warned_of_origin_.assign(readers_.size(), false);
 }
 
 void MappingServer::work() {
   while (running_) {
-    queue_.callAvailable(ros::WallDuration(waiting_.empty() ? kIdleWait : kTransformWait));
+    queue_.callOne(ros::WallDuration(waiting_.size() == 0 ? kIdleWait : kTransformWait));
+    // Messages first, so that the queue that counts holds every cloud; but a flood of them must not keep
+    // the mapper from mapping.
+    for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
+    checkClock();
     processQueue();
-    publishMaps();
+    publishing_->publishDue(snapshot());
+    diagnostics_->update([this] { return status(); }, mapper_->config());
   }
 }
 
-void MappingServer::onCloud(const sensor_msgs::PointCloud2ConstPtr& cloud) {
-  ++status_.received;
-  waiting_.push_back({cloud, Clock::now()});
-  if (waiting_.size() > static_cast<std::size_t>(config_.queue_size)) {
-    const auto oldest = waiting_.front().cloud;
-    waiting_.pop_front();
-    drop(*oldest, DropReason::kQueueFull,
+void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
+  const sensor_msgs::PointCloud2ConstPtr& cloud = event.getConstMessage();
+  const auto now = Clock::now();
+  ledger_.received(now);
+  checkClock();
+  const ros::Time& stamp = cloud->header.stamp;
+  if (time_watch_.stampsWentBack(input, stamp)) onTimeJump(stamp, "the stamps of clouds went back");
+  if (paused_) return drop(*cloud, DropReason::kPaused, "mapping is paused; call ~resume to go on");
+  // It has waited for this call while the last scan was mapped.
+  const double since = std::max(0.0, ros::Time::now().toSec() - event.getReceiptTime().toSec());
+  const auto received =
+      now - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::min(since, 60.0)));
+  const auto most = static_cast<std::size_t>(config_.queue_size);
+  if (const auto given_up = waiting_.push({cloud, input, received}, most, config_.queue_policy)) {
+    drop(*given_up->cloud, DropReason::kQueueFull,
          "queue_size " + std::to_string(config_.queue_size) +
-             " is reached: clouds come faster than they are mapped; use a faster free_space/mode, a coarser "
-             "resolution or fewer clouds");
+             " is reached: clouds come faster than they are mapped, or wait for transforms; use a faster "
+             "free_space/mode, a coarser resolution or fewer clouds, or check tf");
   }
 }
 
 void MappingServer::processQueue() {
-  if (waiting_.empty()) return;
-  const WaitingCloud& next = waiting_.front();
-  const std_msgs::Header& header = next.cloud->header;
-  std::string why;
-  const bool found = tf_buffer_.canTransform(config_.frame_id, header.frame_id, header.stamp, &why);
-  const std::chrono::duration<double> waited = Clock::now() - next.received;
-  if (!found && waited.count() < config_.tf_timeout) return;
-  const sensor_msgs::PointCloud2ConstPtr cloud = next.cloud;
-  waiting_.pop_front();
-  if (!found) {
-    drop(*cloud, DropReason::kNoTransform,
-         "no transform from '" + header.frame_id + "' to '" + config_.frame_id + "' came within tf_timeout " +
-             numberText(config_.tf_timeout) + " s; publish that transform, or set frame_id or tf_timeout (" +
-             why + ")");
-    return;
-  }
-  integrate(*cloud, tf_buffer_.lookupTransform(config_.frame_id, header.frame_id, header.stamp));
+  const auto now = Clock::now();
+  const auto next = waiting_.takeIf([&](const WaitingCloud& waiting) {
+    const std::chrono::duration<double> waited = now - waiting.received;
+    return waited.count() >= config_.tf_timeout || readers_[waiting.input].ready(*waiting.cloud, *poses_);
+  });
+  if (!next) return;
+  map(*next);
 }
 
-void MappingServer::integrate(const sensor_msgs::PointCloud2& cloud,
-                              const geometry_msgs::TransformStamped& pose) {
+void MappingServer::map(const WaitingCloud& waiting) {
+  const sensor_msgs::PointCloud2& cloud = *waiting.cloud;
   if (cloud.width == 0 || cloud.height == 0) {
-    drop(cloud, DropReason::kEmpty, "it has no points; check the sensor");
-    return;
+    return drop(cloud, DropReason::kEmpty, "it has no points; check the sensor");
   }
-  ScanStats stats;
+  if (config_.memory_limit > 0.0 && static_cast<double>(mapper_->blockBytes()) > 1e6 * config_.memory_limit) {
+    return drop(cloud, DropReason::kMemory,
+                "the map holds " + std::to_string(mapper_->blockBytes() / 1000000) +
+                    " MB, more than memory_limit; raise it, set window, or call ~reset");
+  }
   try {
-    CloudContent content = readCloud(cloud, config_.label_field);
-    const Scan scan = scanFromSensorFrame(toIsometry(pose.transform), content.points,
-                                          std::move(content.labels), cloud.header.stamp.toNSec());
-    stats = mapper_->integrate(scan);
+    const auto placed = readers_[waiting.input].read(cloud, *poses_);
+    if (const auto* missing = std::get_if<MissingPose>(&placed)) {
+      return drop(cloud, missing->reason,
+                  missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
+    }
+    integrate(waiting, std::get<PlacedScan>(placed));
   } catch (const std::invalid_argument& fault) {
     drop(cloud, DropReason::kBadCloud,
-         std::string(fault.what()) + "; check the cloud's source and label_field");
-    return;
+         std::string(fault.what()) + "; check the cloud's source and the settings of the input");
   }
-  ++status_.integrated;
-  status_.points_dropped += stats.counts.points - stats.counts.used;
-  status_.labels_not_in_table += stats.counts.labels_not_in_table;
-  status_.integration_ms = static_cast<float>(stats.totalMs());
-  map_stamp_ = cloud.header.stamp;
+}
+
+void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
+  const ScanStats stats = mapper_->integrate(placed.scan);
+  const std_msgs::Header& header = waiting.cloud->header;
+  const auto now = Clock::now();
+  ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
+  ledger_.unknownLabels(placed.unknown_labels);
+  if (readers_[waiting.input].originDoubtful(*waiting.cloud) && !warned_of_origin_[waiting.input]) {
+    warned_of_origin_[waiting.input] = true;
+    ROS_WARN(
+        "Clouds of %s are in the map frame '%s', so that beams start at its origin; set sensor_frame_id to "
+        "the sensor's frame",
+        cloud_subscribers_[waiting.input].getTopic().c_str(), config_.frame_id.c_str());
+  }
+  map_stamp_ = header.stamp;
+  sensor_ = placed.scan.origin;
+  appendPose(header, placed.T_map_sensor);
+  publishing_->changed(mapper_->touchedBlocks());
+  moveWindow();
+  status_publisher_.publish(status());
+}
+
+void MappingServer::appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor) {
   geometry_msgs::PoseStamped sensor;
   sensor.header.frame_id = config_.frame_id;
-  sensor.header.stamp = cloud.header.stamp;
-  sensor.pose.position.x = pose.transform.translation.x;
-  sensor.pose.position.y = pose.transform.translation.y;
-  sensor.pose.position.z = pose.transform.translation.z;
-  sensor.pose.orientation = pose.transform.rotation;
+  sensor.header.stamp = header.stamp;
+  sensor.pose = toPose(T_map_sensor);
+  // A robot that stands still for hours needs one pose, not all.
+  if (trajectory_.size() > 1) {
+    const auto& last = trajectory_[trajectory_.size() - 2].pose.position;
+    const Eigen::Vector3d moved = T_map_sensor.translation() - Eigen::Vector3d(last.x, last.y, last.z);
+    if (moved.norm() < mapper_->config().resolution) trajectory_.pop_back();
+  }
   trajectory_.push_back(sensor);
-  publish_due_ = true;
-  publishStatus(cloud.header, true);
+}
+
+void MappingServer::moveWindow() {
+  if (config_.window <= 0.0) return;
+  const GridGeometry& geometry = mapper_->map().geometry();
+  const double reach = 0.5 * (config_.window + geometry.blockSize());
+  publishing_->changed(mapper_->eraseBlocks([&](const BlockIndex& block) {
+    return (geometry.blockCentre(block) - sensor_).cwiseAbs().maxCoeff() > reach;
+  }));
+}
+
+void MappingServer::checkClock() {
+  if (time_watch_.clockWentBack()) onTimeJump(ros::Time::now(), "/clock went back");
+}
+
+void MappingServer::onTimeJump(const ros::Time& new_time, const std::string& what) {
+  ledger_.timeJumped();
+  time_watch_.restart();
+  poses_->restart(new_time);
+  const std::size_t waited = waiting_.size();
+  while (const auto waiting = waiting_.takeIf([](const WaitingCloud&) { return true; })) {
+    drop(*waiting->cloud, DropReason::kTimeJump, "time jumped back while it waited");
+  }
+  const bool forget = config_.on_time_jump == OnTimeJump::kReset;
+  if (forget) reset();
+  ROS_WARN(
+      "Time jumped back (%s): old transforms and %lu waiting clouds are dropped, the map is %s "
+      "(on_time_jump)",
+      what.c_str(), waited, forget ? "reset" : "kept");
 }
 
 void MappingServer::drop(const sensor_msgs::PointCloud2& cloud, DropReason reason, const std::string& why) {
-  switch (reason) {
-    case DropReason::kNoTransform:
-      ++status_.dropped_no_transform;
-      break;
-    case DropReason::kBadCloud:
-      ++status_.dropped_bad_cloud;
-      break;
-    case DropReason::kEmpty:
-      ++status_.dropped_empty;
-      break;
-    case DropReason::kQueueFull:
-      ++status_.dropped_queue_full;
-      break;
-  }
+  ledger_.dropped(cloud.header, reason);
   const auto said = last_said_.find(reason);
   if (said == last_said_.end() || Clock::now() - said->second >= kSayAgainAfter) {
     last_said_[reason] = Clock::now();
     ROS_WARN("Dropped the cloud of time %.3f: %s", cloud.header.stamp.toSec(), why.c_str());
   }
-  publishStatus(cloud.header, false);
+  status_publisher_.publish(status());
 }
 
-void MappingServer::publishStatus(const std_msgs::Header& header, bool integrated) {
-  status_.header = header;
-  status_.integrated_last = integrated;
-  status_.waiting = waiting_.size();
-  status_.blocks = static_cast<std::uint32_t>(mapper_->map().size());
-  status_.map_bytes = mapper_->map().bytes();
-  status_publisher_.publish(status_);
+MappingStatus MappingServer::status() {
+  MappingStatus status = ledger_.status(Clock::now());
+  status.paused = paused_;
+  status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
+  status.map_bytes = mapper_->blockBytes();
+  return status;
 }
 
-void MappingServer::publishMaps() {
-  const std::chrono::duration<double> since = Clock::now() - last_publish_;
-  if (!publish_due_ || since.count() < 1.0 / config_.publish_rate) return;
-  publish_due_ = false;
-  MapSnapshot snapshot{std_msgs::Header(), *mapper_, trajectory_};
+MapSnapshot MappingServer::snapshot() const {
+  MapSnapshot snapshot{std_msgs::Header(), *mapper_, trajectory_, config_, sensor_};
   snapshot.header.frame_id = config_.frame_id;
   snapshot.header.stamp = map_stamp_;
-  for (const auto& publisher : publishers_) {
-    if (publisher->wanted()) publisher->publish(snapshot);
-  }
-  last_publish_ = Clock::now();
-}
-
-bool MappingServer::onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-  mapper_->reset();
-  trajectory_.clear();
-  publish_due_ = true;
-  ROS_INFO("The map was reset");
-  return true;
-}
-
-bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& response) {
-  try {
-    if (request.path.empty() || request.path.front() != '/') {
-      throw std::invalid_argument("path '" + request.path + "' must be absolute");
-    }
-    const std::string include = request.include.empty() ? "occupied" : request.include;
-    exportMap(request.path, mapper_->map(), mapper_->classes(), parseStates(include));
-    response.success = true;
-    response.message = "wrote " + request.path + " (" + include + ")";
-  } catch (const std::exception& fault) {
-    response.success = false;
-    response.message = fault.what();
-  }
-  ROS_INFO("save_map: %s", response.message.c_str());
-  return true;
+  return snapshot;
 }
 
 }  // namespace bki_mapping::ros_shell

@@ -30,6 +30,12 @@ def program(name, package='bki_mapping'):
     return roslib.packages.find_node(package, name)[0]
 
 
+def adds_up(status):
+    """Whether a MappingStatus accounts for every cloud."""
+    dropped = sum(getattr(status, name) for name in status.__slots__ if name.startswith('dropped_'))
+    return status.received == status.integrated + status.waiting + dropped
+
+
 class Listener:
     """Keeps the messages of one topic."""
 
@@ -78,10 +84,11 @@ def make_cloud(points, labels, stamp, frame='sensor', label_type=PointField.UINT
 class Robot:
     """Publishes clouds of a sensor and its pose."""
 
-    def __init__(self, cloud_topic='cloud_in'):
+    def __init__(self, cloud_topic='cloud_in', frame='sensor'):
         self.clouds = rospy.Publisher(cloud_topic, PointCloud2, queue_size=100)
         self.poses = rospy.Publisher('/tf', TFMessage, queue_size=100)
         self.seconds = 100
+        self.frame = frame
 
     def connect(self):
         wait_until(lambda: self.clouds.get_num_connections() > 0, 'the mapper subscribing to clouds')
@@ -95,7 +102,7 @@ class Robot:
         transform = TransformStamped()
         transform.header.stamp = stamp
         transform.header.frame_id = 'map'
-        transform.child_frame_id = 'sensor'
+        transform.child_frame_id = self.frame
         t = transform.transform.translation
         t.x, t.y, t.z = position
         half = 0.5 ** 0.5
@@ -107,5 +114,5 @@ class Robot:
         """Publishes a pose and a cloud; returns the stamp."""
         stamp = self.next_stamp()
         self.publish_pose(stamp, position, yaw_quarter_turns)
-        self.clouds.publish(make_cloud(points, labels, stamp, **options))
+        self.clouds.publish(make_cloud(points, labels, stamp, **{'frame': self.frame, **options}))
         return stamp

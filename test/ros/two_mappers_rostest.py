@@ -44,8 +44,9 @@ class TwoMappers(unittest.TestCase):
             lambda m: any(marker.colors for marker in m.markers), f'markers of {name}') for name in status}
         car = next(marker for marker in colors['coarse'].markers if marker.ns == 'car')
         self.assertAlmostEqual(car.colors[0].b, 245 / 255, places=5)
-        self.assertEqual((colors['fine'].markers[0].colors[0].r, colors['fine'].markers[0].colors[0].g), (0.0, 0.0))
-        self.assertAlmostEqual(colors['fine'].markers[0].colors[0].b, 0.525, places=2)
+        lowest = next(marker for marker in colors['fine'].markers if marker.colors).colors[0]
+        self.assertEqual((lowest.r, lowest.g), (0.0, 0.0))
+        self.assertAlmostEqual(lowest.b, 0.525, places=2)
 
         rospy.ServiceProxy('/coarse/mapping/reset', Empty)()
         occupancy['coarse'].wait_for(lambda m: not m.blocks, 'the coarse map being empty')

@@ -1,24 +1,26 @@
 /// @file The mapper as a ROS service: clouds and tf in, maps out. Node and nodelet are shells around it.
 #pragma once
 
-#include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/SaveMap.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Empty.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
+#include <std_srvs/Trigger.h>
 
 #include <atomic>
-#include <chrono>
-#include <deque>
 #include <map>
 #include <memory>
 #include <thread>
 #include <vector>
 
-#include "bki_mapping/ros/map_publisher.h"
+#include "bki_mapping/ros/map_publishing.h"
+#include "bki_mapping/ros/mapping_diagnostics.h"
+#include "bki_mapping/ros/pose_source.h"
+#include "bki_mapping/ros/scan_ledger.h"
+#include "bki_mapping/ros/scan_queue.h"
+#include "bki_mapping/ros/scan_reader.h"
+#include "bki_mapping/ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -34,45 +36,56 @@ class MappingServer {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct WaitingCloud {
-    sensor_msgs::PointCloud2ConstPtr cloud;
-    Clock::time_point received;
-  };
 
-  enum class DropReason { kNoTransform, kBadCloud, kEmpty, kQueueFull };
-
+  void subscribe();
+  void offerServices();
   void work();
-  void onCloud(const sensor_msgs::PointCloud2ConstPtr& cloud);
+
+  using CloudEvent = ros::MessageEvent<const sensor_msgs::PointCloud2>;
+  void onCloud(std::size_t input, const CloudEvent& event);
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&);
+  bool onPublishMap(std_srvs::Empty::Request&, std_srvs::Empty::Response&);
+  bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
+  bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
 
-  /// Deals with the first waiting cloud if its transform is there or has been waited for long enough.
+  /// Deals with the first waiting cloud whose transform is there or has been waited for long enough.
   void processQueue();
-  void integrate(const sensor_msgs::PointCloud2& cloud, const geometry_msgs::TransformStamped& T_map_sensor);
+  void map(const WaitingCloud& waiting);
+  void integrate(const WaitingCloud& waiting, const PlacedScan& placed);
+  void reset();
+  void checkClock();
+  void onTimeJump(const ros::Time& new_time, const std::string& what);
+  void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
+  /// Forgets blocks outside of the window about the sensor.
+  void moveWindow();
   /// Counts a cloud as dropped and says so, at most once in 5 s for each reason.
   void drop(const sensor_msgs::PointCloud2& cloud, DropReason reason, const std::string& why);
-  void publishStatus(const std_msgs::Header& header, bool integrated);
-  void publishMaps();
+  MappingStatus status();
+  MapSnapshot snapshot() const;
 
   ros::CallbackQueue queue_;
   ros::NodeHandle node_, private_node_;
   ServerConfig config_;
   std::unique_ptr<SemanticMapper> mapper_;
-  std::vector<geometry_msgs::PoseStamped> trajectory_;
-  MappingStatus status_;
+  std::vector<ScanReader> readers_;  ///< one an input
+  ScanLedger ledger_;
+  ScanQueue waiting_;
+  TimeWatch time_watch_;
+  bool paused_ = false;
+
   ros::Time map_stamp_;
+  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
+  std::vector<geometry_msgs::PoseStamped> trajectory_;
+  std::map<DropReason, Clock::time_point> last_said_;
+  std::vector<bool> warned_of_origin_;  ///< of each input
 
-  std::deque<WaitingCloud> waiting_;
-  std::map<DropReason, Clock::time_point> last_said_;  ///< by reason
-  bool publish_due_ = false;
-  Clock::time_point last_publish_;
-
-  tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
-  ros::Subscriber cloud_subscriber_;
-  ros::ServiceServer reset_service_, save_service_;
+  std::unique_ptr<PoseSource> poses_;
+  std::vector<ros::Subscriber> cloud_subscribers_;
+  std::vector<ros::ServiceServer> services_;
   ros::Publisher status_publisher_;
-  std::vector<std::unique_ptr<MapPublisher>> publishers_;
+  std::unique_ptr<MapPublishing> publishing_;
+  std::unique_ptr<MappingDiagnostics> diagnostics_;
 
   std::atomic<bool> running_{true};
   std::thread thread_;

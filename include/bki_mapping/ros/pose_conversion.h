@@ -1,6 +1,7 @@
 /// @file Poses between tf and Eigen.
 #pragma once
 
+#include <geometry_msgs/Pose.h>
 #include <geometry_msgs/Transform.h>
 
 #include <Eigen/Geometry>
@@ -27,6 +28,16 @@ inline geometry_msgs::Transform toTransform(const Eigen::Isometry3d& T) {
   t.rotation.y = q.y();
   t.rotation.z = q.z();
   return t;
+}
+
+inline geometry_msgs::Pose toPose(const Eigen::Isometry3d& T) {
+  const geometry_msgs::Transform t = toTransform(T);
+  geometry_msgs::Pose pose;
+  pose.position.x = t.translation.x;
+  pose.position.y = t.translation.y;
+  pose.position.z = t.translation.z;
+  pose.orientation = t.rotation;
+  return pose;
 }
 
 }  // namespace bki_mapping::ros_shell

@@ -10,6 +10,9 @@
 
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/ros/input_config.h"
+#include "bki_mapping/ros/scan_queue.h"
+#include "bki_mapping/ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -17,16 +20,29 @@ enum class ColorMode { kSemantics, kProbability, kVariance, kHeight };
 
 struct ServerConfig {
   std::string frame_id = "map";            ///< the map frame
-  std::string label_field = "label";       ///< field of clouds with labels; "": every point has label 0
   std::string classes = "semantic_kitti";  ///< name of a class table, or a file
   double tf_timeout = 0.5;                 ///< how long a cloud waits for its transform [s of wall time]
   int queue_size = 10;                     ///< clouds that may wait
-  double publish_rate = 2.0;               ///< maps a second, at most [Hz]
-  bool latch = false;                      ///< whether map topics are latched
+  QueuePolicy queue_policy = QueuePolicy::kDropOldest;
+  OnTimeJump on_time_jump = OnTimeJump::kKeep;
+  double memory_limit = 0.0;       ///< of the map's blocks [MB]; 0: none
+  double window = 0.0;             ///< edge of the cube about the sensor that is kept [m]; 0: everything is
+  double diagnostic_period = 1.0;  ///< [s]
+  double publish_rate = 2.0;       ///< maps a second, at most [Hz]
+  double view_range = 0.0;         ///< how far markers and voxel_cloud show [m]; 0: everything
+  bool latch = false;              ///< whether map topics are latched
   ColorMode color_mode = ColorMode::kSemantics;
   double occupancy_min_z = -1e6;  ///< of projected_map [m]
   double occupancy_max_z = 1e6;   ///< of projected_map [m]
+  /// Of all inputs that set nothing else; the only input where `inputs` names none.
+  InputConfig input;
+  /// Settings of each named input, by name: parameter and value. See allInputs.
+  std::map<std::string, std::map<std::string, std::string>> inputs;
 };
+
+/// The inputs with all their settings: what they do not set is that of `server.input`, and for ranges that of
+/// `mapper.sensor_model`.
+std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfig& mapper);
 
 /// The server's own parameters (the mapper's are in core/parameters.h).
 std::vector<NamedParameter<ServerConfig>> serverParameters();

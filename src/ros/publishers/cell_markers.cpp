@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "bki_mapping/core/map_query.h"
 #include "bki_mapping/core/voxel_color.h"
@@ -47,48 +48,120 @@ Color colorOf(const VoxelView& view, double z, ColorMode mode, const ClassTable&
   }
 }
 
-/// One CUBE_LIST a class, in a namespace with the class's name.
+/// A chunk is a cube of this many blocks a side.
+constexpr int kChunkEdge = 8;
+
+GridIndex chunkOf(const GridIndex& block) {
+  static_assert(kChunkEdge == kBlockEdge, "blocks lie in a chunk as voxels lie in a block");
+  return GridGeometry::blockOf({block});
+}
+
+/// Marker arrays in which each marker is the CUBE_LIST of one class in one chunk: namespace the class's name,
+/// id the chunk's number. Only chunks that changed are sent; a marker that became empty is deleted.
 class CellMarkers : public MapPublisher {
  public:
-  CellMarkers(const PublisherContext& context, const std::string& topic, VoxelState state, ColorMode mode,
-              float alpha)
-      : state_(state), mode_(mode), alpha_(alpha) {
-    publisher_ = context.advertise<visualization_msgs::MarkerArray>(topic);
+  using MarkerArray = visualization_msgs::MarkerArray;
+  using Marker = visualization_msgs::Marker;
+
+  CellMarkers(const PublisherContext& context, const std::string& topic, VoxelState state, float alpha)
+      : state_(state), alpha_(alpha) {
+    publisher_ = context.advertiseUpdates<MarkerArray>(
+        topic, *this,
+        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
   }
 
-  void publish(const MapSnapshot& snapshot) override {
-    const SemanticMapper& mapper = snapshot.mapper;
-    std::map<ClassId, visualization_msgs::Marker> markers;
-    for (const SemanticClass& c : mapper.classes().classes()) {
-      if (state_ == VoxelState::kOccupied) markers[c.id] = emptyMarker(snapshot, c.name);
-    }
-    if (state_ == VoxelState::kFree) markers[kFreeClass] = emptyMarker(snapshot, "free");
-    forEachKnownVoxel(mapper.map(), [&](const VoxelIndex& voxel, const VoxelView& view) {
-      if (view.state != state_) return;
-      const Eigen::Vector3d centre = mapper.map().geometry().voxelCentre(voxel);
-      visualization_msgs::Marker& marker = markers.at(view.label);
-      geometry_msgs::Point point;
-      point.x = centre.x();
-      point.y = centre.y();
-      point.z = centre.z();
-      marker.points.push_back(point);
-      marker.colors.push_back(rgba(colorOf(view, centre.z(), mode_, mapper.classes()), alpha_));
-    });
-    visualization_msgs::MarkerArray message;
-    for (auto& [id, marker] : markers) {
-      if (marker.points.empty()) marker.action = visualization_msgs::Marker::DELETE;
-      message.markers.push_back(std::move(marker));
-    }
-    publisher_.publish(message);
+  void rest() override {
+    MapPublisher::rest();
+    shown_.clear();
   }
 
  private:
-  visualization_msgs::Marker emptyMarker(const MapSnapshot& snapshot, const std::string& name) const {
-    visualization_msgs::Marker marker;
+  using Markers = std::map<ClassId, Marker>;
+
+  void publishNew(const MapSnapshot& snapshot) override {
+    if (changed.all()) {
+      publisher_.publish(whole(snapshot));
+      return;
+    }
+    IndexNumbering chunks;
+    for (const GridIndex& block : changed.blocks()) chunks.insert(chunkOf(block));
+    for (const GridIndex& chunk : chunks_.members()) {  // the sensor's view moves on
+      if (inView(chunk, snapshot) == (shown_.count(chunk) == 0)) chunks.insert(chunk);
+    }
+    MarkerArray message;
+    for (const GridIndex& chunk : chunks.members()) appendChunk(chunk, snapshot, message);
+    if (!message.markers.empty()) publisher_.publish(message);
+  }
+
+  MarkerArray whole(const MapSnapshot& snapshot) {
+    MarkerArray message;
+    message.markers.emplace_back();
+    message.markers.back().header = snapshot.header;
+    message.markers.back().action = Marker::DELETEALL;
+    message.markers.back().pose.orientation.w = 1.0;
+    shown_.clear();
+    for (const auto& entry : snapshot.mapper.map().entries()) chunks_.insert(chunkOf(entry.index));
+    for (const GridIndex& chunk : chunks_.members()) appendChunk(chunk, snapshot, message);
+    return message;
+  }
+
+  bool inView(const GridIndex& chunk, const MapSnapshot& snapshot) const {
+    const double edge = kChunkEdge * snapshot.mapper.map().geometry().blockSize();
+    return snapshot.inView(Eigen::Vector3d(chunk.x + 0.5, chunk.y + 0.5, chunk.z + 0.5) * edge, edge);
+  }
+
+  void appendChunk(const GridIndex& chunk, const MapSnapshot& snapshot, MarkerArray& message) {
+    const auto id = static_cast<std::int32_t>(chunks_.insert(chunk));
+    Markers markers;
+    const bool visible = inView(chunk, snapshot);
+    if (visible) fill(chunk, snapshot, markers);
+    const std::set<ClassId> before = std::move(shown_[chunk]);
+    shown_.erase(chunk);
+    for (const ClassId gone : before) {
+      if (markers.count(gone) > 0) continue;
+      message.markers.push_back(emptyMarker(snapshot, gone));
+      message.markers.back().action = Marker::DELETE;
+      message.markers.back().id = id;
+    }
+    if (visible) shown_[chunk];  // shown, if only as nothing
+    for (auto& [label, marker] : markers) {
+      marker.id = id;
+      shown_[chunk].insert(label);
+      message.markers.push_back(std::move(marker));
+    }
+  }
+
+  void fill(const GridIndex& chunk, const MapSnapshot& snapshot, Markers& markers) const {
+    const SemanticMap& map = snapshot.mapper.map();
+    for (int n = 0; n < kChunkEdge * kChunkEdge * kChunkEdge; ++n) {
+      const BlockIndex index{GridGeometry::voxelOf({chunk}, n)};
+      const Block* block = map.find(index);
+      for (int offset = 0; block && offset < kBlockVoxels; ++offset) {
+        const VoxelView view = judgeVoxel(map, *block, offset);
+        if (view.state != state_) continue;
+        auto place = markers.find(view.label);
+        if (place == markers.end()) {
+          place = markers.emplace(view.label, emptyMarker(snapshot, view.label)).first;
+        }
+        const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
+        geometry_msgs::Point point;
+        point.x = centre.x();
+        point.y = centre.y();
+        point.z = centre.z();
+        place->second.points.push_back(point);
+        place->second.colors.push_back(
+            rgba(colorOf(view, centre.z(), snapshot.config.color_mode, snapshot.mapper.classes()), alpha_));
+      }
+    }
+  }
+
+  Marker emptyMarker(const MapSnapshot& snapshot, ClassId label) const {
+    const SemanticClass* known = snapshot.mapper.classes().find(label);
+    Marker marker;
     marker.header = snapshot.header;
-    marker.ns = name;
-    marker.type = visualization_msgs::Marker::CUBE_LIST;
-    marker.action = visualization_msgs::Marker::ADD;
+    marker.ns = known ? known->name : "free";
+    marker.type = Marker::CUBE_LIST;
+    marker.action = Marker::ADD;
     marker.pose.orientation.w = 1.0;
     const double edge = snapshot.mapper.map().geometry().resolution();
     marker.scale.x = marker.scale.y = marker.scale.z = edge;
@@ -97,20 +170,19 @@ class CellMarkers : public MapPublisher {
   }
 
   VoxelState state_;
-  ColorMode mode_;
   float alpha_;
+  IndexNumbering chunks_;                         ///< every chunk ever seen; its number is its id
+  std::map<GridIndex, std::set<ClassId>> shown_;  ///< what listeners hold: classes of each chunk in view
 };
 
 }  // namespace
 
 std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context) {
-  return std::make_unique<CellMarkers>(context, "occupied_cells_vis_array", VoxelState::kOccupied,
-                                       context.config.color_mode, 1.0f);
+  return std::make_unique<CellMarkers>(context, "occupied_cells_vis_array", VoxelState::kOccupied, 1.0f);
 }
 
 std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context) {
-  return std::make_unique<CellMarkers>(context, "free_cells_vis_array", VoxelState::kFree,
-                                       context.config.color_mode, 0.1f);
+  return std::make_unique<CellMarkers>(context, "free_cells_vis_array", VoxelState::kFree, 0.1f);
 }
 
 }  // namespace bki_mapping::ros_shell

@@ -16,10 +16,11 @@ class ProjectedMap : public MapPublisher {
  public:
   explicit ProjectedMap(const PublisherContext& context)
       : min_z_(context.config.occupancy_min_z), max_z_(context.config.occupancy_max_z) {
-    publisher_ = context.advertise<nav_msgs::OccupancyGrid>("projected_map");
+    publisher_ = context.advertiseWhole<nav_msgs::OccupancyGrid>("projected_map", *this);
   }
 
-  void publish(const MapSnapshot& snapshot) override {
+ private:
+  void publishNew(const MapSnapshot& snapshot) override {
     const SemanticMap& map = snapshot.mapper.map();
     nav_msgs::OccupancyGrid grid;
     grid.header = snapshot.header;
@@ -30,7 +31,6 @@ class ProjectedMap : public MapPublisher {
     publisher_.publish(grid);
   }
 
- private:
   void fill(const SemanticMap& map, nav_msgs::OccupancyGrid& grid) const {
     BlockIndex low = map.entries().front().index, high = low;
     for (const auto& entry : map.entries()) {

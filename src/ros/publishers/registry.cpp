@@ -7,9 +7,11 @@ std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext
   publishers.push_back(makeOccupiedCells(context));  // occupied_cells_vis_array
   publishers.push_back(makeFreeCells(context));      // free_cells_vis_array
   publishers.push_back(makeVoxelCloud(context));     // voxel_cloud
-  publishers.push_back(makeProjectedMap(context));   // projected_map
-  publishers.push_back(makeOccupancy(context));      // occupancy
-  publishers.push_back(makeTrajectory(context));     // trajectory
+  publishers.push_back(makeVoxelCloudUpdates(context));
+  publishers.push_back(makeProjectedMap(context));  // projected_map
+  publishers.push_back(makeOccupancy(context));     // occupancy
+  publishers.push_back(makeOccupancyUpdates(context));
+  publishers.push_back(makeTrajectory(context));  // trajectory
   return publishers;
 }
 

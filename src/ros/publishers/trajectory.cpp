@@ -5,14 +5,15 @@
 namespace bki_mapping::ros_shell {
 namespace {
 
-/// Where the sensor was at each integrated scan.
+/// Where the sensor was at integrated scans.
 class Trajectory : public MapPublisher {
  public:
   explicit Trajectory(const PublisherContext& context) {
-    publisher_ = context.advertise<nav_msgs::Path>("trajectory");
+    publisher_ = context.advertiseWhole<nav_msgs::Path>("trajectory", *this);
   }
 
-  void publish(const MapSnapshot& snapshot) override {
+ private:
+  void publishNew(const MapSnapshot& snapshot) override {
     nav_msgs::Path path;
     path.header = snapshot.header;
     path.poses = snapshot.trajectory;

@@ -1,3 +1,4 @@
+#include <bki_mapping/VoxelCloudUpdate.h>
 #include <pcl_conversions/pcl_conversions.h>
 #include <sensor_msgs/PointCloud2.h>
 
@@ -8,28 +9,104 @@
 namespace bki_mapping::ros_shell {
 namespace {
 
-/// All known voxels as points, with the fields of the PCD file.
+/// The known voxels of blocks, as points with the fields of the PCD file.
+class CloudBuilder {
+ public:
+  explicit CloudBuilder(const MapSnapshot& snapshot) : snapshot_(snapshot) {}
+
+  void add(const BlockIndex& index, const Block& block) {
+    appendVoxels(snapshot_.mapper.map(), snapshot_.mapper.classes(),
+                 {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}, index, block, voxels_);
+  }
+  void addAll(bool in_view) {
+    for (const auto& [index, block] : sortedBlocks(snapshot_.mapper.map())) {
+      if (!in_view || snapshot_.inView(index)) add(index, *block);
+    }
+  }
+  sensor_msgs::PointCloud2 cloud() const {
+    pcl::PCLPointCloud2 cloud = toPcl(voxels_);
+    sensor_msgs::PointCloud2 message;
+    pcl_conversions::moveFromPCL(cloud, message);
+    message.header = snapshot_.header;
+    return message;
+  }
+
+ private:
+  const MapSnapshot& snapshot_;
+  std::vector<VoxelRecord> voxels_;
+};
+
 class VoxelCloud : public MapPublisher {
  public:
   explicit VoxelCloud(const PublisherContext& context) {
-    publisher_ = context.advertise<sensor_msgs::PointCloud2>("voxel_cloud");
+    publisher_ = context.advertiseWhole<sensor_msgs::PointCloud2>("voxel_cloud", *this);
   }
 
-  void publish(const MapSnapshot& snapshot) override {
-    const auto voxels = collectVoxels(snapshot.mapper.map(), snapshot.mapper.classes(),
-                                      {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded});
-    pcl::PCLPointCloud2 cloud = toPcl(voxels);
-    sensor_msgs::PointCloud2 message;
-    pcl_conversions::moveFromPCL(cloud, message);
-    message.header = snapshot.header;
+ private:
+  void publishNew(const MapSnapshot& snapshot) override {
+    CloudBuilder builder(snapshot);
+    builder.addAll(true);
+    publisher_.publish(builder.cloud());
+  }
+};
+
+class VoxelCloudUpdates : public MapPublisher {
+ public:
+  explicit VoxelCloudUpdates(const PublisherContext& context) {
+    publisher_ = context.advertiseUpdates<VoxelCloudUpdate>(
+        "voxel_cloud_updates", *this,
+        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
+  }
+
+ private:
+  void publishNew(const MapSnapshot& snapshot) override {
+    ++sequence_;
+    if (changed.all()) {
+      publisher_.publish(whole(snapshot));
+      return;
+    }
+    VoxelCloudUpdate message = start(snapshot);
+    CloudBuilder builder(snapshot);
+    message.blocks.reserve(changed.blocks().size());
+    for (const GridIndex& index : changed.blocks()) {
+      message.blocks.emplace_back();
+      message.blocks.back().x = index.x;
+      message.blocks.back().y = index.y;
+      message.blocks.back().z = index.z;
+      if (const Block* block = snapshot.mapper.map().find({index})) builder.add({index}, *block);
+    }
+    message.cloud = builder.cloud();
     publisher_.publish(message);
   }
+
+  VoxelCloudUpdate start(const MapSnapshot& snapshot) const {
+    VoxelCloudUpdate message;
+    message.header = snapshot.header;
+    message.sequence = sequence_;
+    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    return message;
+  }
+
+  VoxelCloudUpdate whole(const MapSnapshot& snapshot) const {
+    VoxelCloudUpdate message = start(snapshot);
+    message.whole = true;
+    CloudBuilder builder(snapshot);
+    builder.addAll(false);
+    message.cloud = builder.cloud();
+    return message;
+  }
+
+  std::uint64_t sequence_ = 0;
 };
 
 }  // namespace
 
 std::unique_ptr<MapPublisher> makeVoxelCloud(const PublisherContext& context) {
   return std::make_unique<VoxelCloud>(context);
+}
+
+std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& context) {
+  return std::make_unique<VoxelCloudUpdates>(context);
 }
 
 }  // namespace bki_mapping::ros_shell

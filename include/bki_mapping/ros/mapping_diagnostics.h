@@ -1,0 +1,52 @@
+/// @file The mapper's health on /diagnostics.
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+
+#include <chrono>
+#include <string>
+
+#include "bki_mapping/core/config.h"
+#include "bki_mapping/ros/scan_ledger.h"
+
+namespace bki_mapping::ros_shell {
+
+/// Level and message of a status: the level is one of diagnostic_msgs/DiagnosticStatus.
+struct Health {
+  std::uint8_t level = 0;
+  std::string message;
+};
+
+/// Judges the time between two reports.
+/// - ERROR: clouds came and none was integrated.
+/// - WARN: clouds were dropped, mapping is slower than clouds come, is paused, or no cloud has come.
+Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config);
+
+/// Reports every `period`.
+class MappingDiagnostics {
+ public:
+  /// @param name of the diagnostic status, as rqt_robot_monitor shows it. @param period [s of wall time].
+  MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, double period);
+
+  /// Reports if it is time to.
+  /// @param status asked for only then.
+  template <typename Status>
+  void update(Status&& status, const MapperConfig& config) {
+    const auto now = std::chrono::steady_clock::now();
+    if (std::chrono::duration<double>(now - last_).count() < period_) return;
+    last_ = now;
+    report(status(), config);
+  }
+
+ private:
+  void report(const MappingStatus& status, const MapperConfig& config);
+  void fill(diagnostic_updater::DiagnosticStatusWrapper& out) const;
+
+  diagnostic_updater::Updater updater_;
+  double period_;
+  std::chrono::steady_clock::time_point last_;
+  MappingStatus before_, now_;
+  Health health_;
+};
+
+}  // namespace bki_mapping::ros_shell

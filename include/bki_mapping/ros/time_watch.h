@@ -1,0 +1,44 @@
+/// @file Notices when time jumps back.
+#pragma once
+
+#include <ros/time.h>
+
+#include <vector>
+
+namespace bki_mapping::ros_shell {
+
+enum class OnTimeJump { kKeep, kReset };
+
+/// Watches /clock, and the stamps of each input for players that publish none.
+class TimeWatch {
+ public:
+  /// A cloud may be this much older than the one before it without time having jumped [s].
+  static constexpr double kOutOfOrder = 1.0;
+
+  /// @return whether simulated time went back since the last call.
+  bool clockWentBack() { return ros::Time::isSimTime() && clockWentBack(ros::Time::now()); }
+  bool clockWentBack(const ros::Time& now) {
+    const bool back = now < clock_;
+    clock_ = now;
+    return back;
+  }
+
+  /// @return whether the stamps of an input went back by more than clouds out of order do. A stamp of 0 says
+  /// nothing.
+  bool stampsWentBack(std::size_t input, const ros::Time& stamp) {
+    if (input >= latest_.size()) latest_.resize(input + 1);
+    if (stamp.isZero()) return false;
+    const bool back = stamp.toSec() + kOutOfOrder < latest_[input].toSec();
+    if (back || stamp > latest_[input]) latest_[input] = stamp;
+    return back;
+  }
+
+  /// Time starts anew.
+  void restart() { latest_.clear(); }
+
+ private:
+  ros::Time clock_;
+  std::vector<ros::Time> latest_;  ///< stamp of each input
+};
+
+}  // namespace bki_mapping::ros_shell

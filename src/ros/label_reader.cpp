@@ -1,0 +1,58 @@
+#include "bki_mapping/ros/label_reader.h"
+
+#include "bki_mapping/ros/color_reader.h"
+#include "bki_mapping/ros/point_field.h"
+#include "bki_mapping/ros/score_reader.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// Every point has the label 0.
+class NoLabels : public LabelReader {
+ public:
+  void append(const std::uint8_t*, CloudLabels& out) override { out.labels.push_back(0); }
+};
+
+/// A field of any datatype with the label number.
+class NumberReader : public LabelReader {
+ public:
+  NumberReader(const sensor_msgs::PointCloud2& cloud, const std::string& field, const ClassTable& classes,
+               LabelValues values)
+      : field_(cloud, field), classes_(classes), values_(values) {}
+
+  void append(const std::uint8_t* point, CloudLabels& out) override {
+    const std::uint32_t label = field_.label(point);
+    if (label != last_) {  // neighbours mostly have the same
+      last_ = label;
+      known_ = classes_.classOf(label, values_).has_value();
+    }
+    if (!known_) out.countUnknown(label);
+    out.labels.push_back(label);
+  }
+
+ private:
+  FieldReader field_;
+  const ClassTable& classes_;
+  LabelValues values_;
+  std::uint32_t last_ = kNoLabel;
+  bool known_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<LabelReader> makeLabelReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
+                                             const ClassTable& classes, LabelValues label_values) {
+  switch (input.label_encoding) {
+    case LabelEncoding::kRgb:
+    case LabelEncoding::kBgr:
+      return makeColorReader(cloud, input, classes);
+    case LabelEncoding::kScores:
+    case LabelEncoding::kTopK:
+      return makeScoreReader(cloud, input, classes, label_values);
+    default:
+      if (input.label_field.empty()) return std::make_unique<NoLabels>();
+      return std::make_unique<NumberReader>(cloud, input.label_field, classes, label_values);
+  }
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,60 @@
+#include "bki_mapping/ros/load_advice.h"
+
+#include <cmath>
+#include <vector>
+
+#include "bki_mapping/core/named_parameter.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// Time of a mode in that of mode none: SemanticKITTI 04, two threads, from docs/performance.md.
+double costOf(const FreeSpaceConfig& free_space) {
+  if (free_space.mode == "none") return 1.0;
+  if (free_space.mode == "even") return 10.0 / free_space.gap;
+  if (free_space.mode == "line") return free_space.extent == FreeSpaceExtent::kObserved ? 5.8 : 4.1;
+  return 1.3 + 0.7 * free_space.samples_per_beam;
+}
+
+std::string milliseconds(double time) {
+  return numberText(std::round(time)) + " ms";
+}
+
+}  // namespace
+
+double loadOf(double integration_ms, double received_hz) {
+  return 1e-3 * integration_ms * received_hz;
+}
+
+std::string loadAdvice(const MapperConfig& config, double integration_ms, double received_hz) {
+  const double load = loadOf(integration_ms, received_hz);
+  if (load <= 1.0) return "";
+  std::string text = "an integration takes " + milliseconds(integration_ms) + ", but clouds come every " +
+                     milliseconds(1e3 / received_hz) + ": mapping is " +
+                     numberText(std::round(10.0 * load) / 10.0) + " times too slow";
+  const double resolution = config.resolution;
+  text += "; resolution " + numberText(std::round(2e3 * resolution) / 1e3) + " would take about " +
+          milliseconds(integration_ms / 4.0);
+  FreeSpaceConfig mapped = config.free_space, linear = config.free_space;
+  mapped.extent = FreeSpaceExtent::kMapped;
+  linear.mode = "linear";
+  linear.samples_per_beam = 1;
+  const double now = costOf(config.free_space);
+  if (config.free_space.mode == "line" && costOf(mapped) < now) {
+    text += "; free_space/extent mapped about " + milliseconds(integration_ms * costOf(mapped) / now);
+  }
+  if (costOf(linear) < now) {
+    text += "; free_space/mode linear with one sample a beam about " +
+            milliseconds(integration_ms * costOf(linear) / now);
+  }
+  const double range = config.sensor_model.max_range;
+  if (range > 0.0) {
+    text += "; sensor_model/max_range " + numberText(range / 2.0) + " about " +
+            milliseconds(integration_ms / 2.0);
+  } else {
+    text += "; sensor_model/max_range leaves out what is far";
+  }
+  return text;
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,72 @@
+#include "bki_mapping/ros/mapping_diagnostics.h"
+
+#include "bki_mapping/ros/load_advice.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+/// "3 queue full, 1 empty" of the clouds dropped between two statuses.
+std::string newDrops(const MappingStatus& before, const MappingStatus& now) {
+  std::string text;
+  for (const DropKind& kind : dropKinds()) {
+    const std::uint64_t count = now.*kind.count - before.*kind.count;
+    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + kind.name;
+  }
+  return text;
+}
+
+}  // namespace
+
+Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config) {
+  const std::string drops = newDrops(before, now);
+  if (now.paused) return {DiagnosticStatus::WARN, "paused; call ~resume to go on"};
+  if (now.received == 0) return {DiagnosticStatus::WARN, "no cloud has come yet; check the topic"};
+  if (!drops.empty() && now.integrated == before.integrated) {
+    return {DiagnosticStatus::ERROR, "nothing is being mapped; dropped: " + drops};
+  }
+  const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
+  if (!drops.empty()) {
+    return {DiagnosticStatus::WARN, "dropped: " + drops + (advice.empty() ? "" : "; " + advice)};
+  }
+  if (!advice.empty()) return {DiagnosticStatus::WARN, advice};
+  if (now.received == before.received && now.waiting == 0) return {DiagnosticStatus::WARN, "no clouds come"};
+  return {DiagnosticStatus::OK, "mapping"};
+}
+
+MappingDiagnostics::MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                                       double period)
+    : updater_(node, private_node, private_node.getNamespace()), period_(period) {
+  updater_.setHardwareID("none");
+  updater_.add("mapping", [this](diagnostic_updater::DiagnosticStatusWrapper& out) { fill(out); });
+}
+
+void MappingDiagnostics::report(const MappingStatus& status, const MapperConfig& config) {
+  now_ = status;
+  health_ = judge(before_, now_, config);
+  before_ = now_;
+  updater_.force_update();
+}
+
+void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) const {
+  out.summary(health_.level, health_.message);
+  out.add("received", now_.received);
+  out.add("integrated", now_.integrated);
+  out.add("waiting", now_.waiting);
+  for (const DropKind& kind : dropKinds()) out.add(std::string("dropped: ") + kind.name, now_.*kind.count);
+  out.add("received [Hz]", now_.received_hz);
+  out.add("integrated [Hz]", now_.integrated_hz);
+  out.add("latency, median [ms]", now_.latency_median_ms);
+  out.add("latency, 99th percentile [ms]", now_.latency_p99_ms);
+  out.add("integration, median [ms]", now_.integration_median_ms);
+  out.add("integration, 99th percentile [ms]", now_.integration_p99_ms);
+  out.add("load", loadOf(now_.integration_median_ms, now_.received_hz));
+  out.add("points dropped", now_.points_dropped);
+  out.add("labels not in the class table", now_.labels_not_in_table);
+  out.add("time jumps", now_.time_jumps);
+  out.add("blocks", now_.blocks);
+  out.add("map [bytes]", now_.map_bytes);
+}
+
+}  // namespace bki_mapping::ros_shell

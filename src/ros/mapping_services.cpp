@@ -1,0 +1,67 @@
+// The services of the mapping server.
+#include "bki_mapping/io/map_export.h"
+#include "bki_mapping/ros/mapping_server.h"
+
+namespace bki_mapping::ros_shell {
+
+void MappingServer::offerServices() {
+  services_.push_back(private_node_.advertiseService("reset", &MappingServer::onReset, this));
+  services_.push_back(private_node_.advertiseService("publish_map", &MappingServer::onPublishMap, this));
+  services_.push_back(private_node_.advertiseService("pause", &MappingServer::onPause, this));
+  services_.push_back(private_node_.advertiseService("resume", &MappingServer::onResume, this));
+  services_.push_back(private_node_.advertiseService("save_map", &MappingServer::onSaveMap, this));
+}
+
+void MappingServer::reset() {
+  mapper_->reset();
+  trajectory_.clear();
+  publishing_->startOver();
+  ROS_INFO("The map was reset");
+}
+
+bool MappingServer::onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+  reset();
+  return true;
+}
+
+bool MappingServer::onPublishMap(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+  publishing_->startOver();
+  return true;
+}
+
+bool MappingServer::onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  response.success = true;
+  response.message = paused_ ? "mapping was paused already" : "mapping is paused; clouds are dropped";
+  paused_ = true;
+  status_publisher_.publish(status());
+  ROS_INFO("%s", response.message.c_str());
+  return true;
+}
+
+bool MappingServer::onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  response.success = true;
+  response.message = paused_ ? "mapping goes on" : "mapping was not paused";
+  paused_ = false;
+  status_publisher_.publish(status());
+  ROS_INFO("%s", response.message.c_str());
+  return true;
+}
+
+bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& response) {
+  try {
+    if (request.path.empty() || request.path.front() != '/') {
+      throw std::invalid_argument("path '" + request.path + "' must be absolute");
+    }
+    const std::string include = request.include.empty() ? "occupied" : request.include;
+    exportMap(request.path, mapper_->map(), mapper_->classes(), parseStates(include));
+    response.success = true;
+    response.message = "wrote " + request.path + " (" + include + ")";
+  } catch (const std::exception& fault) {
+    response.success = false;
+    response.message = fault.what();
+  }
+  ROS_INFO("save_map: %s", response.message.c_str());
+  return true;
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,157 @@
+#include "bki_mapping/ros/point_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <sstream>
+#include <stdexcept>
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using sensor_msgs::PointField;
+
+std::size_t sizeOf(std::uint8_t datatype) {
+  switch (datatype) {
+    case PointField::INT8:
+    case PointField::UINT8:
+      return 1;
+    case PointField::INT16:
+    case PointField::UINT16:
+      return 2;
+    case PointField::INT32:
+    case PointField::UINT32:
+    case PointField::FLOAT32:
+      return 4;
+    case PointField::FLOAT64:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+template <typename T>
+T load(const std::uint8_t* bytes, bool swap) {
+  std::uint8_t raw[sizeof(T)];
+  std::memcpy(raw, bytes, sizeof(T));
+  if (swap) std::reverse(raw, raw + sizeof(T));
+  T value;
+  std::memcpy(&value, raw, sizeof(T));
+  return value;
+}
+
+const PointField& find(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
+  std::string names;
+  const PointField* found = nullptr;
+  for (const PointField& field : cloud.fields) {
+    if (field.name == name && found) {
+      throw std::invalid_argument("the cloud has two fields '" + name + "'");
+    }
+    if (field.name == name) found = &field;
+    names += (names.empty() ? "" : ", ") + field.name;
+  }
+  if (found) return *found;
+  throw std::invalid_argument("the cloud has no field '" + name + "' (it has: " + names + ")");
+}
+
+}  // namespace
+
+bool hostIsBigEndian() {
+  const std::uint16_t one = 1;
+  std::uint8_t first = 0;
+  std::memcpy(&first, &one, 1);
+  return first == 0;
+}
+
+FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name,
+                         std::uint32_t component)
+    : swap_((cloud.is_bigendian != 0) != hostIsBigEndian()) {
+  const PointField& field = find(cloud, name);
+  datatype_ = field.datatype;
+  const std::size_t size = sizeOf(field.datatype);
+  if (size == 0) {
+    throw std::invalid_argument("field '" + name + "' of the cloud has the unknown datatype " +
+                                std::to_string(field.datatype));
+  }
+  offset_ = std::size_t{field.offset} + component * size;
+  if (offset_ + size > cloud.point_step) {
+    throw std::invalid_argument("field '" + name + "' of the cloud ends at byte " +
+                                std::to_string(offset_ + size) + ", beyond its point_step " +
+                                std::to_string(cloud.point_step));
+  }
+}
+
+double FieldReader::operator()(const std::uint8_t* point) const {
+  const std::uint8_t* bytes = point + offset_;
+  switch (datatype_) {
+    case PointField::INT8:
+      return load<std::int8_t>(bytes, swap_);
+    case PointField::UINT8:
+      return load<std::uint8_t>(bytes, swap_);
+    case PointField::INT16:
+      return load<std::int16_t>(bytes, swap_);
+    case PointField::UINT16:
+      return load<std::uint16_t>(bytes, swap_);
+    case PointField::INT32:
+      return load<std::int32_t>(bytes, swap_);
+    case PointField::UINT32:
+      return load<std::uint32_t>(bytes, swap_);
+    case PointField::FLOAT32:
+      return static_cast<double>(load<float>(bytes, swap_));
+    default:
+      return load<double>(bytes, swap_);
+  }
+}
+
+std::uint32_t FieldReader::bits(const std::uint8_t* point) const {
+  if (sizeOf(datatype_) == 4) return load<std::uint32_t>(point + offset_, swap_);
+  return label(point);
+}
+
+std::uint32_t FieldReader::label(const std::uint8_t* point) const {
+  const double rounded = std::round((*this)(point));
+  return rounded >= 0.0 && rounded < kNoLabel ? static_cast<std::uint32_t>(rounded) : kNoLabel;
+}
+
+bool FieldReader::integer() const {
+  return datatype_ != PointField::FLOAT32 && datatype_ != PointField::FLOAT64;
+}
+
+std::uint32_t componentsOf(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
+  return std::max(find(cloud, name).count, 1u);
+}
+
+std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list) {
+  std::vector<FieldReader> readers;
+  for (const std::string& name : splitList(list)) {
+    // Made one by one: a count that does not fit into point_step is refused before memory is taken for it.
+    for (std::uint32_t c = 0; c < componentsOf(cloud, name); ++c) readers.emplace_back(cloud, name, c);
+  }
+  return readers;
+}
+
+std::vector<std::string> splitList(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream in(list);
+  for (std::string part; std::getline(in, part, ',');) {
+    const std::size_t first = part.find_first_not_of(' ');
+    if (first == std::string::npos) continue;
+    parts.push_back(part.substr(first, part.find_last_not_of(' ') - first + 1));
+  }
+  return parts;
+}
+
+void checkSizes(const sensor_msgs::PointCloud2& cloud) {
+  const std::uint64_t row = std::uint64_t{cloud.width} * cloud.point_step;
+  if (row > cloud.row_step && cloud.height > 1) {
+    throw std::invalid_argument("the cloud's row_step is smaller than width * point_step");
+  }
+  const std::uint64_t needed =
+      cloud.height == 0 ? 0 : (std::uint64_t{cloud.height} - 1) * cloud.row_step + row;
+  if (needed > cloud.data.size()) {
+    throw std::invalid_argument("the cloud says it has " + std::to_string(needed) +
+                                " bytes of points, but holds " + std::to_string(cloud.data.size()));
+  }
+}
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,93 @@
+#include "bki_mapping/ros/scan_ledger.h"
+
+namespace bki_mapping::ros_shell {
+
+const std::vector<DropKind>& dropKinds() {
+  using S = MappingStatus;
+  static const std::vector<DropKind> kinds = {
+      {DropReason::kNoTransform, "no transform", &S::dropped_no_transform},
+      {DropReason::kTransformLate, "transform late", &S::dropped_transform_late},
+      {DropReason::kTooOld, "too old", &S::dropped_too_old},
+      {DropReason::kUnknownFrame, "unknown frame", &S::dropped_unknown_frame},
+      {DropReason::kBadCloud, "bad cloud", &S::dropped_bad_cloud},
+      {DropReason::kEmpty, "empty", &S::dropped_empty},
+      {DropReason::kQueueFull, "queue full", &S::dropped_queue_full},
+      {DropReason::kMemory, "memory limit", &S::dropped_memory},
+      {DropReason::kPaused, "paused", &S::dropped_paused},
+      {DropReason::kTimeJump, "time jump", &S::dropped_time_jump},
+  };
+  return kinds;
+}
+
+void ScanLedger::received(Clock::time_point now) {
+  ++status_.received;
+  received_rate_.tick(now);
+}
+
+void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& stats, double latency,
+                            Clock::time_point now) {
+  ++status_.integrated;
+  status_.header = header;
+  status_.integrated_last = true;
+  status_.last_drop.clear();
+  status_.points_dropped += stats.counts.points - stats.counts.used - stats.counts.no_returns;
+  status_.labels_not_in_table += stats.counts.labels_not_in_table;
+  status_.integration_ms = static_cast<float>(stats.totalMs());
+  integration_.add(stats.totalMs());
+  latency_.add(1e3 * latency);
+  integrated_rate_.tick(now);
+}
+
+void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason) {
+  const DropKind& kind = dropKinds()[static_cast<std::size_t>(reason)];
+  ++(status_.*kind.count);
+  status_.header = header;
+  status_.integrated_last = false;
+  status_.last_drop = kind.name;
+}
+
+void ScanLedger::unknownLabels(const std::map<std::uint32_t, std::size_t>& counts) {
+  for (const auto& [label, count] : counts) {
+    if (unknown_.size() < kMostUnknown || unknown_.count(label) > 0) unknown_[label] += count;
+  }
+}
+
+std::uint64_t ScanLedger::droppedClouds() const {
+  std::uint64_t sum = 0;
+  for (const DropKind& kind : dropKinds()) sum += status_.*kind.count;
+  return sum;
+}
+
+MappingStatus ScanLedger::status(Clock::time_point now) {
+  status_.waiting = status_.received - status_.integrated - droppedClouds();
+  status_.received_hz = static_cast<float>(received_rate_.rate(now));
+  status_.integrated_hz = static_cast<float>(integrated_rate_.rate(now));
+  status_.latency_median_ms = static_cast<float>(latency_.median());
+  status_.latency_p99_ms = static_cast<float>(latency_.quantile(0.99));
+  status_.integration_median_ms = static_cast<float>(integration_.median());
+  status_.integration_p99_ms = static_cast<float>(integration_.quantile(0.99));
+  status_.unknown_labels.clear();
+  status_.unknown_label_counts.clear();
+  for (const auto& [label, count] : unknown_) {
+    status_.unknown_labels.push_back(label);
+    status_.unknown_label_counts.push_back(count);
+  }
+  return status_;
+}
+
+std::string ScanLedger::summary() const {
+  std::string text = "Mapped " + std::to_string(status_.integrated) + " of " +
+                     std::to_string(status_.received) + " clouds; dropped";
+  const char* separator = ": ";
+  for (const DropKind& kind : dropKinds()) {
+    if (status_.*kind.count == 0) continue;
+    text += separator + std::to_string(status_.*kind.count) + " " + kind.name;
+    separator = ", ";
+  }
+  const std::uint64_t waiting = status_.received - status_.integrated - droppedClouds();
+  if (droppedClouds() == 0) text += " none";
+  if (waiting > 0) text += "; " + std::to_string(waiting) + " were still waiting";
+  return text;
+}
+
+}  // namespace bki_mapping::ros_shell

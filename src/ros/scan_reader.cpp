@@ -1,0 +1,107 @@
+#include "bki_mapping/ros/scan_reader.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bki_mapping/ros/cloud_conversion.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// Points are moved with the pose of the middle of such a time slice [s]: 1 ms is 3 cm at 100 km/h.
+constexpr double kTimeSlice = 1e-3;
+/// Points may be stamped this long before or after their cloud [s]; beyond it the field is no time.
+constexpr double kLongestScan = 10.0;
+
+ros::Time later(const ros::Time& stamp, double seconds) {
+  const double time = stamp.toSec() + seconds;
+  return time > 0.0 && time < 4e9 ? stamp + ros::Duration(seconds) : stamp;
+}
+
+/// The points relative to the scan's origin, in the axes of the map frame.
+void place(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
+  point = (T_map_cloud * point.cast<double>() - origin).cast<float>();
+}
+
+/// Moves each point with the pose of its time. @return what is missing, if a pose is.
+std::optional<MissingPose> undistort(const CloudContent& content, const ros::Time& stamp,
+                                     const std::string& map_frame, const std::string& frame,
+                                     const PoseSource& poses, Scan& scan) {
+  std::map<std::int64_t, Eigen::Isometry3d> pose_of_slice;
+  scan.points = content.points;
+  for (std::size_t i = 0; i < content.times.size(); ++i) {
+    if (!(std::abs(content.times[i]) <= kLongestScan)) {
+      throw std::invalid_argument("a point's time is " + numberText(content.times[i]) +
+                                  " s from the stamp of its cloud; check time_field");
+    }
+    const auto slice = static_cast<std::int64_t>(std::floor(content.times[i] / kTimeSlice));
+    auto pose = pose_of_slice.find(slice);
+    if (pose == pose_of_slice.end()) {
+      const ros::Time time = later(stamp, (static_cast<double>(slice) + 0.5) * kTimeSlice);
+      const auto found = poses.find(map_frame, frame, time);
+      if (!found) return poses.explain(map_frame, frame, time);
+      pose = pose_of_slice.emplace(slice, found->T_target_source).first;
+    }
+    place(pose->second, scan.origin, scan.points[i]);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const {
+  const std_msgs::Header& header = cloud.header;
+  const auto known = [&](const std::string& frame, const ros::Time& stamp) {
+    return poses.canFind(map_frame_, frame, stamp);
+  };
+  if (!known(header.frame_id, header.stamp) || !known(sensorFrame(cloud), header.stamp)) return false;
+  if (input_.time_field.empty() || cloud.width == 0 || cloud.height == 0) return true;
+  try {
+    checkSizes(cloud);
+    const FieldReader time(cloud, input_.time_field);
+    const std::uint8_t* last = cloud.data.data() + std::size_t{cloud.height - 1} * cloud.row_step +
+                               std::size_t{cloud.width - 1} * cloud.point_step;
+    const double end = pointTime(time, last) + kTimeSlice;
+    return !(end > 0.0 && end < kLongestScan) || known(header.frame_id, later(header.stamp, end));
+  } catch (const std::invalid_argument&) {
+    return true;  // read() says what is wrong
+  }
+}
+
+std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointCloud2& cloud,
+                                                       const PoseSource& poses) const {
+  const std_msgs::Header& header = cloud.header;
+  const std::string sensor_frame = sensorFrame(cloud);
+  const auto sensor = poses.find(map_frame_, sensor_frame, header.stamp);
+  if (!sensor) return poses.explain(map_frame_, sensor_frame, header.stamp);
+  const auto frame = poses.find(map_frame_, header.frame_id, header.stamp);
+  if (!frame) return poses.explain(map_frame_, header.frame_id, header.stamp);
+
+  CloudContent content = readCloud(cloud, input_, classes_, label_values_);
+  PlacedScan placed;
+  Scan& scan = placed.scan;
+  if (sensor_frame == header.frame_id && content.times.empty()) {
+    scan = scanFromSensorFrame(sensor->T_target_source, content.points, {}, 0);
+  } else {
+    scan.origin = sensor->T_target_source.translation();
+    if (content.times.empty()) {
+      scan.points = content.points;
+      for (Eigen::Vector3f& point : scan.points) place(frame->T_target_source, scan.origin, point);
+    } else if (const auto missing =
+                   undistort(content, sensor->stamp, map_frame_, header.frame_id, poses, scan)) {
+      return *missing;
+    }
+  }
+  const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
+  for (const Eigen::Vector3f& direction : content.no_returns) scan.no_returns.push_back(rotation * direction);
+  scan.stamp = sensor->stamp.toNSec();  // that of the cloud, or of the latest pose if the cloud has none
+  scan.labels = std::move(content.labels.labels);
+  scan.labels_are_ids = content.labels.are_ids;
+  scan.soft = std::move(content.labels.soft);
+  scan.sensor_model = input_.sensor_model;
+  placed.T_map_sensor = sensor->T_target_source;
+  placed.unknown_labels = std::move(content.labels.unknown);
+  return placed;
+}
+
+}  // namespace bki_mapping::ros_shell

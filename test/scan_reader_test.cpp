@@ -1,0 +1,221 @@
+// Scans from clouds and tf: where beams start, when points were measured, labels in every encoding.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "bki_mapping/core/map_query.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/ros/pose_conversion.h"
+#include "bki_mapping/ros/scan_reader.h"
+#include "cloud_maker.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using sensor_msgs::PointField;
+
+const std::shared_ptr<const ClassTable>& classes() {
+  static const auto table = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
+  return table;
+}
+
+class Reader : public testing::Test {
+ protected:
+  void pose(const std::string& child, double seconds, const Eigen::Vector3d& position, double yaw = 0.0,
+            const std::string& parent = "map") {
+    geometry_msgs::TransformStamped t;
+    t.header.frame_id = parent;
+    t.header.stamp = ros::Time(seconds);
+    t.child_frame_id = child;
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.translate(position).rotate(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+    t.transform = toTransform(T);
+    poses_.add(t);
+  }
+
+  /// A cloud of cars in the frame `sensor` at 100 s.
+  static CloudMaker cloud(const std::vector<Eigen::Vector3f>& points) {
+    CloudMaker maker(points);
+    maker.add("label", PointField::UINT32, std::vector<double>(points.size(), 10.0));
+    return maker;
+  }
+
+  std::variant<PlacedScan, MissingPose> read(const sensor_msgs::PointCloud2& cloud) const {
+    return ScanReader(input_, "map", *classes(), LabelValues::kRaw).read(cloud, poses_);
+  }
+  bool ready(const sensor_msgs::PointCloud2& cloud) const {
+    return ScanReader(input_, "map", *classes(), LabelValues::kRaw).ready(cloud, poses_);
+  }
+  PlacedScan placed(const sensor_msgs::PointCloud2& cloud) const { return std::get<PlacedScan>(read(cloud)); }
+  DropReason reason(const sensor_msgs::PointCloud2& cloud) const {
+    EXPECT_FALSE(ready(cloud));
+    return std::get<MissingPose>(read(cloud)).reason;
+  }
+
+  InputConfig input_;
+  PoseSource poses_;
+};
+
+TEST_F(Reader, MissingPosesAreToldApart) {
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  EXPECT_EQ(reason(scan), DropReason::kUnknownFrame);
+  pose("other", 100.0, {0, 0, 0});
+  for (const double t : {90.0, 100.0}) pose("sensor", t, {0, 0, 0}, 0.0, "island");
+  EXPECT_EQ(reason(scan), DropReason::kNoTransform);
+  pose("island", 90.0, {0, 0, 0});
+  pose("island", 95.0, {0, 0, 0});
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  pose("island", 101.0, {0, 0, 0});
+  EXPECT_TRUE(ready(scan));
+  EXPECT_TRUE(std::holds_alternative<PlacedScan>(read(scan)));
+  scan.header.stamp = ros::Time(80.0);
+  EXPECT_EQ(reason(scan), DropReason::kTooOld);
+  scan.header.stamp = ros::Time(4294967295u, 0u);  // as far away as a stamp can be
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  scan.header.frame_id = "";
+  EXPECT_EQ(reason(scan), DropReason::kUnknownFrame);
+}
+
+TEST_F(Reader, NonsenseFromTfIsNoPose) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  pose("sensor", 100.0, {NAN, 0, 0});
+  EXPECT_FALSE(ready(scan));
+  geometry_msgs::TransformStamped t;
+  t.header.frame_id = "map";
+  t.header.stamp = ros::Time(100.0);
+  t.child_frame_id = "sensor";
+  t.transform.rotation.w = 2.0;  // not a rotation
+  poses_.add(t);
+  EXPECT_FALSE(ready(scan));
+}
+
+TEST_F(Reader, WhenTimeJumpsBackTransformsOfTheNewTimeAreKept) {
+  for (const double t : {98.0, 99.0, 100.0}) pose("sensor", t, {t, 0, 0});
+  for (const double t : {20.0, 20.5})
+    pose("sensor", t, {t, 0, 0});  // before the jump is known; tf2 refuses them
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  scan.header.stamp = ros::Time(20.25);
+  EXPECT_FALSE(ready(scan));
+  poses_.restart(scan.header.stamp);
+  EXPECT_NEAR(placed(scan).scan.origin.x(), 20.25, 1e-9);
+  scan.header.stamp = ros::Time(99.5);
+  EXPECT_FALSE(ready(scan));
+}
+
+TEST_F(Reader, AStampOfZeroMeansTheLatestPose) {
+  pose("sensor", 99.0, {1, 0, 0});
+  pose("sensor", 100.0, {2, 0, 0});
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  scan.header.stamp = ros::Time();
+  EXPECT_EQ(placed(scan).scan.origin, Eigen::Vector3d(2, 0, 0));
+  EXPECT_EQ(placed(scan).scan.stamp, 100000000000u);
+}
+
+TEST_F(Reader, BeamsStartWhereTheSensorIs) {
+  pose("sensor", 100.0, {3, 4, 5}, 1.0);
+  input_.sensor_frame_id = "sensor";
+  CloudMaker maker = cloud({{10, 4, 5}});
+  maker.frame = "map";
+  const Scan scan = placed(maker.message()).scan;
+  EXPECT_EQ(scan.origin, Eigen::Vector3d(3, 4, 5));
+  EXPECT_TRUE(scan.points[0].isApprox(Eigen::Vector3f(7, 0, 0), 1e-6f));
+  const ScanReader reader(input_, "map", *classes(), LabelValues::kRaw);
+  EXPECT_FALSE(reader.originDoubtful(maker.message()));
+  EXPECT_TRUE(
+      ScanReader(InputConfig(), "map", *classes(), LabelValues::kRaw).originDoubtful(maker.message()));
+}
+
+TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
+  // 10 m/s ahead: a wall at x = 20 is seen 1 m nearer after 0.1 s.
+  pose("sensor", 99.0, {-10, 0, 0});
+  pose("sensor", 101.0, {10, 0, 0});
+  const std::vector<Eigen::Vector3f> points = {{20, 0, 0}, {19.5f, 1, 0}, {19, 2, 0}};
+  for (const bool nanoseconds : {false, true}) {
+    CloudMaker maker = cloud(points);
+    if (nanoseconds) {
+      maker.add("t", PointField::UINT32, {0, 50e6, 100e6});
+    } else {
+      maker.add("t", PointField::FLOAT32, {0.0, 0.05, 0.1});
+    }
+    input_.time_field = "";
+    EXPECT_NEAR(placed(maker.message()).scan.points[2].x(), 19.0, 1e-4);
+    input_.time_field = "t";
+    const Scan scan = placed(maker.message()).scan;
+    EXPECT_TRUE(scan.origin.isZero(1e-9));
+    for (const auto& point : scan.points) EXPECT_NEAR(point.x(), 20.0, 0.011);  // half a time slice
+  }
+  // The end of the scan must be in tf, too.
+  CloudMaker maker = cloud(points);
+  maker.add("t", PointField::FLOAT64, {0.0, 0.5, 1.5});
+  EXPECT_EQ(reason(maker.message()), DropReason::kTransformLate);
+  CloudMaker nonsense = cloud(points);
+  nonsense.add("t", PointField::FLOAT64, {0.0, 0.5, NAN});
+  EXPECT_THROW(read(nonsense.message()), std::invalid_argument);
+  input_.time_field = "no such field";
+  EXPECT_THROW(read(maker.message()), std::invalid_argument);
+}
+
+TEST_F(Reader, SureLabelsGiveTheSameMapInEveryEncoding) {
+  pose("sensor", 100.0, {0.3, 0.2, 0.1}, 0.4);
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> raw, color, car, road, first, sure, second, unsure;
+  for (int i = 0; i < 3000; ++i) {
+    const float a = 0.01f * static_cast<float>(i);
+    points.emplace_back(5.0f * std::cos(a), 5.0f * std::sin(a), 0.0005f * static_cast<float>(i % 700));
+    const bool is_car = i % 3 == 0;
+    const SemanticClass& c = *classes()->find(is_car ? 1 : 9);
+    raw.push_back(is_car ? 10 : 40);
+    color.push_back(c.color[0] << 16 | c.color[1] << 8 | c.color[2]);
+    car.push_back(is_car);
+    road.push_back(!is_car);
+    first.push_back(raw.back());
+    sure.push_back(1.0);
+    second.push_back(is_car ? 40 : 10);
+    unsure.push_back(0.0);
+  }
+  const auto mapOf = [&](const CloudMaker& maker) {
+    auto mapper = std::make_unique<SemanticMapper>(MapperConfig(), classes());
+    mapper->integrate(placed(maker.message()).scan);
+    return mapper;
+  };
+  CloudMaker numbers(points);
+  numbers.add("label", PointField::UINT16, raw);
+  const auto expected = mapOf(numbers);
+  ASSERT_GT(expected->map().size(), 20u);
+  const auto expectSame = [&](const CloudMaker& maker, const std::string& what) {
+    const auto mapper = mapOf(maker);
+    ASSERT_EQ(mapper->map().size(), expected->map().size()) << what;
+    for (const auto& entry : expected->map().entries()) {
+      const Block* block = mapper->map().find(entry.index);
+      ASSERT_TRUE(block) << what;
+      for (const ClassId id : entry.block->classes()) {
+        ASSERT_EQ(0, std::memcmp(block->evidence(id), entry.block->evidence(id), 4 * kBlockVoxels)) << what;
+      }
+    }
+  };
+  CloudMaker floats(points);
+  floats.add("label", PointField::FLOAT32, raw);
+  expectSame(floats, "float");
+  CloudMaker colors(points);
+  colors.add("rgb", PointField::UINT32, color);
+  input_.label_field = "rgb";
+  input_.label_encoding = LabelEncoding::kRgb;
+  expectSame(colors, "rgb");
+  CloudMaker scores(points);
+  scores.add("a", PointField::FLOAT32, car).add("b", PointField::FLOAT32, road);
+  input_.label_encoding = LabelEncoding::kScores;
+  input_.score_fields = "car=a,road=b";
+  expectSame(scores, "scores");
+  CloudMaker top(points);
+  top.add("l1", PointField::UINT8, first).add("p1", PointField::FLOAT32, sure);
+  top.add("l2", PointField::UINT8, second).add("p2", PointField::FLOAT32, unsure);
+  input_.label_encoding = LabelEncoding::kTopK;
+  input_.label_field = "l1,l2";
+  input_.score_fields = "p1,p2";
+  expectSame(top, "top_k");
+}
+
+}  // namespace
+}  // namespace bki_mapping::ros_shell
