@@ -5,6 +5,7 @@ add_library(bki_mapping_ros SHARED
   src/ros/color_reader.cpp
   src/ros/input_config.cpp
   src/ros/label_reader.cpp
+  src/ros/live_settings.cpp
   src/ros/load_advice.cpp
   src/ros/map_publishing.cpp
   src/ros/mapping_diagnostics.cpp
@@ -26,7 +27,7 @@ add_library(bki_mapping_ros SHARED
   src/tools/sequence_messages.cpp
 )
 target_link_libraries(bki_mapping_ros PUBLIC bki_mapping_io ${catkin_LIBRARIES})
-add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp)
+add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 bki_mapping_warnings(bki_mapping_ros)
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
+#include <tuple>
 
 #include "bki_mapping/core/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -197,6 +199,77 @@ TEST(Laws, AKernelOfTooManyVoxelsIsRefused) {
   EXPECT_NO_THROW(SemanticMapper(config, reference::smallTable()));
   config.kernel.length = 7.3;
   EXPECT_THROW(SemanticMapper(config, reference::smallTable()), std::invalid_argument);
+}
+
+TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
+  const std::vector<Scan> scans = someScans();
+  MapperConfig other = configOf("linear");
+  other.sensor_model.max_range = 2.0;
+  other.free_space.hits_before_misses = true;
+  SemanticMapper changed(configOf("line"), reference::smallTable()), made(other, reference::smallTable());
+  changed.integrate(scans[0]);
+  changed.reset();
+  changed.reconfigure(other);
+  for (const Scan& scan : scans) {
+    changed.integrate(scan);
+    made.integrate(scan);
+  }
+  std::size_t differences = 0;
+  compare(made.map(), changed.map(), {{0, 0, 0}},
+          [&](ClassId, float x, float y) { differences += std::memcmp(&x, &y, sizeof(x)) != 0; });
+  EXPECT_EQ(differences, 0u);
+  EXPECT_EQ(made.map().size(), changed.map().size());
+
+  MapperConfig refused = other;
+  refused.resolution = 0.7;
+  EXPECT_THROW(changed.reconfigure(refused), std::invalid_argument);
+  refused = other;
+  refused.free_space.mode = "liner";
+  EXPECT_THROW(changed.reconfigure(refused), std::invalid_argument);
+  EXPECT_EQ(changed.config().resolution, other.resolution);
+  EXPECT_EQ(changed.config().free_space.mode, "linear");
+}
+
+/// The bytes of all blocks, one by one.
+std::size_t bytesOf(const SemanticMap& map) {
+  std::size_t sum = 0;
+  for (const auto& entry : map.entries()) sum += entry.block->bytes();
+  return sum;
+}
+
+TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
+  for (const std::string& mode : kModes) {
+    SemanticMapper mapper(configOf(mode), reference::smallTable());
+    SemanticMap before = mapOf({}, configOf(mode));
+    for (const Scan& scan : someScans()) {
+      mapper.integrate(scan);
+      EXPECT_EQ(mapper.blockBytes(), bytesOf(mapper.map())) << mode;
+      std::set<std::tuple<int, int, int>> touched;
+      for (const GridIndex& b : mapper.touchedBlocks()) {
+        EXPECT_TRUE(touched.emplace(b.x, b.y, b.z).second) << "a block is named twice";
+      }
+      // What is not named is as it was.
+      for (const auto& entry : mapper.map().entries()) {
+        if (touched.count({entry.index.x, entry.index.y, entry.index.z}) > 0) continue;
+        const Block* old = before.find(entry.index);
+        ASSERT_TRUE(old) << mode;
+        ASSERT_EQ(old->classes(), entry.block->classes()) << mode;
+        for (std::size_t c = 0; c < old->classes().size(); ++c) {
+          ASSERT_EQ(0, std::memcmp(old->plane(c), entry.block->plane(c), kBlockVoxels * sizeof(float)));
+        }
+      }
+      before.clear();
+      before.add(mapper.map());
+    }
+    const std::size_t size = mapper.map().size();
+    const auto gone = mapper.eraseBlocks([](const BlockIndex& b) { return b.x < 0; });
+    EXPECT_GT(gone.size(), 0u);
+    EXPECT_EQ(mapper.map().size(), size - gone.size());
+    for (const auto& entry : mapper.map().entries()) EXPECT_GE(entry.index.x, 0);
+    EXPECT_EQ(mapper.blockBytes(), bytesOf(mapper.map())) << mode;
+    mapper.reset();
+    EXPECT_EQ(mapper.blockBytes(), 0u);
+  }
 }
 
 TEST(Laws, GainsFollowTheFlagsOfClasses) {

@@ -11,7 +11,7 @@ LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 LIBRARIES = {
     'inference/beam_rtree.cpp': ('boost/geometry',),
     'io': ('pcl/', 'yaml-cpp/', 'nlohmann/'),
-    'ros': ('diagnostic_updater/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
+    'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
     'tools': ('boost/program_options', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
 }
 MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')

@@ -1,11 +1,14 @@
 // The server's parameters, and that the documents name every one, and every topic, service and field.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <regex>
 #include <sstream>
 
+#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/ros/live_settings.h"
 #include "bki_mapping/ros/server_config.h"
 
 namespace bki_mapping::ros_shell {
@@ -88,6 +91,58 @@ TEST(ServerConfig, InputsTakeOverWhatTheyDoNotSet) {
   EXPECT_THROW(
       setParameters({{"clear_no_returns", "true"}, {"sensor_model/max_range", "-1"}}, unlimited, mapper),
       std::invalid_argument);
+}
+
+TEST(LiveSettings, HaveTheNamesDefaultsAndDescriptionsOfTheParameters) {
+  dynamic_reconfigure::Config defaults, expected;
+  MappingConfig::__getDefault__().__toMessage__(defaults);
+  LiveSettings::show(ServerConfig(), MapperConfig()).__toMessage__(expected);
+  const auto same = [](const auto& a, const auto& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].value, b[i].value) << a[i].name;
+  };
+  same(defaults.bools, expected.bools);
+  same(defaults.ints, expected.ints);
+  same(defaults.doubles, expected.doubles);
+  same(defaults.strs, expected.strs);
+  std::map<std::string, std::string> descriptions;
+  const auto collect = [&](const auto& table) {
+    for (const auto& p : table) {
+      std::string name = p.name;
+      std::replace(name.begin(), name.end(), '/', '_');
+      descriptions[name] = p.description;
+    }
+  };
+  collect(serverParameters());
+  collect(mapperParameters());
+  EXPECT_GT(MappingConfig::__getParamDescriptions__().size(), 20u);
+  for (const auto& p : MappingConfig::__getParamDescriptions__()) {
+    EXPECT_EQ(p->description, descriptions[p->name]) << p->name;
+  }
+}
+
+TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
+  ServerConfig server;
+  MapperConfig mapper;
+  MappingConfig config = LiveSettings::show(server, mapper);
+  config.free_space_mode = "linear";
+  config.sensor_model_max_range = 40.0;
+  config.color_mode = "height";
+  config.free_space_hits_before_misses = true;
+  LiveSettings::take(config, server, mapper);
+  EXPECT_EQ(mapper.free_space.mode, "linear");
+  EXPECT_EQ(mapper.sensor_model.max_range, 40.0);
+  EXPECT_TRUE(mapper.free_space.hits_before_misses);
+  EXPECT_EQ(server.color_mode, ColorMode::kHeight);
+  config.resolution = 0.1;
+  config.view_range = 7.0;
+  try {
+    LiveSettings::take(config, server, mapper);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_NE(std::string(fault.what()).find("resolution cannot change"), std::string::npos) << fault.what();
+  }
+  EXPECT_EQ(server.view_range, 0.0);
 }
 
 /// Topics and services as the code names them: the first text in advertise, advertiseService and subscribe.

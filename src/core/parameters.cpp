@@ -1,5 +1,7 @@
 #include "bki_mapping/core/parameters.h"
 
+#include <set>
+
 namespace bki_mapping {
 namespace {
 
@@ -104,6 +106,16 @@ std::vector<Parameter> mapperParameters() {
           "threads", 0, 1024, "Threads of the update; 0 takes all cores. The map does not depend on it.",
           [](MapperConfig & c) -> auto& { return c.threads; }),
   };
+}
+
+bool changesWhileMapping(const std::string& name) {
+  static const std::set<std::string> fixed = {"resolution",      "prior",
+                                              "kernel/type",     "kernel/length",
+                                              "kernel/scale",    "free_space/beam_index",
+                                              "free_space/seed", "unknown_labels",
+                                              "label_values",    "downsample_resolution",
+                                              "threads"};
+  return fixed.count(name) == 0;
 }
 
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values) {

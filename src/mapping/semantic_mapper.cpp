@@ -37,12 +37,32 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
       beams_(map_.geometry(), config_.kernel, config_.free_space.beam_index),
       free_space_(makeFreeSpaceModel(config_)),
       occlusion_(config_.occlusion) {
+  applySettings();
+}
+
+void SemanticMapper::applySettings() {
   hits_.protectVoxels(config_.free_space.hits_before_misses);
   soft_hits_.protectVoxels(config_.free_space.hits_before_misses);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     if (!c.unlabelled) map_.setFreeGain(c.id, c.dynamic ? gain.dynamic_classes : gain.static_classes);
   }
+}
+
+void SemanticMapper::reconfigure(const MapperConfig& config) {
+  const MapperConfig allowed = checked(config, *classes_);
+  for (const Parameter& p : mapperParameters()) {
+    if (p.get(allowed) != p.get(config_) && !changesWhileMapping(p.name)) {
+      throw std::invalid_argument("parameter " + p.name +
+                                  " cannot change while mapping; set it and start again");
+    }
+  }
+  std::unique_ptr<FreeSpaceModel> free_space = makeFreeSpaceModel(allowed);
+  config_ = allowed;
+  free_space_ = std::move(free_space);
+  observer_ = Observer(config_);
+  occlusion_ = Occlusion(config_.occlusion);
+  applySettings();
 }
 
 void SemanticMapper::reset() {

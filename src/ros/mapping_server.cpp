@@ -28,6 +28,9 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
   offerServices();
   subscribe();
+  live_settings_ = std::make_unique<LiveSettings>(
+      private_node_, config_, mapper_->config(),
+      [this](const ServerConfig& server, const MapperConfig& mapper) { applySettings(server, mapper); });
   status_publisher_.publish(status());
   thread_ = std::thread(&MappingServer::work, this);
 }
@@ -52,6 +55,17 @@ void MappingServer::subscribe() {
              mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
   }
   warned_of_origin_.assign(readers_.size(), false);
+}
+
+void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
+  mapper_->reconfigure(mapper);
+  config_ = server;
+  const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
+  readers_.clear();
+  for (const InputConfig& input : inputs) {
+    readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
+  }
+  publishing_->startOver();
 }
 
 void MappingServer::work() {

@@ -32,6 +32,9 @@ bool positive(double x) {
   return x > 0.0;
 }
 
+/// What dynamic_reconfigure writes.
+const std::string kLive = "reconfigure/";
+
 /// What the names of inputs' parameters begin with.
 const std::string kInputs = "inputs/";
 
@@ -113,8 +116,8 @@ void readParameters(const ros::NodeHandle& private_node, ServerConfig& server, M
   for (const std::string& full : names) {
     if (full.compare(0, prefix.size(), prefix) != 0) continue;
     XmlRpc::XmlRpcValue value;
-    if (private_node.getParam(full, value)) {
-      const std::string name = full.substr(prefix.size());
+    const std::string name = full.substr(prefix.size());
+    if (name.compare(0, kLive.size(), kLive) != 0 && private_node.getParam(full, value)) {
       values[name] = textOf(name, value);
     }
   }

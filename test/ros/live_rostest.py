@@ -11,6 +11,7 @@ import rospy
 import rostest
 from bki_mapping.msg import MappingStatus, OccupancyMap, OccupancyUpdate, VoxelCloudUpdate
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import PointField
 from std_srvs.srv import Empty, Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -241,6 +242,22 @@ class Live(unittest.TestCase):
         self.assertGreaterEqual(int(values['dropped: empty']), 1)
         self.assertIn('latency, 99th percentile [ms]', values)
         report(DiagnosticStatus.WARN, 'no clouds come')
+
+    def test_settings_change_while_mapping(self):
+        client = Client('/mapping/reconfigure', timeout=30)
+        self.addCleanup(client.close)
+        stamp = self.integrate([(4.5, 0.5, 0.5)], [CAR])
+        self.assertEqual(self.map_of_server(stamp)[(0, 0, 0)][0][2], OccupancyMap.FREE)
+        answer = client.update_configuration({'free_space_mode': 'none', 'sensor_model_max_range': 20.0})
+        self.addCleanup(client.update_configuration, {'free_space_mode': 'line', 'sensor_model_max_range': -1.0})
+        self.assertEqual((answer.free_space_mode, answer.sensor_model_max_range), ('none', 20.0))
+        stamp = self.integrate([(0.5, 5.5, 0.5), (0.5, 25.5, 0.5)], [ROAD, ROAD])
+        blocks = self.map_of_server(stamp)
+        self.assertEqual(blocks[(0, 0, 0)][0][4], OccupancyMap.OCCUPIED, 'the map is kept')
+        self.assertEqual(blocks[(0, 0, 0)][0][8 * 3], OccupancyMap.UNKNOWN, 'nothing is cleared')
+        self.assertNotIn((0, 3, 0), blocks, 'hits beyond the range are not mapped')
+        answer = client.update_configuration({'resolution': 0.5, 'view_range': 3.0})
+        self.assertEqual((answer.resolution, answer.view_range), (1.0, 0.0), 'refused as a whole')
 
     def test_inputs_have_settings_of_their_own(self):
         # Merged clouds come in the map frame, with colours; beams start at the sensor.

@@ -15,6 +15,9 @@ using Parameter = NamedParameter<MapperConfig>;
 /// All parameters of the mapper, in the order in which they are documented.
 std::vector<Parameter> mapperParameters();
 
+/// Whether a mapper can take over another value of a parameter and keep its map.
+bool changesWhileMapping(const std::string& name);
+
 /// setNamedParameters with the mapper's parameters.
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values);
 

@@ -42,6 +42,11 @@ class SemanticMapper {
   /// point that the map can hold; the map is then as it was.
   ScanStats integrate(const Scan& scan);
 
+  /// Takes over other settings; the map stays, and its states follow the gains.
+  /// @throws std::invalid_argument if a setting is not allowed, or cannot change while mapping
+  /// (changesWhileMapping); the settings are then as they were.
+  void reconfigure(const MapperConfig& config);
+
   /// Forgets all scans.
   void reset();
 
@@ -68,6 +73,9 @@ class SemanticMapper {
   const MapperConfig& config() const { return config_; }
 
  private:
+  /// What follows from settings that may change.
+  void applySettings();
+
   MapperConfig config_;
   std::shared_ptr<const ClassTable> classes_;
   SemanticMap map_;

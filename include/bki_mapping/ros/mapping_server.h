@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "bki_mapping/ros/live_settings.h"
 #include "bki_mapping/ros/map_publishing.h"
 #include "bki_mapping/ros/mapping_diagnostics.h"
 #include "bki_mapping/ros/pose_source.h"
@@ -38,6 +39,7 @@ class MappingServer {
   using Clock = std::chrono::steady_clock;
 
   void subscribe();
+  void applySettings(const ServerConfig& server, const MapperConfig& mapper);
   void offerServices();
   void work();
 
@@ -86,6 +88,7 @@ class MappingServer {
   ros::Publisher status_publisher_;
   std::unique_ptr<MapPublishing> publishing_;
   std::unique_ptr<MappingDiagnostics> diagnostics_;
+  std::unique_ptr<LiveSettings> live_settings_;
 
   std::atomic<bool> running_{true};
   std::thread thread_;

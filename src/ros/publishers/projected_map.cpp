@@ -14,8 +14,7 @@ constexpr std::int8_t kUnknownCell = -1, kFreeCell = 0, kOccupiedCell = 100;
 /// occupancy_max_z; free if any is free and none occupied; unknown otherwise.
 class ProjectedMap : public MapPublisher {
  public:
-  explicit ProjectedMap(const PublisherContext& context)
-      : min_z_(context.config.occupancy_min_z), max_z_(context.config.occupancy_max_z) {
+  explicit ProjectedMap(const PublisherContext& context) {
     publisher_ = context.advertiseWhole<nav_msgs::OccupancyGrid>("projected_map", *this);
   }
 
@@ -27,11 +26,13 @@ class ProjectedMap : public MapPublisher {
     grid.info.map_load_time = snapshot.header.stamp;
     grid.info.resolution = static_cast<float>(map.geometry().resolution());
     grid.info.origin.orientation.w = 1.0;
-    if (map.size() > 0) fill(map, grid);
+    if (map.size() > 0) fill(snapshot, grid);
     publisher_.publish(grid);
   }
 
-  void fill(const SemanticMap& map, nav_msgs::OccupancyGrid& grid) const {
+  static void fill(const MapSnapshot& snapshot, nav_msgs::OccupancyGrid& grid) {
+    const SemanticMap& map = snapshot.mapper.map();
+    const ServerConfig& config = snapshot.config;
     BlockIndex low = map.entries().front().index, high = low;
     for (const auto& entry : map.entries()) {
       low.x = std::min(low.x, entry.index.x);
@@ -47,15 +48,14 @@ class ProjectedMap : public MapPublisher {
     grid.data.assign(std::size_t{grid.info.width} * grid.info.height, kUnknownCell);
     forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
       const double z = map.geometry().voxelCentre(voxel).z();
-      if (z < min_z_ || z > max_z_ || view.state == VoxelState::kOccluded) return;
+      if (z < config.occupancy_min_z || z > config.occupancy_max_z || view.state == VoxelState::kOccluded)
+        return;
       const auto column = static_cast<std::size_t>(voxel.x - low.x * kBlockEdge);
       const auto row = static_cast<std::size_t>(voxel.y - low.y * kBlockEdge);
       std::int8_t& cell = grid.data[row * grid.info.width + column];
       cell = std::max(cell, view.state == VoxelState::kOccupied ? kOccupiedCell : kFreeCell);
     });
   }
-
-  double min_z_, max_z_;
 };
 
 }  // namespace

@@ -1,0 +1,97 @@
+#include "bki_mapping/ros/live_settings.h"
+
+#include <ros/param.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "bki_mapping/core/parameters.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// dynamic_reconfigure wants identifiers.
+std::string identifierOf(std::string name) {
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
+/// All values by identifier.
+std::map<std::string, std::string> valuesOf(const MappingConfig& config) {
+  dynamic_reconfigure::Config message;
+  config.__toMessage__(message);
+  std::map<std::string, std::string> values;
+  for (const auto& p : message.bools) values[p.name] = p.value ? "true" : "false";
+  for (const auto& p : message.ints) values[p.name] = std::to_string(p.value);
+  for (const auto& p : message.doubles) values[p.name] = numberText(p.value);
+  for (const auto& p : message.strs) values[p.name] = p.value;
+  return values;
+}
+
+/// Names and values of all parameters of both kinds.
+std::map<std::string, std::string> valuesOf(const ServerConfig& server, const MapperConfig& mapper) {
+  std::map<std::string, std::string> values;
+  for (const auto& p : serverParameters()) values[p.name] = p.get(server);
+  for (const auto& p : mapperParameters()) values[p.name] = p.get(mapper);
+  return values;
+}
+
+const char* const kFixed[] = {"resolution", "frame_id", "classes"};
+
+}  // namespace
+
+LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server,
+                           const MapperConfig& mapper, Apply apply)
+    : server_(server), mapper_(mapper), apply_(std::move(apply)) {
+  ros::NodeHandle node(private_node, "reconfigure");
+  ros::param::del(node.getNamespace());  // what an earlier run left there is not what this one was told
+  offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(node);
+  offered_->updateConfig(show(server_, mapper_));
+  offered_->setCallback([this](MappingConfig& config, std::uint32_t) { onChange(config); });
+}
+
+MappingConfig LiveSettings::show(const ServerConfig& server, const MapperConfig& mapper) {
+  MappingConfig config = MappingConfig::__getDefault__();
+  dynamic_reconfigure::Config message;
+  config.__toMessage__(message);
+  std::map<std::string, std::string> values;
+  for (const auto& [name, value] : valuesOf(server, mapper)) values[identifierOf(name)] = value;
+  for (auto& p : message.bools) p.value = values.at(p.name) == "true";
+  for (auto& p : message.ints) p.value = std::stoi(values.at(p.name));
+  for (auto& p : message.doubles) p.value = parseNumber(values.at(p.name));
+  for (auto& p : message.strs) p.value = values.at(p.name);
+  config.__fromMessage__(message);
+  return config;
+}
+
+void LiveSettings::take(const MappingConfig& from, ServerConfig& server, MapperConfig& mapper) {
+  const std::map<std::string, std::string> before = valuesOf(server, mapper), now = valuesOf(from);
+  std::map<std::string, std::string> changed;
+  for (const auto& [name, value] : before) {
+    const auto found = now.find(identifierOf(name));
+    if (found == now.end() || found->second == value) continue;
+    if (std::find(std::begin(kFixed), std::end(kFixed), name) != std::end(kFixed)) {
+      throw std::invalid_argument("parameter " + name +
+                                  " cannot change while mapping; set it and start again");
+    }
+    changed[name] = found->second;
+  }
+  setParameters(changed, server, mapper);
+}
+
+void LiveSettings::onChange(MappingConfig& config) {
+  ServerConfig server = server_;
+  MapperConfig mapper = mapper_;
+  try {
+    take(config, server, mapper);
+    if (valuesOf(server, mapper) != valuesOf(server_, mapper_)) apply_(server, mapper);
+    server_ = server;
+    mapper_ = mapper;
+  } catch (const std::invalid_argument& fault) {
+    ROS_WARN("Settings stay as they were: %s", fault.what());
+  }
+  config = show(server_, mapper_);
+}
+
+}  // namespace bki_mapping::ros_shell
