@@ -1,11 +1,11 @@
 # catkin: dependencies, messages and what the package exports. Before any target, so that catkin places them.
 set(BKI_MAPPING_CATKIN_COMPONENTS
-  diagnostic_updater dynamic_reconfigure geometry_msgs message_generation nav_msgs nodelet pluginlib rosbag roscpp
+  diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_generation nav_msgs nodelet pluginlib rosbag roscpp
   rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros visualization_msgs)
 find_package(catkin REQUIRED COMPONENTS ${BKI_MAPPING_CATKIN_COMPONENTS})
 find_package(pcl_conversions REQUIRED)  # headers only: its libraries are all of VTK
 
-add_message_files(FILES BlockCoordinates.msg ClassInfo.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg
+add_message_files(FILES BlockCoordinates.msg ClassInfo.msg ElevationMap.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg
   OccupancyUpdate.msg VoxelCloudUpdate.msg)
 add_service_files(FILES SaveMap.srv)
 generate_messages(DEPENDENCIES sensor_msgs std_msgs)
@@ -14,7 +14,7 @@ generate_dynamic_reconfigure_options(cfg/Mapping.cfg)
 catkin_package(
   INCLUDE_DIRS include
   LIBRARIES bki_mapping_core bki_mapping_io bki_mapping_ros
-  CATKIN_DEPENDS diagnostic_updater dynamic_reconfigure geometry_msgs message_runtime nav_msgs nodelet roscpp
+  CATKIN_DEPENDS diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_runtime nav_msgs nodelet roscpp
     rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros visualization_msgs
   DEPENDS EIGEN3
 )

@@ -24,6 +24,7 @@ add_library(bki_mapping_core SHARED
   src/free_space/random_samples.cpp
   src/free_space/registry.cpp
   src/mapping/dynamics_quality.cpp
+  src/mapping/column_map.cpp
   src/mapping/observation.cpp
   src/mapping/soft_merge.cpp
   src/mapping/semantic_mapper.cpp

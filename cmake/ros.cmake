@@ -15,6 +15,7 @@ add_library(bki_mapping_ros SHARED
   src/ros/point_field.cpp
   src/ros/pose_source.cpp
   src/ros/publishers/cell_markers.cpp
+  src/ros/publishers/elevation_map.cpp
   src/ros/publishers/occupancy.cpp
   src/ros/publishers/projected_map.cpp
   src/ros/publishers/registry.cpp

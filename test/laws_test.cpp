@@ -283,6 +283,9 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_EQ(mapper.map().freeGain(1), 0.1f);
   EXPECT_EQ(mapper.map().freeGain(2), 30.0f);
   EXPECT_EQ(mapper.map().freeGain(kFreeClass), 1.0f);
+  classes[2].free_gain = 7.0;
+  const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
+  EXPECT_EQ(own.map().freeGain(2), 7.0f);
 }
 
 }  // namespace

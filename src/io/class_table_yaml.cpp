@@ -47,8 +47,13 @@ void setFlag(const std::string& file, const std::string& flag, SemanticClass& c)
     c.unlabelled = true;
   } else if (flag == "dynamic") {
     c.dynamic = true;
+  } else if (flag == "ground") {
+    c.ground = true;
+  } else if (flag == "ignored") {
+    c.ignored = true;
   } else {
-    fail(file, "flag '" + flag + "' is unknown" + nearestWord(flag, {"unlabelled", "dynamic"}));
+    fail(file, "flag '" + flag + "' is unknown" +
+                   nearestWord(flag, {"unlabelled", "dynamic", "ground", "ignored"}));
   }
 }
 
@@ -59,7 +64,7 @@ std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::
 }
 
 SemanticClass parseClass(const std::string& file, const YAML::Node& node) {
-  const std::vector<std::string> keys = {"id", "name", "color", "raw", "flags"};
+  const std::vector<std::string> keys = {"id", "name", "color", "raw", "flags", "free_gain"};
   for (const auto& entry : node) {
     const auto key = entry.first.as<std::string>();
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
@@ -82,6 +87,11 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node) {
     c.raw = node["raw"].as<std::vector<std::uint32_t>>();
   }
   for (const YAML::Node& flag : node["flags"]) setFlag(file, flag.as<std::string>(), c);
+  if (c.ground && c.ignored) fail(file, "class '" + c.name + "' is flagged both ground and ignored");
+  if (node["free_gain"]) {
+    c.free_gain = node["free_gain"].as<double>();
+    if (!(*c.free_gain > 0.0)) fail(file, "the free_gain of class '" + c.name + "' must be a number > 0");
+  }
   return c;
 }
 

@@ -45,7 +45,8 @@ void SemanticMapper::applySettings() {
   soft_hits_.protectVoxels(config_.free_space.hits_before_misses);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
-    if (!c.unlabelled) map_.setFreeGain(c.id, c.dynamic ? gain.dynamic_classes : gain.static_classes);
+    const double of_kind = c.unlabelled ? 1.0 : (c.dynamic ? gain.dynamic_classes : gain.static_classes);
+    map_.setFreeGain(c.id, c.free_gain.value_or(of_kind));
   }
 }
 

@@ -105,6 +105,17 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
       realParameter<C>(
           "occupancy_max_z", "a number", "m", "Upper end of the space that projected_map shows.",
           [](C & c) -> auto& { return c.occupancy_max_z; }, [](double) { return true; }),
+      choiceParameter<C>(
+          "occupancy_height", {"map", "ground"},
+          "From where occupancy_min_z and occupancy_max_z are measured: the map frame's origin, or the "
+          "ground "
+          "below; obstacles without known ground below count at any height then.",
+          [](C & c) -> auto& { return c.occupancy_height; }),
+      choiceParameter<C>(
+          "full_projected_map", {"false", "true"},
+          "Whether projected_map is sent whole each time, for listeners that leave projected_map_updates "
+          "out.",
+          [](C & c) -> auto& { return c.full_projected_map; }),
   };
 }
 

@@ -9,9 +9,11 @@ import unittest
 
 import rospy
 import rostest
-from bki_mapping.msg import MappingStatus, OccupancyMap, OccupancyUpdate, VoxelCloudUpdate
+from bki_mapping.msg import ElevationMap, MappingStatus, OccupancyMap, OccupancyUpdate, VoxelCloudUpdate
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.client import Client
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointField
 from std_srvs.srv import Empty, Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -201,6 +203,44 @@ class Live(unittest.TestCase):
         self.assertLess(len({m.id for m in last.markers}), len(chunks), 'only chunks that changed are sent')
         self.call('reset')
         wait_until(lambda: markers.update() or not markers.shown, 'the markers being deleted')
+
+    def test_grids_from_above_follow_the_map(self):
+        self.drive(range(1))
+        grid = Listener('projected_map', OccupancyGrid)
+        updates = Listener('projected_map_updates', OccupancyGridUpdate)
+        elevation = Listener('elevation_map', ElevationMap)
+        for listener in (grid, updates, elevation):
+            self.addCleanup(listener.close)
+        grid.wait_for(lambda m: m.data, 'a whole grid')
+        elevation.wait_for(lambda m: m.whole, 'a whole elevation map')
+        # A second drive over the same place: the grid need not grow.
+        for seed in range(1, 3):
+            stamp = self.integrate(*random_scan(seed))
+        updates.wait_for(lambda m: m.header.stamp == stamp, 'the update of the last scan')
+        self.assertEqual(len(grid.messages), 1)
+        width, cells = grid.messages[0].info.width, list(grid.messages[0].data)
+        for update in updates.messages:
+            self.assertLess(update.width * update.height, len(cells))
+            for row in range(update.height):
+                begin = (update.y + row) * width + update.x
+                cells[begin:begin + update.width] = update.data[row * update.width:(row + 1) * update.width]
+        grid.close()
+        again = Listener('projected_map', OccupancyGrid)
+        self.addCleanup(again.close)
+        whole = again.wait_for(lambda m: True, 'the whole grid again')
+        self.assertEqual((whole.info.width, whole.info.origin.position.x),
+                         (width, grid.messages[0].info.origin.position.x))
+        self.assertEqual(list(whole.data), cells)
+        self.assertEqual({-1, 0, 100}, set(cells))
+        # The road is ground: it does not block, and it has a height.
+        self.call('reset')
+        stamp = self.integrate([(3.5, 0.5, -1.5), (3.5, 2.5, -1.5), (3.5, 2.5, 1.5)], [ROAD, ROAD, CAR])
+        part = elevation.wait_for(lambda m: m.header.stamp == stamp, 'the elevation')
+        place = {(x, y): (x - part.x) + part.width * (y - part.y) for x, y in ((3, 0), (3, 2), (0, 5))}
+        self.assertEqual(part.ground_height[place[3, 0]], -1.0)
+        self.assertEqual((part.ground_height[place[3, 2]], part.clearance[place[3, 2]]), (-1.0, 2.0))
+        self.assertEqual(bytes(part.ground_class)[place[3, 0]], 9)
+        self.assertNotEqual(part.ground_height[place[0, 5]], part.ground_height[place[0, 5]], 'NaN: not known')
 
     def test_the_queue_is_bounded_and_counts(self):
         before = self.deal_with(self.robot.scan([(2.0, 0.0, 0.0)], [CAR]))

@@ -130,7 +130,7 @@ class MappingTest(unittest.TestCase):
 
     def test_projected_map_is_cut_at_its_heights(self):
         # occupancy_min_z is -1: the hit at z = -1.5 is below, its cell is unknown.
-        stamp = self.integrate(HITS, [CAR, CAR, ROAD]).header.stamp
+        stamp = self.integrate(HITS + [(0.5, -3.5, -1.5)], [CAR, CAR, CAR, ROAD]).header.stamp
         grid = self.latest('projected_map', OccupancyGrid, stamp)
         self.assertEqual((grid.header.frame_id, grid.info.resolution), ('map', 1.0))
         cell = {}
@@ -141,6 +141,7 @@ class MappingTest(unittest.TestCase):
         self.assertEqual(cell[(4.5, 0.5)], 100)
         self.assertEqual(cell[(2.5, 0.5)], 0)
         self.assertEqual(cell[(0.5, 3.5)], -1)
+        self.assertEqual(cell[(0.5, -3.5)], 0, 'a road is ground')
         self.assertEqual(cell[(7.5, 7.5)], -1)
 
     def test_labels_of_every_datatype_give_the_same_map(self):

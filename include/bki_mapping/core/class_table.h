@@ -21,6 +21,9 @@ struct SemanticClass {
   bool any_raw = false;     ///< means all label numbers that no class lists; at most one class has this
   bool unlabelled = false;  ///< hits of no known class; at most one class has this
   bool dynamic = false;     ///< things of this class can move
+  bool ground = false;      ///< robots stand and drive on it
+  bool ignored = false;     ///< of no account for navigation: neither ground nor in the way
+  std::optional<double> free_gain;  ///< instead of the gain of the mapper's settings, > 0
 };
 
 /// Maps label numbers of clouds to classes. Immutable.

@@ -126,6 +126,7 @@ std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& cont
 std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
 
 }  // namespace bki_mapping::ros_shell

@@ -10,6 +10,7 @@
 
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/mapping/column_map.h"
 #include "bki_mapping/ros/input_config.h"
 #include "bki_mapping/ros/scan_queue.h"
 #include "bki_mapping/ros/time_watch.h"
@@ -34,6 +35,8 @@ struct ServerConfig {
   ColorMode color_mode = ColorMode::kSemantics;
   double occupancy_min_z = -1e6;  ///< of projected_map [m]
   double occupancy_max_z = 1e6;   ///< of projected_map [m]
+  HeightReference occupancy_height = HeightReference::kMap;
+  bool full_projected_map = false;  ///< whether projected_map is sent whole each time
   /// Of all inputs that set nothing else; the only input where `inputs` names none.
   InputConfig input;
   /// Settings of each named input, by name: parameter and value. See allInputs.

@@ -1,61 +1,93 @@
+#include <map_msgs/OccupancyGridUpdate.h>
 #include <nav_msgs/OccupancyGrid.h>
 
-#include <algorithm>
-
-#include "bki_mapping/core/map_query.h"
-#include "bki_mapping/ros/map_publisher.h"
+#include "columns.h"
 
 namespace bki_mapping::ros_shell {
 namespace {
 
-constexpr std::int8_t kUnknownCell = -1, kFreeCell = 0, kOccupiedCell = 100;
+/// Cells around the known ones in the grid, so that it need not grow with every scan.
+constexpr int kMargin = 16 * kBlockEdge;
 
-/// The map seen from above: a cell is occupied if any voxel above it is, between occupancy_min_z and
-/// occupancy_max_z; free if any is free and none occupied; unknown otherwise.
-class ProjectedMap : public MapPublisher {
+/// The map seen from above as a costmap_2d sends it: the grid when it grows, and rectangles that changed.
+class ProjectedMap : public ColumnPublisher {
  public:
   explicit ProjectedMap(const PublisherContext& context) {
-    publisher_ = context.advertiseWhole<nav_msgs::OccupancyGrid>("projected_map", *this);
+    publisher_ = context.advertiseUpdates<nav_msgs::OccupancyGrid>(
+        "projected_map", *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+          bool all = false;
+          look(snapshot, all);
+          if (all) layOut(snapshot);
+          subscriber.publish(whole(snapshot));
+        });
+    updates_ = context.advertiseUpdates<map_msgs::OccupancyGridUpdate>(
+        "projected_map_updates", *this, [](const auto&, const MapSnapshot&) {});
   }
+
+  bool wanted() const override { return MapPublisher::wanted() || updates_.getNumSubscribers() > 0; }
 
  private:
   void publishNew(const MapSnapshot& snapshot) override {
-    const SemanticMap& map = snapshot.mapper.map();
+    bool all = false;
+    const std::set<ColumnMap::Place> places = look(snapshot, all);
+    const bool inside =
+        std::all_of(places.begin(), places.end(), [&](const auto& p) { return grid_.contains(p); });
+    if (all || !inside) layOut(snapshot);
+    if (all || !inside || snapshot.config.full_projected_map) {
+      publisher_.publish(whole(snapshot));
+    } else if (!places.empty()) {
+      updates_.publish(update(snapshot, around(places)));
+    }
+  }
+
+  /// Makes the grid large enough for all that is known.
+  void layOut(const MapSnapshot& snapshot) {
+    grid_ = everything();
+    const bool grows = !snapshot.config.full_projected_map && grid_.width > 0;
+    if (!grows) return;
+    grid_.x -= kMargin;
+    grid_.y -= kMargin;
+    grid_.width += 2 * kMargin;
+    grid_.height += 2 * kMargin;
+  }
+
+  std::vector<std::int8_t> cells(const CellRectangle& rectangle) const {
+    std::vector<std::int8_t> data(std::size_t{rectangle.width} * rectangle.height,
+                                  static_cast<std::int8_t>(ColumnView::Occupancy::kUnknown));
+    forEachCell(rectangle, [&](std::size_t place, const ColumnView& view) {
+      data[place] = static_cast<std::int8_t>(view.occupancy);
+    });
+    return data;
+  }
+
+  nav_msgs::OccupancyGrid whole(const MapSnapshot& snapshot) const {
+    const double resolution = snapshot.mapper.map().geometry().resolution();
     nav_msgs::OccupancyGrid grid;
     grid.header = snapshot.header;
     grid.info.map_load_time = snapshot.header.stamp;
-    grid.info.resolution = static_cast<float>(map.geometry().resolution());
+    grid.info.resolution = static_cast<float>(resolution);
     grid.info.origin.orientation.w = 1.0;
-    if (map.size() > 0) fill(snapshot, grid);
-    publisher_.publish(grid);
+    grid.info.origin.position.x = grid_.x * resolution;
+    grid.info.origin.position.y = grid_.y * resolution;
+    grid.info.width = grid_.width;
+    grid.info.height = grid_.height;
+    grid.data = cells(grid_);
+    return grid;
   }
 
-  static void fill(const MapSnapshot& snapshot, nav_msgs::OccupancyGrid& grid) {
-    const SemanticMap& map = snapshot.mapper.map();
-    const ServerConfig& config = snapshot.config;
-    BlockIndex low = map.entries().front().index, high = low;
-    for (const auto& entry : map.entries()) {
-      low.x = std::min(low.x, entry.index.x);
-      low.y = std::min(low.y, entry.index.y);
-      high.x = std::max(high.x, entry.index.x);
-      high.y = std::max(high.y, entry.index.y);
-    }
-    const Eigen::Vector3d corner = map.geometry().blockOrigin(low);
-    grid.info.origin.position.x = corner.x();
-    grid.info.origin.position.y = corner.y();
-    grid.info.width = static_cast<std::uint32_t>((high.x - low.x + 1) * kBlockEdge);
-    grid.info.height = static_cast<std::uint32_t>((high.y - low.y + 1) * kBlockEdge);
-    grid.data.assign(std::size_t{grid.info.width} * grid.info.height, kUnknownCell);
-    forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
-      const double z = map.geometry().voxelCentre(voxel).z();
-      if (z < config.occupancy_min_z || z > config.occupancy_max_z || view.state == VoxelState::kOccluded)
-        return;
-      const auto column = static_cast<std::size_t>(voxel.x - low.x * kBlockEdge);
-      const auto row = static_cast<std::size_t>(voxel.y - low.y * kBlockEdge);
-      std::int8_t& cell = grid.data[row * grid.info.width + column];
-      cell = std::max(cell, view.state == VoxelState::kOccupied ? kOccupiedCell : kFreeCell);
-    });
+  map_msgs::OccupancyGridUpdate update(const MapSnapshot& snapshot, const CellRectangle& rectangle) const {
+    map_msgs::OccupancyGridUpdate message;
+    message.header = snapshot.header;
+    message.x = rectangle.x - grid_.x;
+    message.y = rectangle.y - grid_.y;
+    message.width = rectangle.width;
+    message.height = rectangle.height;
+    message.data = cells(rectangle);
+    return message;
   }
+
+  ros::Publisher updates_;
+  CellRectangle grid_;  ///< of the messages on projected_map
 };
 
 }  // namespace

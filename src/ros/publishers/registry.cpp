@@ -11,6 +11,7 @@ std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext
   publishers.push_back(makeProjectedMap(context));  // projected_map
   publishers.push_back(makeOccupancy(context));     // occupancy
   publishers.push_back(makeOccupancyUpdates(context));
+  publishers.push_back(makeElevationMap(context));
   publishers.push_back(makeTrajectory(context));  // trajectory
   return publishers;
 }

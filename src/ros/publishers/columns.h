@@ -1,0 +1,91 @@
+/// @file What the publishers of maps seen from above have in common.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "bki_mapping/mapping/column_map.h"
+#include "bki_mapping/ros/map_publisher.h"
+
+namespace bki_mapping::ros_shell {
+
+/// A rectangle of cells: columns of voxels.
+struct CellRectangle {
+  std::int32_t x = 0, y = 0;            ///< first column and row
+  std::uint32_t width = 0, height = 0;  ///< [cells]
+
+  bool contains(const ColumnMap::Place& place) const {
+    const std::int64_t left = std::int64_t{place.first} * kBlockEdge - x,
+                       below = std::int64_t{place.second} * kBlockEdge - y;
+    return left >= 0 && below >= 0 && left < width && below < height;
+  }
+
+  /// The smallest rectangle about columns of blocks. `begin` to `end` point to them.
+  template <typename Iterator, typename PlaceOf>
+  static CellRectangle around(Iterator begin, Iterator end, PlaceOf&& placeOf) {
+    if (begin == end) return {};
+    ColumnMap::Place low = placeOf(*begin), high = low;
+    for (; begin != end; ++begin) {
+      const ColumnMap::Place place = placeOf(*begin);
+      low = {std::min(low.first, place.first), std::min(low.second, place.second)};
+      high = {std::max(high.first, place.first), std::max(high.second, place.second)};
+    }
+    return {low.first * kBlockEdge, low.second * kBlockEdge,
+            static_cast<std::uint32_t>(high.first - low.first + 1) * kBlockEdge,
+            static_cast<std::uint32_t>(high.second - low.second + 1) * kBlockEdge};
+  }
+};
+
+/// Keeps up a ColumnMap while somebody listens.
+class ColumnPublisher : public MapPublisher {
+ public:
+  void rest() override {
+    MapPublisher::rest();
+    known_ = false;
+  }
+
+ protected:
+  static ColumnRules rulesOf(const ServerConfig& config) {
+    return {config.occupancy_min_z, config.occupancy_max_z, config.occupancy_height};
+  }
+
+  /// Looks at what changed. @return the columns of blocks looked at; `all` is set if it was all of them.
+  std::set<ColumnMap::Place> look(const MapSnapshot& snapshot, bool& all) {
+    const SemanticMap& map = snapshot.mapper.map();
+    all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
+    if (!all) return columns_.update(map, snapshot.mapper.classes(), changed.blocks());
+    columns_.start(rulesOf(snapshot.config));
+    known_ = true;
+    std::vector<GridIndex> blocks;
+    for (const auto& entry : map.entries()) blocks.push_back(entry.index);
+    return columns_.update(map, snapshot.mapper.classes(), blocks);
+  }
+
+  /// Calls write(place in the rectangle's arrays, view) for every known column in a rectangle of whole
+  /// blocks.
+  template <typename Write>
+  void forEachCell(const CellRectangle& r, Write&& write) const {
+    for (const auto& [place, columns] : columns_.columns()) {
+      if (!r.contains(place)) continue;
+      const auto x = static_cast<std::size_t>(place.first * kBlockEdge - r.x),
+                 y = static_cast<std::size_t>(place.second * kBlockEdge - r.y);
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        write((y + c / kBlockEdge) * r.width + x + c % kBlockEdge, columns[c]);
+      }
+    }
+  }
+
+  CellRectangle everything() const {
+    return CellRectangle::around(columns_.columns().begin(), columns_.columns().end(),
+                                 [](const auto& entry) { return entry.first; });
+  }
+  static CellRectangle around(const std::set<ColumnMap::Place>& places) {
+    return CellRectangle::around(places.begin(), places.end(), [](const auto& place) { return place; });
+  }
+
+ private:
+  ColumnMap columns_;
+  bool known_ = false;  ///< whether columns_ follows the map
+};
+
+}  // namespace bki_mapping::ros_shell

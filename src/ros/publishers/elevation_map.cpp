@@ -1,0 +1,64 @@
+#include <bki_mapping/ElevationMap.h>
+
+#include <limits>
+
+#include "columns.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+/// The ground, and what is above it: first whole, then rectangles that changed.
+class Elevation : public ColumnPublisher {
+ public:
+  explicit Elevation(const PublisherContext& context) {
+    publisher_ = context.advertiseUpdates<ElevationMap>(
+        "elevation_map", *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+          bool all = false;
+          look(snapshot, all);
+          subscriber.publish(message(snapshot, everything(), true));
+        });
+  }
+
+ private:
+  void publishNew(const MapSnapshot& snapshot) override {
+    bool all = false;
+    const std::set<ColumnMap::Place> places = look(snapshot, all);
+    ++sequence_;
+    publisher_.publish(message(snapshot, all ? everything() : around(places), all));
+  }
+
+  ElevationMap message(const MapSnapshot& snapshot, const CellRectangle& rectangle, bool whole) const {
+    const std::size_t cells = std::size_t{rectangle.width} * rectangle.height;
+    ElevationMap message;
+    message.header = snapshot.header;
+    message.sequence = sequence_;
+    message.whole = whole;
+    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    message.x = rectangle.x;
+    message.y = rectangle.y;
+    message.width = rectangle.width;
+    message.height = rectangle.height;
+    const ColumnView unknown;
+    message.ground_height.assign(cells, unknown.ground);
+    message.ground_class.assign(cells, unknown.ground_class);
+    message.clearance.assign(cells, unknown.clearance);
+    message.occluded_height.assign(cells, unknown.occluded);
+    forEachCell(rectangle, [&](std::size_t place, const ColumnView& view) {
+      message.ground_height[place] = view.ground;
+      message.ground_class[place] = view.ground_class;
+      message.clearance[place] = view.clearance;
+      message.occluded_height[place] = view.occluded;
+    });
+    return message;
+  }
+
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context) {
+  return std::make_unique<Elevation>(context);
+}
+
+}  // namespace bki_mapping::ros_shell
