@@ -143,8 +143,11 @@ TEST(TimeWatch, NoticesTimeGoingBack) {
   EXPECT_FALSE(watch.stampsWentBack(1, ros::Time(50.0)));  // another sensor's clock
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(99.5)));  // out of order
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time()));
-  EXPECT_TRUE(watch.stampsWentBack(0, ros::Time(98.0)));
-  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(98.1)));
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(20.0)));  // a stray
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(100.1)));
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(98.0)));
+  EXPECT_TRUE(watch.stampsWentBack(0, ros::Time(98.1)));
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(98.2)));
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(4294967295u, 0u)));
   watch.restart();
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(1.0)));

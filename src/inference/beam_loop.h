@@ -27,6 +27,14 @@ struct PickedBeams {
   alignas(64) std::int32_t ux[kMost + kLanes], uy[kMost + kLanes], uz[kMost + kLanes];
   alignas(64) float inverse_length[kMost + kLanes];
   int count = 0;
+
+  /// Fills the last lanes that loops look at with beams that have no weight.
+  void pad() {
+    for (int n = count; n < count + kLanes; ++n) {
+      ux[n] = uy[n] = uz[n] = 0;
+      inverse_length[n] = 0.0f;
+    }
+  }
 };
 
 /// Appends those of kLanes beams that are to be kept. @param keep -1 or 0.
@@ -140,6 +148,7 @@ template <BeamWeight kWeight>
 void addOctant(const BeamBlock& block, const Places& places, int octant, PickedBeams& near_octant,
                float* sums) {
   PickedBeams near_tile;
+  near_octant.pad();
   for (int n = 0; n < 8; ++n) {
     const int number = tileInOctant(octant, n);
     const Place place = places.tile(number);
@@ -151,8 +160,7 @@ void addOctant(const BeamBlock& block, const Places& places, int octant, PickedB
     if (near_tile.count == 0) continue;
     const Tile tile = tileOf(block, places, number);
     alignas(64) float lanes[8 * kLanes] = {};
-    for (int lane = 0; lane < kLanes; ++lane)
-      near_tile.inverse_length[near_tile.count + lane] = 0.0f;  // no weight
+    near_tile.pad();
     for (int b = 0; b < near_tile.count; b += kLanes) addPicked<kWeight>(near_tile, b, tile, lanes);
     addTile(tile, lanes, sums);
   }

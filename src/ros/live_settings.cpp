@@ -46,7 +46,7 @@ LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConf
     : server_(server), mapper_(mapper), apply_(std::move(apply)) {
   ros::NodeHandle node(private_node, "reconfigure");
   ros::param::del(node.getNamespace());  // what an earlier run left there is not what this one was told
-  offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(node);
+  offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(mutex_, node);
   offered_->updateConfig(show(server_, mapper_));
   offered_->setCallback([this](MappingConfig& config, std::uint32_t) { onChange(config); });
 }

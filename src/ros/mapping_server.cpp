@@ -187,8 +187,11 @@ void MappingServer::onTimeJump(const ros::Time& new_time, const std::string& wha
   ledger_.timeJumped();
   time_watch_.restart();
   poses_->restart(new_time);
-  const std::size_t waited = waiting_.size();
-  while (const auto waiting = waiting_.takeIf([](const WaitingCloud&) { return true; })) {
+  const auto of_old_time = [&](const WaitingCloud& waiting) {
+    return waiting.cloud->header.stamp.toSec() > new_time.toSec() + TimeWatch::kOutOfOrder;
+  };
+  std::size_t waited = 0;
+  for (; const auto waiting = waiting_.takeIf(of_old_time); ++waited) {
     drop(*waiting->cloud, DropReason::kTimeJump, "time jumped back while it waited");
   }
   const bool forget = config_.on_time_jump == OnTimeJump::kReset;

@@ -321,10 +321,13 @@ class Live(unittest.TestCase):
         waiting = self.robot.next_stamp()
         self.robot.clouds.publish(make_cloud([(2.0, 0.0, 0.0)], [CAR], waiting))  # waits for its pose
         self.robot.seconds -= 50
-        again = self.robot.scan([(0.5, 3.5, 0.5)], [ROAD])
+        first = self.robot.scan([(0.5, 3.5, 0.5)], [ROAD])  # one old cloud alone might be a stray
+        self.assertEqual(self.status.find(lambda m: True).time_jumps, jumps)
+        again = self.robot.scan([(0.5, 5.5, 0.5)], [ROAD])
         status = self.deal_with(again)
         self.assertTrue(status.integrated_last, status)
         self.assertEqual(status.time_jumps, jumps + 1)
+        self.assertTrue(self.deal_with(first).integrated_last, 'it waited, and is of the new time')
         self.assertEqual(self.status.find(lambda m: m.header.stamp == waiting).last_drop, 'time jump')
         self.assertTrue(adds_up(status), status)
         self.assertEqual(self.map_of_server(again)[(0, 0, 0)][0][4], OccupancyMap.OCCUPIED)

@@ -33,6 +33,7 @@ class LiveSettings {
   ServerConfig server_;
   MapperConfig mapper_;
   Apply apply_;
+  boost::recursive_mutex mutex_;  ///< of offered_
   std::unique_ptr<dynamic_reconfigure::Server<MappingConfig>> offered_;
 };
 

@@ -23,22 +23,30 @@ class TimeWatch {
     return back;
   }
 
-  /// @return whether the stamps of an input went back by more than clouds out of order do. A stamp of 0 says
-  /// nothing.
+  /// @return whether the stamps of an input went back by more than clouds out of order do, in two clouds in a
+  /// row: one alone is a stray. A stamp of 0 says nothing.
   bool stampsWentBack(std::size_t input, const ros::Time& stamp) {
-    if (input >= latest_.size()) latest_.resize(input + 1);
+    if (input >= inputs_.size()) inputs_.resize(input + 1);
     if (stamp.isZero()) return false;
-    const bool back = stamp.toSec() + kOutOfOrder < latest_[input].toSec();
-    if (back || stamp > latest_[input]) latest_[input] = stamp;
-    return back;
+    Input& i = inputs_[input];
+    const bool back = stamp.toSec() + kOutOfOrder < i.latest.toSec();
+    const bool again = back && i.stray;
+    i.stray = back && !again;
+    if (again || stamp > i.latest) i.latest = stamp;
+    return again;
   }
 
   /// Time starts anew.
-  void restart() { latest_.clear(); }
+  void restart() { inputs_.clear(); }
 
  private:
+  struct Input {
+    ros::Time latest;    ///< stamp
+    bool stray = false;  ///< whether the last cloud was far older
+  };
+
   ros::Time clock_;
-  std::vector<ros::Time> latest_;  ///< stamp of each input
+  std::vector<Input> inputs_;
 };
 
 }  // namespace bki_mapping::ros_shell
