@@ -44,11 +44,15 @@ bki_mapping_tool(play_sequence bki_mapping_ros)
 add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 
+add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
+bki_mapping_tool(benchmark_publishing bki_mapping_ros)
+
 install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS benchmark_sequence evaluate_map map_sequence mapping_node play_sequence sequence_to_bag simulate_drive
+install(TARGETS benchmark_publishing benchmark_sequence evaluate_map map_sequence mapping_node play_sequence
+  sequence_to_bag simulate_drive
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 if(TARGET benchmark_parts)
   install(TARGETS benchmark_parts RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

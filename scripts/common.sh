@@ -50,3 +50,18 @@ source_build() {
   source "$1/devel/setup.bash"
   set -u
 }
+
+# The soak test by itself, so that its exit status counts. $1: build folder, $2: seconds, $3: seed of the faults.
+run_soak() {
+  (
+    source_build "$1"
+    export ROS_MASTER_URI=http://localhost:11611
+    roscore -p 11611 >/dev/null 2>&1 &
+    trap 'kill %1; wait' EXIT
+    for _ in $(seq 100); do
+      if rosparam list >/dev/null 2>&1; then break; fi
+      sleep 0.1
+    done
+    BKI_MAPPING_SOAK_SECONDS=$2 BKI_MAPPING_SOAK_SEED=$3 "$1/devel/lib/bki_mapping/soak_test"
+  )
+}

@@ -157,6 +157,22 @@ TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
   EXPECT_THROW(read(maker.message()), std::invalid_argument);
 }
 
+TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {
+  pose("sensor", 100.0, {0, 0, 0});
+  MapperConfig config;
+  config.free_space.mode = "none";
+  SemanticMapper mapper(config, classes());
+  EXPECT_EQ(mapper.integrate(placed(cloud({{1, 2, 3}}).message()).scan).counts.used, 1u);
+  std::vector<Eigen::Vector3f> many;
+  for (int i = 0; i < 2000000; ++i) {
+    const float a = 1e-4f * static_cast<float>(i);
+    many.emplace_back(30.0f * std::cos(a), 30.0f * std::sin(a), 1e-6f * static_cast<float>(i));
+  }
+  const ScanStats stats = mapper.integrate(placed(cloud(many).message()).scan);
+  EXPECT_EQ(stats.counts.used, 2000000u);
+  EXPECT_GT(stats.hits, 1000u);
+}
+
 TEST_F(Reader, SureLabelsGiveTheSameMapInEveryEncoding) {
   pose("sensor", 100.0, {0.3, 0.2, 0.1}, 0.4);
   std::vector<Eigen::Vector3f> points;

@@ -299,6 +299,22 @@ class Live(unittest.TestCase):
         answer = client.update_configuration({'resolution': 0.5, 'view_range': 3.0})
         self.assertEqual((answer.resolution, answer.view_range), (1.0, 0.0), 'refused as a whole')
 
+    def test_window_and_memory_are_bounded(self):
+        client = Client('/mapping/reconfigure', timeout=30)
+        self.addCleanup(client.close)
+        self.addCleanup(client.update_configuration, {'window': 0.0, 'memory_limit': 0.0})
+        client.update_configuration({'window': 40.0})
+        for step in range(6):
+            stamp = self.integrate([(3.5, 0.5, 0.5)], [CAR], position=(30.0 * step, 0.0, 0.0))
+        blocks = self.map_of_server(stamp)
+        self.assertGreater(len(blocks), 0)
+        self.assertTrue(all(8 * x + 8 > 150 - 28 for x, _, _ in blocks), blocks.keys())
+        before = self.status.find(lambda m: True)
+        client.update_configuration({'memory_limit': 0.001})
+        status = self.deal_with(self.robot.scan([(3.5, 0.5, 0.5)], [CAR]))
+        self.assertEqual(status.dropped_memory, before.dropped_memory + 1)
+        self.assertEqual(status.map_bytes, before.map_bytes)
+
     def test_inputs_have_settings_of_their_own(self):
         # Merged clouds come in the map frame, with colours; beams start at the sensor.
         self.merged.seconds = self.robot.seconds

@@ -8,6 +8,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "bki_mapping/inference/index_numbering.h"
@@ -66,6 +67,7 @@ class MapPublisher {
  public:
   virtual ~MapPublisher() = default;
   virtual bool wanted() const { return publisher_.getNumSubscribers() > 0; }
+  std::string topic() const { return publisher_.getTopic(); }
   /// Publishes what is new since the last call, or all of it; then nothing is new.
   void publish(const MapSnapshot& snapshot) {
     publishNew(snapshot);
