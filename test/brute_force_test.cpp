@@ -192,6 +192,34 @@ TEST_P(EveryScene, SoftLabelsEqualBruteForce) {
   }
 }
 
+TEST_P(EveryScene, EvidenceBeforeMissesEqualsBruteForce) {
+  if (scene_.name == "near the sensor") GTEST_SKIP() << "nothing is left to clear there";
+  for (const std::string mode : {"even", "line"}) {
+    for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+      MapperConfig config = withMode(mode);
+      config.kernel.type = kernel;
+      config.free_space.evidence_before_misses = true;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", evidence before misses, " + mode);
+      expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
+                             scene_.name + ", soft, evidence before misses");
+    }
+  }
+}
+
+TEST_P(EveryScene, LimitsOfAScanEqualBruteForce) {
+  for (const std::string mode : {"even", "line"}) {
+    for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+      MapperConfig config = withMode(mode);
+      config.kernel.type = kernel;
+      config.scan_limit.hits = kernel == KernelType::kSparse ? 0.05 : 1.0;
+      config.scan_limit.free = kernel == KernelType::kSparse ? 0.03 : 0.4;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", limits, " + mode);
+      expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
+                             scene_.name + ", soft labels, limits, " + mode);
+    }
+  }
+}
+
 TEST_P(EveryScene, NoReturnsEqualBruteForce) {
   Scan scan = scene_.scan;
   for (int i = 0; i < 40; ++i) {

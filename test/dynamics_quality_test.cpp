@@ -50,6 +50,28 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_DOUBLE_EQ(quality.accuracy(), std::sqrt(0.5));
 }
 
+TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
+  std::vector<SemanticClass> flagged = reference::smallTable()->classes();
+  flagged[1].ground = true;
+  flagged[2].dynamic = true;
+  const ClassTable classes("flags", flagged);
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {99}, 1, 1);
+  evaluation.add(scanOf({{{0.5f, 0, 0}, 10},
+                         {{0.6f, 0, 0}, 10},
+                         {{1.5f, 0, 0}, 10},
+                         {{2.5f, 0, 0}, 20},
+                         {{3.5f, 0, 0}, 20},
+                         {{4.5f, 0, 0}, 30}}),
+                 classes);
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}, {2.5, 0, 0}}));
+  EXPECT_DOUBLE_EQ(quality.groundAccuracy(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(quality.standingAccuracy(), 0.5);
+  EXPECT_DOUBLE_EQ(quality.otherAccuracy(), 0.0);
+  EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.5);
+  EXPECT_EQ(quality.floor_voxels, 2u);
+  EXPECT_DOUBLE_EQ(quality.holes(), 0.5);
+}
+
 TEST(DynamicsQuality, NothingToCountIsNoNumber) {
   const DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
   const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}));

@@ -83,6 +83,23 @@ class Tools(unittest.TestCase):
         self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
         self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
 
+    def test_presets(self):
+        folder = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets')
+        figures = {}
+        for name in sorted(os.listdir(folder)):
+            result = call('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
+                          '--config', os.path.join(folder, name))
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(self.path('figures.json')) as file:
+                figures[name[:-len('.yaml')]] = json.load(file)
+        self.assertEqual(set(figures), {'baseline_even', 'occupancy_only', 'paper_line', 'paper_linear', 'paper_none',
+                                        'robot', 'small_cpu'})
+        self.assertEqual(figures['paper_none']['sa'], 1.0)
+        for figure in ('sa', 'sa_ground', 'sa_standing', 'sa_other'):
+            self.assertGreater(figures['robot'][figure], figures['paper_line'][figure], figure)
+        self.assertGreater(figures['robot']['sa'], 0.98)
+        self.assertLess(figures['robot']['floor_holes'], 0.2 * figures['paper_line']['floor_holes'])
+
     def test_benchmark(self):
         result = call('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--csv', self.path('times.csv'))
         self.assertEqual(result.returncode, 0, result.stderr)

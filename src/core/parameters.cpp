@@ -65,6 +65,11 @@ std::vector<Parameter> mapperParameters() {
           "the "
           "same scan.",
           [](MapperConfig & c) -> auto& { return c.free_space.hits_before_misses; }),
+      choiceParameter<MapperConfig>(
+          "free_space/evidence_before_misses", {"false", "true"},
+          "Whether a voxel that gets evidence from a hit of a scan takes no evidence for free from the same "
+          "scan.",
+          [](MapperConfig & c) -> auto& { return c.free_space.evidence_before_misses; }),
       realParameter<MapperConfig>(
           "free_gain/dynamic", "a number > 0", "",
           "Gain on the evidence for free when the state of a voxel is decided whose likeliest class is "
@@ -75,6 +80,14 @@ std::vector<Parameter> mapperParameters() {
           "free_gain/static", "a number > 0", "",
           "The same for classes not flagged dynamic; below 1, beams that graze a surface do not eat it.",
           [](MapperConfig & c) -> auto& { return c.free_gain.static_classes; }, positive),
+      realParameter<MapperConfig>(
+          "scan_limit/hits", "a number >= 0", "",
+          "The most evidence that the hits of one scan add to one class of a voxel; 0: no limit.",
+          [](MapperConfig & c) -> auto& { return c.scan_limit.hits; }, notNegative),
+      realParameter<MapperConfig>(
+          "scan_limit/free", "a number >= 0", "",
+          "The most evidence for free that one scan adds to a voxel; 0: no limit.",
+          [](MapperConfig & c) -> auto& { return c.scan_limit.free; }, notNegative),
       realParameter<MapperConfig>(
           "sensor_model/min_range", "a number >= 0", "m", "Nearer hits are dropped.",
           [](MapperConfig & c) -> auto& { return c.sensor_model.min_range; }, notNegative),

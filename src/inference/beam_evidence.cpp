@@ -44,7 +44,7 @@ void BeamEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch&
   scratch.leaveHeldAlone();
   float most = 0.0f;
   for (int v = 0; v < kBlockVoxels; ++v) {
-    sums[v] *= field_->kernel().scale;
+    sums[v] = std::min(sums[v] * field_->kernel().scale, scratch.limits.free);
     most = std::max(most, sums[v]);
   }
   if (most > 0.0f) block.add(kFreeClass, sums);

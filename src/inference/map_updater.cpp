@@ -40,6 +40,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
   stats.collect_ms = watch.lap();
 
   scratch_.resize(workers.count());
+  for (EvidenceScratch& scratch : scratch_) scratch.limits = limits_;
   workers.forEach((jobs_.size() + kBlocksAJob - 1) / kBlocksAJob, [&](std::size_t j, std::size_t worker) {
     const std::size_t end = std::min(jobs_.size(), (j + 1) * kBlocksAJob);
     for (std::size_t n = j * kBlocksAJob; n < end; ++n) {

@@ -169,6 +169,8 @@ void PointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch
     scratch.sums.fill(0.0f);
     addPoints(points + i, end - i, scratch.sums.data());
     if (label == kFreeClass) scratch.leaveHeldAlone();
+    if (protect_evidence_) scratch.holdSums();
+    scratch.limit(static_cast<ClassId>(label));
     const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(), isZero);
     if (!nothing) block.add(static_cast<ClassId>(label), scratch.sums.data());
     i = end;

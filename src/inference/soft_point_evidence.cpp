@@ -84,6 +84,8 @@ void SoftPointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScr
       if (protect_ && voxel != LocalPoint::kOutside) scratch.held.set(voxel);
       addRecord(records[i], scratch.sums.data());
     }
+    if (protect_evidence_) scratch.holdSums();
+    scratch.limit(label);
     const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(),
                                                  [](float sum) { return sum == 0.0f; });
     if (!nothing) block.add(label, scratch.sums.data());

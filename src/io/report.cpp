@@ -106,7 +106,12 @@ std::string qualityJson(const DynamicsQuality& q, double median_ms) {
                                   {"static_kept", q.static_kept},
                                   {"moving_points", q.moving_points},
                                   {"moving_removed", q.moving_removed},
+                                  {"floor_voxels", q.floor_voxels},
+                                  {"floor_holes", q.holes()},
                                   {"sa", q.staticAccuracy()},
+                                  {"sa_ground", q.groundAccuracy()},
+                                  {"sa_standing", q.standingAccuracy()},
+                                  {"sa_other", q.otherAccuracy()},
                                   {"da", q.dynamicAccuracy()},
                                   {"aa", q.accuracy()},
                                   {"median_ms", median_ms}};

@@ -20,7 +20,10 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
     if (number == fresh) voxels_.push_back({index});
     Voxel& voxel = voxels_[number];
     const bool moving = moving_.count(scan.labels[i]) > 0;
-    voxel.static_points += !moving;
+    const SemanticClass& known = *classes.find(*id);
+    voxel.ground_points += !moving && known.ground;
+    voxel.standing_points += !moving && known.dynamic;
+    voxel.other_points += !moving && !known.ground && !known.dynamic;
     voxel.early_moving_points += moving && early;
     voxel.hit_late |= late;
   }
@@ -31,14 +34,25 @@ DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
   DynamicsQuality quality;
   for (const Voxel& voxel : voxels_) {
     const Block* block = map.find(GridGeometry::blockOf(voxel.index));
-    const bool occupied = block && viewVoxel(map, *block, GridGeometry::offsetInBlock(voxel.index)).state ==
+    const bool occupied = block && judgeVoxel(map, *block, GridGeometry::offsetInBlock(voxel.index)).state ==
                                        VoxelState::kOccupied;
-    quality.static_points += voxel.static_points;
-    if (occupied) quality.static_kept += voxel.static_points;
+    quality.ground_points += voxel.ground_points;
+    quality.standing_points += voxel.standing_points;
+    quality.other_points += voxel.other_points;
+    quality.floor_voxels += voxel.ground_points > 0;
+    if (occupied) {
+      quality.ground_kept += voxel.ground_points;
+      quality.standing_kept += voxel.standing_points;
+      quality.other_kept += voxel.other_points;
+    } else {
+      quality.floor_holes += voxel.ground_points > 0;
+    }
     if (voxel.hit_late) continue;
     quality.moving_points += voxel.early_moving_points;
     if (!occupied) quality.moving_removed += voxel.early_moving_points;
   }
+  quality.static_points = quality.ground_points + quality.standing_points + quality.other_points;
+  quality.static_kept = quality.ground_kept + quality.standing_kept + quality.other_kept;
   return quality;
 }
 

@@ -43,6 +43,12 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
 void SemanticMapper::applySettings() {
   hits_.protectVoxels(config_.free_space.hits_before_misses);
   soft_hits_.protectVoxels(config_.free_space.hits_before_misses);
+  hits_.protectEvidence(config_.free_space.evidence_before_misses);
+  soft_hits_.protectEvidence(config_.free_space.evidence_before_misses);
+  EvidenceLimits limits;
+  if (config_.scan_limit.hits > 0.0) limits.hits = static_cast<float>(config_.scan_limit.hits);
+  if (config_.scan_limit.free > 0.0) limits.free = static_cast<float>(config_.scan_limit.free);
+  updater_.setLimits(limits);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     const double of_kind = c.unlabelled ? 1.0 : (c.dynamic ? gain.dynamic_classes : gain.static_classes);

@@ -44,6 +44,10 @@ int evaluate(const po::variables_map& given) {
   const DynamicsQuality quality = evaluation.compare(mapper.map());
   const double median_ms = quantile(times, 0.5);
   print("SA", quality.staticAccuracy(), "of the points of standing things are in occupied voxels");
+  print("  ground  ", quality.groundAccuracy(), "of those of ground");
+  print("  standing", quality.standingAccuracy(), "of those of things that could move, but stand");
+  print("  other   ", quality.otherAccuracy(), "of the others");
+  print("holes", quality.holes(), "of the voxels that hold points of ground are not occupied");
   print("DA", quality.dynamicAccuracy(), "of the early points of moving things are not");
   print("AA", quality.accuracy(), "sqrt(SA DA)");
   std::cout << quality.static_points << " points of standing and " << quality.moving_points

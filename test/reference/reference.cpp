@@ -203,9 +203,20 @@ Value ScanReference::lineEvidence(const VoxelIndex& voxel) const {
   return value;
 }
 
-Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
+Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
   if (label != kFreeClass) return pointEvidence(hits_, voxel, label);
   Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
+  if (config_.free_space.evidence_before_misses) {
+    Value hits;
+    for (int id = 0; id < static_cast<int>(kMaxClasses); ++id) {
+      const Value one = pointEvidence(hits_, voxel, id);
+      hits.sum += one.sum;
+      hits.slack += one.slack;
+    }
+    if (hits.slack > 0.0 || (hits.sum > 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
+      value.slack += value.sum;
+    if (hits.sum >= 1e-6 * config_.kernel.scale) return Value();
+  }
   if (!config_.free_space.hits_before_misses) return value;
   const Eigen::Vector3d centre = relativeCentre(voxel);
   for (const Point& hit : hits_) {
@@ -213,6 +224,13 @@ Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
     if (outside < -kClose) return Value();
     if (outside <= kClose) value.slack += value.sum;
   }
+  return value;
+}
+
+Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
+  Value value = unlimited(voxel, label);
+  const double most = label == kFreeClass ? config_.scan_limit.free : config_.scan_limit.hits;
+  if (most > 0.0) value.sum = std::min(value.sum, most);
   return value;
 }
 

@@ -52,6 +52,7 @@ class ScanReference {
   const std::vector<Eigen::Vector3d>& beams() const { return beams_; }
 
  private:
+  Value unlimited(const VoxelIndex& voxel, ClassId label) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
   Value lineEvidence(const VoxelIndex& voxel) const;

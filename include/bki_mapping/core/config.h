@@ -24,7 +24,8 @@ struct FreeSpaceConfig {
   BeamWeight weight = BeamWeight::kBilinear;            ///< mode line
   FreeSpaceExtent extent = FreeSpaceExtent::kObserved;  ///< mode line
   BeamIndexType beam_index = BeamIndexType::kTable;     ///< mode line, and occlusion
-  bool hits_before_misses = false;  ///< voxels that hold a hit are not cleared by its scan
+  bool hits_before_misses = false;      ///< voxels that hold a hit are not cleared by its scan
+  bool evidence_before_misses = false;  ///< nor are voxels that a hit's kernel reaches
 };
 
 /// Gains on the evidence for `free` when the state of a voxel is decided, by its likeliest class; 1 is the
@@ -32,6 +33,12 @@ struct FreeSpaceConfig {
 struct FreeGainConfig {
   double dynamic_classes = 1.0;  ///< classes flagged dynamic
   double static_classes = 1.0;   ///< the others
+};
+
+/// What one scan may add at most to one class of one voxel; 0: no limit.
+struct ScanLimitConfig {
+  double hits = 0.0;
+  double free = 0.0;
 };
 
 struct SensorModelConfig {
@@ -52,6 +59,7 @@ struct MapperConfig {
   KernelConfig kernel;
   FreeSpaceConfig free_space;
   FreeGainConfig free_gain;
+  ScanLimitConfig scan_limit;
   SensorModelConfig sensor_model;
   bool clear_beyond_max_range = true;  ///< hits beyond max_range clear as beams cut there
   OcclusionExtent occlusion = OcclusionExtent::kNone;

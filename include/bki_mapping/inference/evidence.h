@@ -1,8 +1,10 @@
 /// @file What a scan says, in a form that the updater can spread over blocks.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bitset>
+#include <limits>
 #include <vector>
 
 #include "bki_mapping/core/semantic_map.h"
@@ -13,8 +15,15 @@
 
 namespace bki_mapping {
 
+/// What one scan may add at most to one class of one voxel.
+struct EvidenceLimits {
+  float hits = std::numeric_limits<float>::infinity();
+  float free = std::numeric_limits<float>::infinity();
+};
+
 /// Working memory of one thread.
 struct EvidenceScratch {
+  EvidenceLimits limits;
   alignas(64) std::array<float, kBlockVoxels> sums{};
   std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
@@ -25,6 +34,16 @@ struct EvidenceScratch {
   void leaveHeldAlone() {
     if (held.none()) return;
     for (std::size_t v = 0; v < sums.size(); ++v) sums[v] = held[v] ? 0.0f : sums[v];
+  }
+  /// Holds the voxels that `sums` say something of.
+  void holdSums() {
+    for (std::size_t v = 0; v < sums.size(); ++v) {
+      if (sums[v] > 0.0f) held.set(v);
+    }
+  }
+  void limit(ClassId id) {
+    const float most = id == kFreeClass ? limits.free : limits.hits;
+    for (float& sum : sums) sum = std::min(sum, most);
   }
 };
 

@@ -17,6 +17,8 @@ struct MapUpdateStats {
 /// Adds evidence to maps. Keeps its memory from scan to scan.
 class MapUpdater {
  public:
+  void setLimits(const EvidenceLimits& limits) { limits_ = limits; }
+
   /// Adds all pieces of evidence of one scan, in the order given. The result does not depend on the number of
   /// workers, to the bit. Blocks about which nothing is known afterwards are not kept.
   /// @param evidence at most 32 pieces.
@@ -35,6 +37,7 @@ class MapUpdater {
 
   void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
 
+  EvidenceLimits limits_;
   IndexNumbering touched_, numbering_;
   std::vector<Job> jobs_;
   std::vector<EvidenceScratch> scratch_;  ///< one a worker

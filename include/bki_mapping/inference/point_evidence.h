@@ -30,6 +30,8 @@ class PointEvidence : public Evidence {
 
   /// Whether evidence for `free` that stands behind this one leaves the voxels alone that hold a point.
   void protectVoxels(bool protect) { protect_ = protect; }
+  /// The same for voxels to which a point adds evidence.
+  void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point.
   void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
@@ -63,7 +65,7 @@ class PointEvidence : public Evidence {
   double per_metre_;  ///< voxels
   VoxelKernel kernel_;
   const InnerLoops& loops_;
-  bool protect_ = false;
+  bool protect_ = false, protect_evidence_ = false;
   std::size_t size_ = 0;
   std::vector<Chunk> chunks_;
   std::array<Partition, kPartitions> partitions_;

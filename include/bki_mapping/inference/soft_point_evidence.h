@@ -21,6 +21,8 @@ class SoftPointEvidence : public Evidence {
   void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, const SoftLabels& soft);
   /// Whether evidence for `free` that stands behind this one leaves the voxels alone that hold a point.
   void protectVoxels(bool protect) { protect_ = protect; }
+  /// The same for voxels to which a point adds evidence.
+  void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point, or, if protected, with a point.
   void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
@@ -37,7 +39,7 @@ class SoftPointEvidence : public Evidence {
 
   GridGeometry geometry_;
   VoxelKernel kernel_;
-  bool protect_ = false;
+  bool protect_ = false, protect_evidence_ = false;
   IndexNumbering blocks_;
   std::vector<std::vector<Record>> records_;  ///< of each block, by class
 };

@@ -16,13 +16,23 @@ namespace bki_mapping {
 
 /// The accuracies of the DynamicMap benchmark (Zhang et al., ITSC 2023), point by point of the input.
 struct DynamicsQuality {
-  std::size_t static_points = 0;   ///< labelled points of things that stand, of all scans
-  std::size_t static_kept = 0;     ///< of these, in voxels that the map calls occupied
+  std::size_t static_points = 0;  ///< labelled points of things that stand, of all scans
+  std::size_t static_kept = 0;    ///< of these, in voxels that the map calls occupied
+  /// Of the static points, and of those kept: by class flags ground, dynamic (what could move, but stands),
+  /// and neither.
+  std::size_t ground_points = 0, ground_kept = 0, standing_points = 0, standing_kept = 0, other_points = 0,
+              other_kept = 0;
+  std::size_t floor_voxels = 0;    ///< voxels that hold static points of ground
+  std::size_t floor_holes = 0;     ///< of these, such that the map does not call occupied
   std::size_t moving_points = 0;   ///< points of things that move, of the first half of the scans, in voxels
                                    ///< that no point of the last scans hits
   std::size_t moving_removed = 0;  ///< of these, in voxels that the map does not call occupied
 
-  double staticAccuracy() const { return share(static_kept, static_points); }          ///< SA
+  double staticAccuracy() const { return share(static_kept, static_points); }  ///< SA
+  double groundAccuracy() const { return share(ground_kept, ground_points); }
+  double standingAccuracy() const { return share(standing_kept, standing_points); }
+  double otherAccuracy() const { return share(other_kept, other_points); }
+  double holes() const { return share(floor_holes, floor_voxels); }
   double dynamicAccuracy() const { return share(moving_removed, moving_points); }      ///< DA
   double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
 
@@ -53,7 +63,7 @@ class DynamicsEvaluation {
  private:
   struct Voxel {
     VoxelIndex index;
-    std::uint32_t static_points = 0, early_moving_points = 0;
+    std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
     bool hit_late = false;
   };
 
