@@ -26,6 +26,7 @@ add_library(bki_mapping_core SHARED
   src/mapping/dynamics_quality.cpp
   src/mapping/column_map.cpp
   src/mapping/observation.cpp
+  src/mapping/semantic_quality.cpp
   src/mapping/soft_merge.cpp
   src/mapping/semantic_mapper.cpp
 )

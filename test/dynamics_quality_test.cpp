@@ -48,6 +48,7 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.75);
   EXPECT_DOUBLE_EQ(quality.dynamicAccuracy(), 2.0 / 3.0);
   EXPECT_DOUBLE_EQ(quality.accuracy(), std::sqrt(0.5));
+  EXPECT_DOUBLE_EQ(quality.harmonicAccuracy(), 12.0 / 17.0);
 }
 
 TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {

@@ -82,7 +82,8 @@ std::vector<Parameter> mapperParameters() {
           [](MapperConfig & c) -> auto& { return c.free_gain.static_classes; }, positive),
       realParameter<MapperConfig>(
           "scan_limit/hits", "a number >= 0", "",
-          "The most evidence that the hits of one scan add to one class of a voxel; 0: no limit.",
+          "The most evidence that the hits of one scan add to a voxel, shared by its classes in proportion; "
+          "0: no limit.",
           [](MapperConfig & c) -> auto& { return c.scan_limit.hits; }, notNegative),
       realParameter<MapperConfig>(
           "scan_limit/free", "a number >= 0", "",

@@ -1,6 +1,7 @@
 #include "bki_mapping/inference/point_evidence.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "bki_mapping/inference/axis_blocks.h"
@@ -163,14 +164,24 @@ void PointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch
     for (std::size_t i = 0; i < count; ++i) scratch.points[begin[points[i].label]++] = points[i];
     points = scratch.points.data();
   }
+  const bool limited = std::isfinite(scratch.limits.hits) && points[0].label != kFreeClass;
+  if (limited) {
+    scratch.sums.fill(0.0f);
+    addPoints(points, count, scratch.sums.data());
+    scratch.shareHits();
+  }
   for (std::size_t i = 0; i < count;) {
     const std::uint32_t label = points[i].label;
     std::size_t end = one_class ? count : begin[label];
     scratch.sums.fill(0.0f);
     addPoints(points + i, end - i, scratch.sums.data());
-    if (label == kFreeClass) scratch.leaveHeldAlone();
     if (protect_evidence_) scratch.holdSums();
-    scratch.limit(static_cast<ClassId>(label));
+    if (label == kFreeClass) {
+      scratch.leaveHeldAlone();
+      scratch.limitFree();
+    } else if (limited) {
+      scratch.limitHits();
+    }
     const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(), isZero);
     if (!nothing) block.add(static_cast<ClassId>(label), scratch.sums.data());
     i = end;

@@ -1,6 +1,7 @@
 #include "bki_mapping/inference/soft_point_evidence.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "bki_mapping/inference/axis_blocks.h"
 
@@ -76,6 +77,12 @@ void SoftPointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScr
   const std::uint32_t number = blocks_.find(index);
   if (number == IndexNumbering::kNone) return;
   const std::vector<Record>& records = records_[number];
+  const bool limited = std::isfinite(scratch.limits.hits);
+  if (limited) {
+    scratch.sums.fill(0.0f);
+    for (const Record& record : records) addRecord(record, scratch.sums.data());
+    scratch.shareHits();
+  }
   for (std::size_t i = 0; i < records.size();) {
     const auto label = static_cast<ClassId>(records[i].point.label);
     scratch.sums.fill(0.0f);
@@ -85,7 +92,7 @@ void SoftPointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScr
       addRecord(records[i], scratch.sums.data());
     }
     if (protect_evidence_) scratch.holdSums();
-    scratch.limit(label);
+    if (limited) scratch.limitHits();
     const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(),
                                                  [](float sum) { return sum == 0.0f; });
     if (!nothing) block.add(label, scratch.sums.data());

@@ -7,6 +7,7 @@
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/dynamics_quality.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/mapping/semantic_quality.h"
 #include "bki_mapping/tools/options.h"
 
 namespace {
@@ -18,7 +19,11 @@ po::options_description options() {
   po::options_description options("Options");
   options.add_options()("json", po::value<std::string>()->value_name("FILE.json"), "figures to write")(
       "late", po::value<std::size_t>()->value_name("N")->default_value(3),
-      "voxels hit in the last N scans need not be cleared");
+      "voxels hit in the last N scans need not be cleared")(
+      "label-noise", po::value<double>()->value_name("SHARE")->default_value(0.0),
+      "give the mapper this share of labels wrong")(
+      "noise-seed", po::value<std::uint64_t>()->value_name("N")->default_value(1),
+      "same seed, same wrong labels");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -34,11 +39,19 @@ int evaluate(const po::variables_map& given) {
   const auto [first, last] = tools::frameRange(given, sequence);
   DynamicsEvaluation evaluation(mapper.map().geometry(), DynamicsEvaluation::movingOfSemanticKitti(),
                                 last - first, given["late"].as<std::size_t>());
+  SemanticEvaluation semantics(mapper.map().geometry());
+  const double noise = given["label-noise"].as<double>();
+  if (!(noise >= 0.0 && noise <= 1.0)) throw std::invalid_argument("--label-noise must be a share, 0 to 1");
   std::vector<double> times;
   for (std::size_t i = first; i < last; ++i) {
     const Scan scan = sequence.read(i).scan();
-    times.push_back(mapper.integrate(scan).totalMs());
+    Scan told = scan;
+    if (noise > 0.0) {
+      told.labels = withLabelNoise(scan, mapper.classes(), noise, given["noise-seed"].as<std::uint64_t>());
+    }
+    times.push_back(mapper.integrate(told).totalMs());
     evaluation.add(scan, mapper.classes());
+    semantics.add(scan, told.labels, mapper.classes());
     tools::showProgress(times.size(), last - first, "");
   }
   const DynamicsQuality quality = evaluation.compare(mapper.map());
@@ -50,13 +63,20 @@ int evaluate(const po::variables_map& given) {
   print("holes", quality.holes(), "of the voxels that hold points of ground are not occupied");
   print("DA", quality.dynamicAccuracy(), "of the early points of moving things are not");
   print("AA", quality.accuracy(), "sqrt(SA DA)");
+  print("HA", quality.harmonicAccuracy(), "2 SA DA / (SA + DA)");
+  const SemanticQuality semantic = semantics.compare(mapper.map());
+  print("mIoU of the map", semantic.map.meanIou(), "at the labelled points");
+  print("mIoU of the input", semantic.input.meanIou(), "of the labels given to the mapper");
+  print("ECE", semantic.calibrationError(), "expected calibration error of the class's probability");
+  print("AUSE", semantic.sparsificationError, "area under the sparsification error curve, by variance");
   std::cout << quality.static_points << " points of standing and " << quality.moving_points
             << " of moving things; median " << median_ms << " ms a scan\n";
   if (quality.moving_points == 0) {
     std::cout << "there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known\n";
   }
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(), qualityJson(quality, median_ms));
+    writeTextFile(given["json"].as<std::string>(),
+                  qualityJson(quality, semantic, mapper.classes(), median_ms));
   }
   return 0;
 }

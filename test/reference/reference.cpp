@@ -86,7 +86,10 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
     cut.push_back({direction.cast<double>().normalized() * max_range, 255});
   }
   hits_ = downsample(origin_, raw, config.downsample_resolution);
-  for (const Point& hit : hits_) beams_.push_back(hit.p);
+  for (const Point& hit : hits_) {
+    beams_.push_back(hit.p);
+    any_hits_.push_back({hit.p, 0});
+  }
   for (const Point& end : downsample(origin_, cut, config.downsample_resolution)) beams_.push_back(end.p);
   drawSamples(scan.stamp);
 }
@@ -133,6 +136,10 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
     if (std::abs(outside) <= kClose) value.slack += share;
   }
   return value;
+}
+
+Value ScanReference::anyHit(const VoxelIndex& voxel) const {
+  return pointEvidence(any_hits_, voxel, 0);
 }
 
 bool ScanReference::reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho,
@@ -207,12 +214,7 @@ Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
   if (label != kFreeClass) return pointEvidence(hits_, voxel, label);
   Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
   if (config_.free_space.evidence_before_misses) {
-    Value hits;
-    for (int id = 0; id < static_cast<int>(kMaxClasses); ++id) {
-      const Value one = pointEvidence(hits_, voxel, id);
-      hits.sum += one.sum;
-      hits.slack += one.slack;
-    }
+    const Value hits = anyHit(voxel);
     if (hits.slack > 0.0 || (hits.sum > 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
       value.slack += value.sum;
     if (hits.sum >= 1e-6 * config_.kernel.scale) return Value();
@@ -229,8 +231,14 @@ Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
 
 Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   Value value = unlimited(voxel, label);
-  const double most = label == kFreeClass ? config_.scan_limit.free : config_.scan_limit.hits;
-  if (most > 0.0) value.sum = std::min(value.sum, most);
+  const ScanLimitConfig& limit = config_.scan_limit;
+  if (label == kFreeClass) {
+    if (limit.free > 0.0) value.sum = std::min(value.sum, limit.free);
+    return value;
+  }
+  if (limit.hits == 0.0) return value;
+  const double all = anyHit(voxel).sum;
+  if (all > limit.hits) value.sum *= limit.hits / all;
   return value;
 }
 

@@ -55,6 +55,8 @@ class ScanReference {
   Value unlimited(const VoxelIndex& voxel, ClassId label) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
+  /// Of all hits, whatever their class.
+  Value anyHit(const VoxelIndex& voxel) const;
   Value lineEvidence(const VoxelIndex& voxel) const;
   bool blockIsHit(const BlockIndex& block) const;
   void drawSamples(std::uint64_t stamp);
@@ -65,6 +67,7 @@ class ScanReference {
   GridGeometry geometry_;
   Eigen::Vector3d origin_;
   std::vector<Point> hits_, samples_;
+  std::vector<Point> any_hits_;  ///< the hits, all of class 0
   std::vector<Eigen::Vector3d> beams_;
   mutable std::map<std::tuple<int, int, int>, bool> hit_blocks_;
 };

@@ -35,9 +35,9 @@ struct FreeGainConfig {
   double static_classes = 1.0;   ///< the others
 };
 
-/// What one scan may add at most to one class of one voxel; 0: no limit.
+/// What one scan may add at most to one voxel; 0: no limit.
 struct ScanLimitConfig {
-  double hits = 0.0;
+  double hits = 0.0;  ///< to all classes together; they share it in proportion
   double free = 0.0;
 };
 

@@ -15,7 +15,7 @@
 
 namespace bki_mapping {
 
-/// What one scan may add at most to one class of one voxel.
+/// What one scan may add at most to one voxel.
 struct EvidenceLimits {
   float hits = std::numeric_limits<float>::infinity();
   float free = std::numeric_limits<float>::infinity();
@@ -25,6 +25,7 @@ struct EvidenceLimits {
 struct EvidenceScratch {
   EvidenceLimits limits;
   alignas(64) std::array<float, kBlockVoxels> sums{};
+  alignas(64) std::array<float, kBlockVoxels> share{};  ///< of the evidence of hits that is within the limit
   std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
@@ -41,9 +42,17 @@ struct EvidenceScratch {
       if (sums[v] > 0.0f) held.set(v);
     }
   }
-  void limit(ClassId id) {
-    const float most = id == kFreeClass ? limits.free : limits.hits;
-    for (float& sum : sums) sum = std::min(sum, most);
+  /// Keeps evidence for `free` within its limit.
+  void limitFree() {
+    for (float& sum : sums) sum = std::min(sum, limits.free);
+  }
+  /// Sets `share`, by which the hits of each class are multiplied, from the sums of all classes.
+  void shareHits() {
+    for (std::size_t v = 0; v < sums.size(); ++v)
+      share[v] = sums[v] > limits.hits ? limits.hits / sums[v] : 1.0f;
+  }
+  void limitHits() {
+    for (std::size_t v = 0; v < sums.size(); ++v) sums[v] *= share[v];
   }
 };
 

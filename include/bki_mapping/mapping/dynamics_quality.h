@@ -35,6 +35,9 @@ struct DynamicsQuality {
   double holes() const { return share(floor_holes, floor_voxels); }
   double dynamicAccuracy() const { return share(moving_removed, moving_points); }      ///< DA
   double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
+  double harmonicAccuracy() const {                                                    ///< HA
+    return 2.0 * staticAccuracy() * dynamicAccuracy() / (staticAccuracy() + dynamicAccuracy());
+  }
 
  private:
   /// NaN if there is nothing to share.
