@@ -93,6 +93,14 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "view_range", "a number >= 0", "m",
           "How far around the sensor markers and voxel_cloud show the map, on each axis; 0: all of it.",
           [](C & c) -> auto& { return c.view_range; }, notNegative),
+      realParameter<C>(
+          "view_min_z", "a number", "m",
+          "Lower end of the heights that markers and voxel_cloud show, in the map frame.",
+          [](C & c) -> auto& { return c.view_min_z; }, [](double) { return true; }),
+      realParameter<C>(
+          "view_max_z", "a number", "m",
+          "Upper end of the heights that markers and voxel_cloud show, in the map frame.",
+          [](C & c) -> auto& { return c.view_max_z; }, [](double) { return true; }),
       choiceParameter<C>(
           "latch", {"false", "true"}, "Whether map topics are latched.",
           [](C & c) -> auto& { return c.latch; }),
@@ -181,6 +189,9 @@ void setParameters(const std::map<std::string, std::string>& values, ServerConfi
   setNamedParameters(parameters, both, values);
   if (both.first.occupancy_min_z > both.first.occupancy_max_z) {
     throw std::invalid_argument("parameter occupancy_min_z must not be above occupancy_max_z");
+  }
+  if (both.first.view_min_z > both.first.view_max_z) {
+    throw std::invalid_argument("parameter view_min_z must not be above view_max_z");
   }
   for (const InputConfig& input : allInputs(both.first, both.second)) {
     if (input.clear_no_returns && input.sensor_model.max_range <= 0.0) {

@@ -299,6 +299,24 @@ class Live(unittest.TestCase):
         answer = client.update_configuration({'resolution': 0.5, 'view_range': 3.0})
         self.assertEqual((answer.resolution, answer.view_range), (1.0, 0.0), 'refused as a whole')
 
+    def test_views_are_limited(self):
+        client = Client('/mapping/reconfigure', timeout=30)
+        self.addCleanup(client.close)
+        self.addCleanup(client.update_configuration, {'view_range': 0.0, 'view_max_z': 1e6})
+        self.integrate([(3.5, 0.5, 0.5), (3.5, 0.5, 5.5), (100.5, 0.5, 0.5)], [CAR] * 3)
+        markers = MarkerClient()
+        self.addCleanup(markers.listener.close)
+
+        def shows(*points):
+            wait_until(lambda: markers.update() or [p for _, p in markers.cubes()] == sorted(points), f'{points}')
+        shows((3.5, 0.5, 0.5), (3.5, 0.5, 5.5), (100.5, 0.5, 0.5))
+        client.update_configuration({'view_range': 20.0})
+        shows((3.5, 0.5, 0.5), (3.5, 0.5, 5.5))
+        client.update_configuration({'view_max_z': 2.0})
+        shows((3.5, 0.5, 0.5))
+        self.integrate([(3.5, 0.2, 0.2)], [CAR], position=(110.0, 0.5, 0.5))  # the view moves on, chunk by chunk
+        shows((100.5, 0.5, 0.5), (113.5, 0.5, 0.5))
+
     def test_window_and_memory_are_bounded(self):
         client = Client('/mapping/reconfigure', timeout=30)
         self.addCleanup(client.close)

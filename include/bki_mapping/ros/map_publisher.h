@@ -31,6 +31,8 @@ struct MapSnapshot {
     const double beyond = (centre - sensor).cwiseAbs().maxCoeff() - 0.5 * edge;
     return config.view_range <= 0.0 || beyond <= config.view_range;
   }
+  /// Whether a height is within view_min_z and view_max_z.
+  bool heightInView(double z) const { return z >= config.view_min_z && z <= config.view_max_z; }
   bool inView(const BlockIndex& block) const {
     const GridGeometry& geometry = mapper.map().geometry();
     return inView(geometry.blockCentre(block), geometry.blockSize());

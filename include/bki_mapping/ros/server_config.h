@@ -30,6 +30,8 @@ struct ServerConfig {
   double window = 0.0;             ///< edge of the cube about the sensor that is kept [m]; 0: everything is
   double diagnostic_period = 1.0;  ///< [s]
   double publish_rate = 2.0;       ///< maps a second, at most [Hz]
+  double view_min_z = -1e6;        ///< lowest voxels that markers and voxel_cloud show [m]
+  double view_max_z = 1e6;         ///< highest [m]
   double view_range = 0.0;         ///< how far markers and voxel_cloud show [m]; 0: everything
   bool latch = false;              ///< whether map topics are latched
   ColorMode color_mode = ColorMode::kSemantics;

@@ -139,11 +139,12 @@ class CellMarkers : public MapPublisher {
       for (int offset = 0; block && offset < kBlockVoxels; ++offset) {
         const VoxelView view = judgeVoxel(map, *block, offset);
         if (view.state != state_) continue;
+        const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
+        if (!snapshot.heightInView(centre.z())) continue;
         auto place = markers.find(view.label);
         if (place == markers.end()) {
           place = markers.emplace(view.label, emptyMarker(snapshot, view.label)).first;
         }
-        const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
         geometry_msgs::Point point;
         point.x = centre.x();
         point.y = centre.y();

@@ -2,6 +2,8 @@
 #include <pcl_conversions/pcl_conversions.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include <algorithm>
+
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/voxel_pcl.h"
 #include "bki_mapping/ros/map_publisher.h"
@@ -22,6 +24,10 @@ class CloudBuilder {
     for (const auto& [index, block] : sortedBlocks(snapshot_.mapper.map())) {
       if (!in_view || snapshot_.inView(index)) add(index, *block);
     }
+    const auto hidden = [&](const VoxelRecord& v) {
+      return !snapshot_.heightInView(static_cast<double>(v.z));
+    };
+    if (in_view) voxels_.erase(std::remove_if(voxels_.begin(), voxels_.end(), hidden), voxels_.end());
   }
   sensor_msgs::PointCloud2 cloud() const {
     pcl::PCLPointCloud2 cloud = toPcl(voxels_);
