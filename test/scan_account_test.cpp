@@ -60,20 +60,21 @@ TEST(ScanLedger, AddsUp) {
   stats.update_ms = 20.0;
   for (int i = 0; i < 14; ++i) ledger.received(now);
   ledger.integrated(header, stats, 0.25, now);
-  EXPECT_EQ(ledger.status(now).points_dropped, 1u);
-  EXPECT_EQ(ledger.status(now).latency_median_ms, 250.0f);
-  EXPECT_EQ(ledger.status(now).integration_p99_ms, 20.0f);
+  EXPECT_EQ(ledger.status(now, 3).points_dropped, 1u);
+  EXPECT_EQ(ledger.status(now, 3).latency_median_ms, 250.0f);
+  EXPECT_EQ(ledger.status(now, 3).integration_p99_ms, 20.0f);
   for (const DropKind& kind : dropKinds()) {
     EXPECT_EQ(&kind - dropKinds().data(), static_cast<std::ptrdiff_t>(kind.reason));
-    const std::uint64_t before = ledger.status(now).*kind.count;
+    const std::uint64_t before = ledger.status(now, 3).*kind.count;
     ledger.dropped(header, kind.reason);
-    EXPECT_EQ(ledger.status(now).*kind.count, before + 1);
-    EXPECT_EQ(ledger.status(now).last_drop, kind.name);
-    EXPECT_FALSE(ledger.status(now).integrated_last);
+    EXPECT_EQ(ledger.status(now, 3).*kind.count, before + 1);
+    EXPECT_EQ(ledger.status(now, 3).last_drop, kind.name);
+    EXPECT_FALSE(ledger.status(now, 3).integrated_last);
   }
   EXPECT_EQ(ledger.droppedClouds(), dropKinds().size());
-  EXPECT_EQ(ledger.status(now).waiting, 14 - 1 - dropKinds().size());
-  const std::string text = ledger.summary();
+  EXPECT_EQ(ledger.status(now, 3).waiting, 3u);
+  EXPECT_EQ(ledger.status(now, 3).received, 1 + dropKinds().size() + 3);
+  const std::string text = ledger.summary(3);
   EXPECT_NE(text.find("Mapped 1 of 14 clouds"), std::string::npos) << text;
   EXPECT_NE(text.find("1 queue full"), std::string::npos) << text;
   EXPECT_NE(text.find("3 were still waiting"), std::string::npos) << text;
@@ -83,13 +84,13 @@ TEST(ScanLedger, TellsUnknownLabelsApart) {
   ScanLedger ledger;
   ledger.unknownLabels({{7, 2}, {300, 1}});
   ledger.unknownLabels({{7, 3}});
-  const MappingStatus status = ledger.status(Clock::time_point());
+  const MappingStatus status = ledger.status(Clock::time_point(), 0);
   EXPECT_EQ(status.unknown_labels, (std::vector<std::uint32_t>{7, 300}));
   EXPECT_EQ(status.unknown_label_counts, (std::vector<std::uint64_t>{5, 1}));
   std::map<std::uint32_t, std::size_t> many;
   for (std::uint32_t label = 1000; label < 2000; ++label) many[label] = 1;
   ledger.unknownLabels(many);
-  EXPECT_EQ(ledger.status(Clock::time_point()).unknown_labels.size(), 64u);
+  EXPECT_EQ(ledger.status(Clock::time_point(), 0).unknown_labels.size(), 64u);
 }
 
 TEST(Diagnostics, JudgeWhatHappened) {

@@ -99,7 +99,7 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
   evidence_.assign(1, soft ? static_cast<Evidence*>(&soft_hits_) : &hits_);
   if (free.evidence) evidence_.push_back(free.evidence);
   if (config_.occlusion != OcclusionExtent::kNone) {
-    const double max_range = config_.sensor_model.max_range;
+    const double max_range = scan.sensor_model.value_or(config_.sensor_model).max_range;
     const BeamField& field = beams_.field(workers_);
     occlusion_.setField(field, max_range > 0.0 ? max_range : field.longest());
     evidence_.push_back(&occlusion_);

@@ -38,7 +38,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
 MappingServer::~MappingServer() {
   running_ = false;
   thread_.join();
-  ROS_INFO("%s", ledger_.summary().c_str());
+  ROS_INFO("%s", ledger_.summary(waiting_.size()).c_str());
 }
 
 void MappingServer::subscribe() {
@@ -84,10 +84,10 @@ void MappingServer::work() {
 void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
   const sensor_msgs::PointCloud2ConstPtr& cloud = event.getConstMessage();
   const auto now = Clock::now();
-  ledger_.received(now);
   checkClock();
   const ros::Time& stamp = cloud->header.stamp;
   if (time_watch_.stampsWentBack(input, stamp)) onTimeJump(stamp, "the stamps of clouds went back");
+  ledger_.received(now);
   if (paused_) return drop(*cloud, DropReason::kPaused, "mapping is paused; call ~resume to go on");
   // It has waited for this call while the last scan was mapped.
   const double since = std::max(0.0, ros::Time::now().toSec() - event.getReceiptTime().toSec());
@@ -129,7 +129,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
                   missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
     }
     integrate(waiting, std::get<PlacedScan>(placed));
-  } catch (const std::invalid_argument& fault) {
+  } catch (const std::exception& fault) {
     drop(cloud, DropReason::kBadCloud,
          std::string(fault.what()) + "; check the cloud's source and the settings of the input");
   }
@@ -213,7 +213,7 @@ void MappingServer::drop(const sensor_msgs::PointCloud2& cloud, DropReason reaso
 }
 
 MappingStatus MappingServer::status() {
-  MappingStatus status = ledger_.status(Clock::now());
+  MappingStatus status = ledger_.status(Clock::now(), waiting_.size());
   status.paused = paused_;
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
   status.map_bytes = mapper_->blockBytes();

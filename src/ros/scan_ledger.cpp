@@ -58,8 +58,8 @@ std::uint64_t ScanLedger::droppedClouds() const {
   return sum;
 }
 
-MappingStatus ScanLedger::status(Clock::time_point now) {
-  status_.waiting = status_.received - status_.integrated - droppedClouds();
+MappingStatus ScanLedger::status(Clock::time_point now, std::size_t waiting) {
+  status_.waiting = waiting;
   status_.received_hz = static_cast<float>(received_rate_.rate(now));
   status_.integrated_hz = static_cast<float>(integrated_rate_.rate(now));
   status_.latency_median_ms = static_cast<float>(latency_.median());
@@ -75,7 +75,7 @@ MappingStatus ScanLedger::status(Clock::time_point now) {
   return status_;
 }
 
-std::string ScanLedger::summary() const {
+std::string ScanLedger::summary(std::size_t waiting) const {
   std::string text = "Mapped " + std::to_string(status_.integrated) + " of " +
                      std::to_string(status_.received) + " clouds; dropped";
   const char* separator = ": ";
@@ -84,7 +84,6 @@ std::string ScanLedger::summary() const {
     text += separator + std::to_string(status_.*kind.count) + " " + kind.name;
     separator = ", ";
   }
-  const std::uint64_t waiting = status_.received - status_.integrated - droppedClouds();
   if (droppedClouds() == 0) text += " none";
   if (waiting > 0) text += "; " + std::to_string(waiting) + " were still waiting";
   return text;

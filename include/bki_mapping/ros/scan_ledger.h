@@ -53,10 +53,11 @@ class ScanLedger {
   std::uint64_t droppedClouds() const;
   const RollingStatistics& integration() const { return integration_; }  ///< [ms]
 
-  /// The status; rates and quantiles as of `now`.
-  MappingStatus status(Clock::time_point now);
+  /// The status; rates and quantiles as of `now`. @param waiting clouds in the queue, as the queue counts
+  /// them.
+  MappingStatus status(Clock::time_point now, std::size_t waiting);
   /// All counts in one line, for the log.
-  std::string summary() const;
+  std::string summary(std::size_t waiting) const;
 
  private:
   /// Unknown labels are told apart up to this many values.

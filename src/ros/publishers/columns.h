@@ -65,12 +65,15 @@ class ColumnPublisher : public MapPublisher {
   /// blocks.
   template <typename Write>
   void forEachCell(const CellRectangle& r, Write&& write) const {
-    for (const auto& [place, columns] : columns_.columns()) {
-      if (!r.contains(place)) continue;
-      const auto x = static_cast<std::size_t>(place.first * kBlockEdge - r.x),
-                 y = static_cast<std::size_t>(place.second * kBlockEdge - r.y);
-      for (std::size_t c = 0; c < columns.size(); ++c) {
-        write((y + c / kBlockEdge) * r.width + x + c % kBlockEdge, columns[c]);
+    const auto& all = columns_.columns();
+    for (std::size_t x = 0; x < r.width; x += kBlockEdge) {
+      const auto first = static_cast<std::int32_t>((r.x + static_cast<std::int64_t>(x)) / kBlockEdge);
+      for (auto at = all.lower_bound({first, r.y / kBlockEdge}); at != all.end(); ++at) {
+        if (at->first.first != first || !r.contains(at->first)) break;
+        const auto y = static_cast<std::size_t>(at->first.second * kBlockEdge - r.y);
+        for (std::size_t c = 0; c < at->second.size(); ++c) {
+          write((y + c / kBlockEdge) * r.width + x + c % kBlockEdge, at->second[c]);
+        }
       }
     }
   }
