@@ -42,16 +42,19 @@ bki_mapping_script_test(tools_test)
 if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
-    test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/mapping_rostest.py test/ros/replay_rostest.py test/ros/two_mappers_rostest.py
+    test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/mapping_rostest.py
+    test/ros/publishing_rostest.py test/ros/replay_rostest.py test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_test(cloud_conversion_test bki_mapping_ros)
   bki_mapping_unit_test(scan_account_test bki_mapping_ros)
   bki_mapping_unit_test(scan_reader_test bki_mapping_ros)
   bki_mapping_unit_test(server_config_test bki_mapping_ros)
+  add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)
   add_rostest(test/ros/live.test)
   add_rostest(test/ros/mapping_node.test)
   add_rostest(test/ros/mapping_nodelet.test)
+  add_rostest(test/ros/publishing.test)
   add_rostest(test/ros/replay.test)
   add_rostest(test/ros/two_mappers.test)
   # Found by rostest where catkin puts executables; loads the nodelet into its own process.

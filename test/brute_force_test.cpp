@@ -231,6 +231,13 @@ TEST_P(EveryScene, NoReturnsEqualBruteForce) {
   scan.sensor_model->max_range = 2.5;
   expectEqualsBruteForce(scan, withMode("line"), scene_.name + ", no returns, line");
   expectEqualsBruteForce(scan, withMode("even"), scene_.name + ", no returns, even");
+  for (Eigen::Vector3f direction : scan.no_returns) {  // the same beams as points at the sensor's range
+    scan.points.push_back(direction.normalized() * 2.5f);
+    scan.labels.push_back(10);
+  }
+  scan.no_returns.clear();
+  scan.no_returns_at_max_range = true;
+  expectEqualsBruteForce(scan, withMode("line"), scene_.name + ", points at the maximum, line");
 }
 
 INSTANTIATE_TEST_SUITE_P(Nasty, EveryScene, testing::Range<std::size_t>(0, reference::nastyScenes(1).size()));

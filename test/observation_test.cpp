@@ -56,6 +56,22 @@ TEST(Observation, CountsEveryReason) {
   EXPECT_NEAR(seen.beams.ends[1].x(), 50.0f, 1e-4f);
 }
 
+TEST(Observation, PointsAtTheSensorsRangeAreNoReturnsWhereTheScanSaysSo) {
+  MapperConfig config = plainConfig();
+  config.sensor_model.max_range = 50.0;
+  config.clear_beyond_max_range = false;
+  Scan scan = scanOf({{50, 0, 0}, {0, 49.999f, 0}, {0, 0, 50.001f}, {49.9f, 0, 0}, {50.1f, 0, 0}},
+                     {10, 10, 10, 10, 10});
+  EXPECT_EQ(observe(scan, config).counts.used, 3u);
+  scan.no_returns_at_max_range = true;
+  const Observation seen = observe(scan, config);
+  EXPECT_EQ(seen.counts.no_returns, 3u);
+  EXPECT_EQ(seen.counts.used, 1u);
+  EXPECT_EQ(seen.counts.beyond_max, 1u);
+  EXPECT_EQ(seen.hits.points.size(), 1u);
+  EXPECT_EQ(seen.beams.ends.size(), 4u);  // three of them cut at 50 m
+}
+
 TEST(Observation, UnlabelledIsAHitUnlessIgnored) {
   MapperConfig config = plainConfig();
   const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}}, {0, 77});

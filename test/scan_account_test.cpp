@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "bki_mapping/ros/load_advice.h"
+#include "bki_mapping/ros/map_publishing.h"
 #include "bki_mapping/ros/mapping_diagnostics.h"
 #include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/scan_queue.h"
@@ -117,6 +118,14 @@ TEST(Diagnostics, JudgeWhatHappened) {
   EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);
   now.paused = true;
   EXPECT_NE(judge(before, now, config).message.find("~resume"), std::string::npos);
+}
+
+TEST(MapPublishing, ATopicTakesATenthOfTheTimeAtMost) {
+  using Seconds = std::chrono::duration<double>;
+  EXPECT_DOUBLE_EQ(publishPeriod(2.0, Seconds(0.01)).count(), 0.5);
+  EXPECT_DOUBLE_EQ(publishPeriod(2.0, Seconds(0.05)).count(), 0.5);
+  EXPECT_DOUBLE_EQ(publishPeriod(2.0, Seconds(0.2)).count(), 2.0);
+  EXPECT_DOUBLE_EQ(publishPeriod(50.0, Seconds(0.2)).count(), 2.0);
 }
 
 TEST(LoadAdvice, SaysHowFarBehindAndWhatWouldHelp) {

@@ -149,7 +149,7 @@ TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
 std::set<std::string> namesInCode() {
   std::set<std::string> names;
   const std::regex call(
-      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>)\( ?(?:context, )?"([\w/]+)")re");
+      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>|UpdatePublisher)\( ?(?:context, )?"([\w/]+)")re");
   for (const auto& entry : fs::recursive_directory_iterator(kRoot / "src/ros")) {
     if (!entry.is_regular_file()) continue;
     const std::string text = std::regex_replace(textOf(entry.path()), std::regex("\\s+"), " ");

@@ -1,6 +1,7 @@
 #include "bki_mapping/mapping/observation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "bki_mapping/core/grid_geometry.h"
@@ -57,6 +58,9 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const LabelValues values = scan.labels_are_ids ? LabelValues::kId : config_.label_values;
   const bool limited = sensor.max_range > 0.0;
+  const auto cut = [&](const Eigen::Vector3f& point, float range) {
+    cut_.add(chunk, point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
+  };
   for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3f& point = scan.points[i];
     const float range = point.norm();
@@ -67,11 +71,13 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
       ++counts.at_sensor;
     } else if (range < sensor.min_range) {
       ++counts.too_near;
+    } else if (limited && scan.no_returns_at_max_range &&
+               std::abs(range - sensor.max_range) <= kAtMaxRange * sensor.max_range) {
+      ++counts.no_returns;
+      cut(point, range);
     } else if (limited && range > sensor.max_range) {
       ++counts.beyond_max;
-      if (config_.clear_beyond_max_range) {
-        cut_.add(chunk, point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
-      }
+      if (config_.clear_beyond_max_range) cut(point, range);
     } else if (!geometry.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
     } else if (const auto id = classOf(scan.labels[i], values, classes, config_, counts)) {

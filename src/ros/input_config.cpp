@@ -45,7 +45,7 @@ std::vector<NamedParameter<InputConfig>> inputParameters() {
           "clear_no_returns", {"false", "true"},
           "Whether beams without a return clear the space up to sensor_model/max_range: points with one "
           "infinite "
-          "coordinate or more, and, in organised clouds, points that are NaN.",
+          "coordinate or more, points at max_range itself, and, in organised clouds, points that are NaN.",
           [](C & c) -> auto& { return c.clear_no_returns; }),
   };
 }

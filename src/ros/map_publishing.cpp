@@ -3,12 +3,11 @@
 #include <algorithm>
 
 namespace bki_mapping::ros_shell {
-namespace {
 
-/// The pause after publishing a topic, in times of what publishing took.
-constexpr int kPause = 9;
-
-}  // namespace
+std::chrono::duration<double> publishPeriod(double rate, std::chrono::duration<double> took) {
+  constexpr double kShare = 0.1;  // of the time, at most
+  return std::max(std::chrono::duration<double>(1.0 / rate), took / kShare);
+}
 
 void MapPublishing::changed(const std::vector<GridIndex>& blocks) {
   for (const auto& publisher : publishers_) {
@@ -23,7 +22,6 @@ void MapPublishing::startOver() {
 }
 
 void MapPublishing::publishDue(const MapSnapshot& snapshot) {
-  const std::chrono::duration<double> period(1.0 / snapshot.config.publish_rate);
   for (std::size_t p = 0; p < publishers_.size(); ++p) {
     MapPublisher& publisher = *publishers_[p];
     if (!publisher.wanted()) {
@@ -33,9 +31,8 @@ void MapPublishing::publishDue(const MapSnapshot& snapshot) {
     const auto start = Clock::now();
     if (publisher.changed.empty() || start < next_[p]) continue;
     publisher.publish(snapshot);
-    const auto took = Clock::now() - start;
-    next_[p] = start + std::max<Clock::duration>(std::chrono::duration_cast<Clock::duration>(period),
-                                                 (kPause + 1) * took);
+    next_[p] = start + std::chrono::duration_cast<Clock::duration>(
+                           publishPeriod(snapshot.config.publish_rate, Clock::now() - start));
   }
 }
 

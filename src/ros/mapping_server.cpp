@@ -1,5 +1,7 @@
 #include "bki_mapping/ros/mapping_server.h"
 
+#include <cstdio>
+
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/ros/pose_conversion.h"
 
@@ -38,7 +40,13 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
 MappingServer::~MappingServer() {
   running_ = false;
   thread_.join();
-  ROS_INFO("%s", ledger_.summary(waiting_.size()).c_str());
+  const std::string summary = ledger_.summary(waiting_.size());
+  if (ros::isShuttingDown()) {  // the console of ROS is closed by then
+    std::printf("%s: %s\n", private_node_.getNamespace().c_str(), summary.c_str());
+    std::fflush(stdout);
+  } else {
+    ROS_INFO("%s", summary.c_str());
+  }
 }
 
 void MappingServer::subscribe() {

@@ -99,6 +99,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   scan.labels_are_ids = content.labels.are_ids;
   scan.soft = std::move(content.labels.soft);
   scan.sensor_model = input_.sensor_model;
+  scan.no_returns_at_max_range = input_.clear_no_returns;
   placed.T_map_sensor = sensor->T_target_source;
   placed.unknown_labels = std::move(content.labels.unknown);
   return placed;

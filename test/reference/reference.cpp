@@ -66,6 +66,11 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
     const Eigen::Vector3d p = scan.points[i].cast<double>();
     const double range = p.norm();
     if (!p.allFinite() || range < 1e-3 || range < sensor.min_range) continue;
+    const double beyond = range / max_range - 1.0;
+    if (max_range > 0.0 && scan.no_returns_at_max_range && std::abs(beyond) <= 1e-4) {
+      cut.push_back({p * (max_range / range), 255});
+      continue;
+    }
     if (max_range > 0.0 && range > max_range) {
       if (config.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
       continue;

@@ -1,15 +1,21 @@
 """What the rostests share: clouds, poses, and waiting for messages with a timeout."""
+import random
 import struct
 import threading
 import time
+import unittest
 
 import roslib.packages
 import rospy
+from bki_mapping.msg import MappingStatus, OccupancyMap
+from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
+from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
 TIMEOUT = 30.0  # wall time to wait for anything [s]
+CAR, ROAD = 10, 40  # raw labels of config/classes/semantic_kitti.yaml
 FORMATS = {PointField.INT8: 'b', PointField.UINT8: 'B', PointField.INT16: 'h', PointField.UINT16: 'H',
            PointField.INT32: 'i', PointField.UINT32: 'I', PointField.FLOAT32: 'f', PointField.FLOAT64: 'd'}
 
@@ -116,3 +122,64 @@ class Robot:
         self.publish_pose(stamp, position, yaw_quarter_turns)
         self.clouds.publish(make_cloud(points, labels, stamp, **{'frame': self.frame, **options}))
         return stamp
+
+
+def random_scan(seed, points=60, reach=30.0):
+    """Points in a cube around the sensor, and a label for each."""
+    rand = random.Random(seed)
+    cloud = [tuple(rand.uniform(-reach, reach) for _ in range(3)) for _ in range(points)]
+    return cloud, [rand.choice((CAR, ROAD)) for _ in cloud]
+
+
+def voxels_of(blocks):
+    return {(b.x, b.y, b.z): (bytes(b.state), bytes(b.label), b.probability) for b in blocks if any(bytes(b.state))}
+
+
+class MapperTest(unittest.TestCase):
+    """Drives the mapper `mapping` with one robot, from an empty map in each test."""
+    cloud_topic = 'cloud_in'
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node(cls.__name__.lower() + '_rostest')
+        cls.robot = Robot(cls.cloud_topic)
+        cls.robot.connect()
+        cls.status = Listener('mapping/status', MappingStatus)
+        cls.status.wait_for(lambda m: True, 'a first status')
+        rospy.wait_for_service('mapping/reset', TIMEOUT)
+
+    def setUp(self):
+        self.call('reset')
+
+    def call(self, service, kind=Empty):
+        return rospy.ServiceProxy(f'mapping/{service}', kind)()
+
+    def reconfigure(self, **settings):
+        """Changes settings while mapping, and back at the end of the test."""
+        client = Client('/mapping/reconfigure', timeout=TIMEOUT)
+        self.addCleanup(client.close)
+        before = client.get_configuration(TIMEOUT)
+        self.addCleanup(client.update_configuration, {name: before[name] for name in settings})
+        return client.update_configuration(settings)
+
+    def deal_with(self, stamp):
+        return self.status.wait_for(lambda m: m.header.stamp == stamp, f'dealing with the cloud of {stamp.to_sec()}')
+
+    def integrate(self, points, labels, **options):
+        status = self.deal_with(self.robot.scan(points, labels, **options))
+        self.assertTrue(status.integrated_last, status)
+        return status.header.stamp
+
+    def drive(self, seeds):
+        """Scans at random, 20 m after one another; returns the stamp of the last."""
+        for seed in seeds:
+            stamp = self.integrate(*random_scan(seed), position=(20.0 * seed, 0.0, 0.0))
+        return stamp
+
+    def map_of_server(self, stamp):
+        """Blocks of the map as of a scan: states, labels, probabilities."""
+        listener = Listener('occupancy', OccupancyMap)
+        try:
+            return voxels_of(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map').blocks)
+        finally:
+            listener.close()

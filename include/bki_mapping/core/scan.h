@@ -12,6 +12,9 @@
 
 namespace bki_mapping {
 
+/// How near to max_range a point is at it, as a share of max_range: 1 cm at 100 m, more than clouds round by.
+constexpr double kAtMaxRange = 1e-4;
+
 /// The hits of one sweep. Points are kept relative to the sensor so that single precision is enough
 /// however far the map's origin is away.
 struct Scan {
@@ -27,6 +30,8 @@ struct Scan {
   SoftLabels soft;
   /// Directions of beams that met nothing up to the sensor's range, in the axes of the map frame; any length.
   std::vector<Eigen::Vector3f> no_returns;
+  /// Whether points at max_range (within kAtMaxRange of it) met nothing either: some drivers put them there.
+  bool no_returns_at_max_range = false;
   /// Ranges of the sensor, where they are not those of the mapper's settings.
   std::optional<SensorModelConfig> sensor_model;
   /// Time of the scan [ns]. Seeds the random free-space samples: scans drawn at the same time and with the

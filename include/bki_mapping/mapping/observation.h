@@ -23,7 +23,7 @@ struct PointCounts {
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
   std::size_t unknown_label = 0;  ///< not in the class table, and unknown_labels is ignore
   std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
-  std::size_t no_returns = 0;     ///< directions without a hit, which clear up to the sensor's range
+  std::size_t no_returns = 0;     ///< beams that met nothing, which clear up to the sensor's range
   /// Labels not in the class table, whatever became of them (not part of the sum).
   std::size_t labels_not_in_table = 0;
 

@@ -9,6 +9,10 @@
 
 namespace bki_mapping::ros_shell {
 
+/// The time from one publication of a topic to the next [s]: that of the rate, or ten times what the first
+/// took, so that no topic takes more than a tenth of the time. @param rate publish_rate [Hz].
+std::chrono::duration<double> publishPeriod(double rate, std::chrono::duration<double> took);
+
 /// Owns the publishers. Each publishes what changed at most publish_rate times a second, and takes at most a
 /// tenth of the time, however large the map.
 class MapPublishing {

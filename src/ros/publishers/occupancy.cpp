@@ -2,7 +2,7 @@
 #include <bki_mapping/OccupancyUpdate.h>
 
 #include "bki_mapping/core/map_query.h"
-#include "bki_mapping/ros/map_publisher.h"
+#include "updates.h"
 
 namespace bki_mapping::ros_shell {
 namespace {
@@ -22,13 +22,10 @@ OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const 
   return message;
 }
 
-/// What a whole map has, be it an OccupancyMap or an OccupancyUpdate.
+/// The parts of a whole map, be it an OccupancyMap or an OccupancyUpdate.
 template <typename Message>
-Message wholeMap(const MapSnapshot& snapshot) {
+void fillMap(const MapSnapshot& snapshot, Message& message) {
   const SemanticMap& map = snapshot.mapper.map();
-  Message message;
-  message.header = snapshot.header;
-  message.resolution = static_cast<float>(map.geometry().resolution());
   message.block_edge = kBlockEdge;
   for (const SemanticClass& c : snapshot.mapper.classes().classes()) {
     ClassInfo info;
@@ -43,7 +40,6 @@ Message wholeMap(const MapSnapshot& snapshot) {
   message.blocks.reserve(map.size());
   for (const auto& [index, block] : sortedBlocks(map))
     message.blocks.push_back(toMessage(map, index, *block));
-  return message;
 }
 
 class Occupancy : public MapPublisher {
@@ -54,53 +50,35 @@ class Occupancy : public MapPublisher {
 
  private:
   void publishNew(const MapSnapshot& snapshot) override {
-    publisher_.publish(wholeMap<OccupancyMap>(snapshot));
+    OccupancyMap message;
+    message.header = snapshot.header;
+    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    fillMap(snapshot, message);
+    publisher_.publish(message);
   }
 };
 
-class OccupancyUpdates : public MapPublisher {
+class OccupancyUpdates : public UpdatePublisher<OccupancyUpdate> {
  public:
-  explicit OccupancyUpdates(const PublisherContext& context) {
-    publisher_ = context.advertiseUpdates<OccupancyUpdate>(
-        "occupancy_updates", *this,
-        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
-  }
+  explicit OccupancyUpdates(const PublisherContext& context)
+      : UpdatePublisher(context, "occupancy_updates") {}
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
-    ++sequence_;
-    if (changed.all()) {
-      publisher_.publish(whole(snapshot));
-      return;
-    }
+  void fillWhole(const MapSnapshot& snapshot, OccupancyUpdate& message) const override {
+    fillMap(snapshot, message);
+  }
+  void fillChanges(const MapSnapshot& snapshot, OccupancyUpdate& message) const override {
     const SemanticMap& map = snapshot.mapper.map();
-    OccupancyUpdate message;
-    message.header = snapshot.header;
-    message.sequence = sequence_;
-    message.resolution = static_cast<float>(map.geometry().resolution());
     message.block_edge = kBlockEdge;
     message.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {
       if (const Block* block = map.find({index})) {
         message.blocks.push_back(toMessage(map, {index}, *block));
       } else {
-        message.removed.emplace_back();
-        message.removed.back().x = index.x;
-        message.removed.back().y = index.y;
-        message.removed.back().z = index.z;
+        message.removed.push_back(ros_shell::toMessage(index));
       }
     }
-    publisher_.publish(message);
   }
-
-  OccupancyUpdate whole(const MapSnapshot& snapshot) const {
-    auto message = wholeMap<OccupancyUpdate>(snapshot);
-    message.sequence = sequence_;
-    message.whole = true;
-    return message;
-  }
-
-  std::uint64_t sequence_ = 0;
 };
 
 }  // namespace

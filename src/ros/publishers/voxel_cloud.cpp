@@ -6,7 +6,7 @@
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/voxel_pcl.h"
-#include "bki_mapping/ros/map_publisher.h"
+#include "updates.h"
 
 namespace bki_mapping::ros_shell {
 namespace {
@@ -56,53 +56,26 @@ class VoxelCloud : public MapPublisher {
   }
 };
 
-class VoxelCloudUpdates : public MapPublisher {
+class VoxelCloudUpdates : public UpdatePublisher<VoxelCloudUpdate> {
  public:
-  explicit VoxelCloudUpdates(const PublisherContext& context) {
-    publisher_ = context.advertiseUpdates<VoxelCloudUpdate>(
-        "voxel_cloud_updates", *this,
-        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
-  }
+  explicit VoxelCloudUpdates(const PublisherContext& context)
+      : UpdatePublisher(context, "voxel_cloud_updates") {}
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
-    ++sequence_;
-    if (changed.all()) {
-      publisher_.publish(whole(snapshot));
-      return;
-    }
-    VoxelCloudUpdate message = start(snapshot);
-    CloudBuilder builder(snapshot);
-    message.blocks.reserve(changed.blocks().size());
-    for (const GridIndex& index : changed.blocks()) {
-      message.blocks.emplace_back();
-      message.blocks.back().x = index.x;
-      message.blocks.back().y = index.y;
-      message.blocks.back().z = index.z;
-      if (const Block* block = snapshot.mapper.map().find({index})) builder.add({index}, *block);
-    }
-    message.cloud = builder.cloud();
-    publisher_.publish(message);
-  }
-
-  VoxelCloudUpdate start(const MapSnapshot& snapshot) const {
-    VoxelCloudUpdate message;
-    message.header = snapshot.header;
-    message.sequence = sequence_;
-    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
-    return message;
-  }
-
-  VoxelCloudUpdate whole(const MapSnapshot& snapshot) const {
-    VoxelCloudUpdate message = start(snapshot);
-    message.whole = true;
+  void fillWhole(const MapSnapshot& snapshot, VoxelCloudUpdate& message) const override {
     CloudBuilder builder(snapshot);
     builder.addAll(false);
     message.cloud = builder.cloud();
-    return message;
   }
-
-  std::uint64_t sequence_ = 0;
+  void fillChanges(const MapSnapshot& snapshot, VoxelCloudUpdate& message) const override {
+    CloudBuilder builder(snapshot);
+    message.blocks.reserve(changed.blocks().size());
+    for (const GridIndex& index : changed.blocks()) {
+      message.blocks.push_back(toMessage(index));
+      if (const Block* block = snapshot.mapper.map().find({index})) builder.add({index}, *block);
+    }
+    message.cloud = builder.cloud();
+  }
 };
 
 }  // namespace

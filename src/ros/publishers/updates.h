@@ -1,0 +1,57 @@
+/// @file What topics with updates have in common.
+#pragma once
+
+#include <bki_mapping/BlockCoordinates.h>
+
+#include <cstdint>
+#include <string>
+
+#include "bki_mapping/ros/map_publisher.h"
+
+namespace bki_mapping::ros_shell {
+
+inline BlockCoordinates toMessage(const GridIndex& block) {
+  BlockCoordinates message;
+  message.x = block.x;
+  message.y = block.y;
+  message.z = block.z;
+  return message;
+}
+
+/// Publishes the blocks that changed, and the whole map to each new subscriber and on request; with a
+/// sequence number, so that a client sees what it missed.
+/// @tparam Message has header, sequence, whole and resolution.
+template <typename Message>
+class UpdatePublisher : public MapPublisher {
+ protected:
+  UpdatePublisher(const PublisherContext& context, const std::string& topic) {
+    publisher_ = context.advertiseUpdates<Message>(
+        topic, *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+          subscriber.publish(message(snapshot, true));
+        });
+  }
+
+ private:
+  virtual void fillWhole(const MapSnapshot& snapshot, Message& message) const = 0;
+  /// Fills in what happened to the blocks in `changed`.
+  virtual void fillChanges(const MapSnapshot& snapshot, Message& message) const = 0;
+
+  void publishNew(const MapSnapshot& snapshot) override {
+    ++sequence_;
+    publisher_.publish(message(snapshot, changed.all()));
+  }
+
+  Message message(const MapSnapshot& snapshot, bool whole) const {
+    Message message;
+    message.header = snapshot.header;
+    message.sequence = sequence_;
+    message.whole = whole;
+    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    whole ? fillWhole(snapshot, message) : fillChanges(snapshot, message);
+    return message;
+  }
+
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace bki_mapping::ros_shell

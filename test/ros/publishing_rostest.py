@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+"""Topics cost what changed: clients that listen to updates alone hold the same map as the mapper."""
+import os
+import sys
+import time
+import xmlrpc.client
+
+import rosgraph
+import rospy
+import rostest
+from bki_mapping.msg import ElevationMap, OccupancyUpdate
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from harness import CAR, ROAD, Listener, MapperTest, random_scan, wait_until  # noqa: E402
+from map_clients import CloudClient, MapClient, MarkerClient  # noqa: E402
+
+
+class Publishing(MapperTest):
+    def expect_same(self, client, stamp):
+        truth = self.map_of_server(stamp)
+
+        def arrived():
+            client.update()
+            return client.stamp == stamp and client.blocks == truth
+        wait_until(arrived, 'the client having the same map')
+        return truth
+
+    def test_clients_of_updates_hold_the_map(self):
+        early = MapClient()
+        wait_until(lambda: early.update() or early.blocks is not None, 'the whole map for a new client')
+        stamp = self.drive(range(4))
+        truth = self.expect_same(early, stamp)
+        self.assertEqual((early.wholes, early.gaps), (1, 0))
+        sent = early.listener.messages[-1]
+        self.assertGreater(len(truth), 100)
+        self.assertLess(len(sent.blocks), len(truth), 'an update has what changed, not all')
+        early.listener.close()  # listeners of one process share a connection: a late client must be alone
+        late = MapClient()
+        self.addCleanup(late.listener.close)
+        stamp = self.drive(range(4, 6))
+        self.expect_same(late, stamp)
+        self.assertEqual((late.wholes, late.gaps), (1, 0))
+
+        # A message is lost: the client sees a gap, asks for the whole map, and is right again.
+        late.read += 1
+        stamp = self.drive(range(6, 8))
+        wait_until(lambda: late.update() or late.gaps > 0 or late.stamp == stamp, 'further updates')
+        self.call('publish_map')
+        wait_until(lambda: late.update() or late.wholes == 2, 'a whole map on request')
+        self.expect_same(late, stamp)
+        self.call('reset')
+        wait_until(lambda: late.update() or late.blocks == {}, 'the client forgetting the map')
+
+    def test_clouds_and_markers_follow_the_map(self):
+        self.drive(range(2))
+        cloud, markers = CloudClient(), MarkerClient()
+        for client in (cloud, markers):
+            self.addCleanup(client.listener.close)
+        stamp = self.drive(range(2, 5))
+        truth = self.map_of_server(stamp)
+        wait_until(lambda: cloud.update() or cloud.stamp == stamp, 'the last cloud update')
+        self.assertEqual({place: len(points) for place, points in cloud.points.items() if points},
+                         {place: sum(1 for s in states if s) for place, (states, _, _) in truth.items()})
+        names = {1: 'car', 9: 'road'}
+        expected = sorted((names[labels[v]], (8 * x + v % 8 + 0.5, 8 * y + v // 8 % 8 + 0.5, 8 * z + v // 64 + 0.5))
+                          for (x, y, z), (states, labels, _) in truth.items() for v in range(512) if states[v] == 2)
+        self.assertGreater(len(expected), 100)
+        wait_until(lambda: markers.update() or markers.cubes() == expected, 'the markers showing the map')
+        chunks = {key[1] for key in markers.shown}
+        last = markers.listener.messages[-1]
+        self.assertLess(len({m.id for m in last.markers}), len(chunks), 'only chunks that changed are sent')
+        self.call('reset')
+        wait_until(lambda: markers.update() or not markers.shown, 'the markers being deleted')
+
+    def test_grids_from_above_follow_the_map(self):
+        self.drive(range(1))
+        grid = Listener('projected_map', OccupancyGrid)
+        updates = Listener('projected_map_updates', OccupancyGridUpdate)
+        elevation = Listener('elevation_map', ElevationMap)
+        for listener in (grid, updates, elevation):
+            self.addCleanup(listener.close)
+        grid.wait_for(lambda m: m.data, 'a whole grid')
+        elevation.wait_for(lambda m: m.whole, 'a whole elevation map')
+        # A second drive over the same place: the grid need not grow.
+        for seed in range(1, 3):
+            stamp = self.integrate(*random_scan(seed))
+        updates.wait_for(lambda m: m.header.stamp == stamp, 'the update of the last scan')
+        self.assertEqual(len(grid.messages), 1)
+        width, cells = grid.messages[0].info.width, list(grid.messages[0].data)
+        for update in updates.messages:
+            self.assertLess(update.width * update.height, len(cells))
+            for row in range(update.height):
+                begin = (update.y + row) * width + update.x
+                cells[begin:begin + update.width] = update.data[row * update.width:(row + 1) * update.width]
+        grid.close()
+        again = Listener('projected_map', OccupancyGrid)
+        self.addCleanup(again.close)
+        whole = again.wait_for(lambda m: True, 'the whole grid again')
+        self.assertEqual((whole.info.width, whole.info.origin.position.x),
+                         (width, grid.messages[0].info.origin.position.x))
+        self.assertEqual(list(whole.data), cells)
+        self.assertEqual({-1, 0, 100}, set(cells))
+        # The road is ground: it does not block, and it has a height.
+        self.call('reset')
+        stamp = self.integrate([(3.5, 0.5, -1.5), (3.5, 2.5, -1.5), (3.5, 2.5, 1.5)], [ROAD, ROAD, CAR])
+        part = elevation.wait_for(lambda m: m.header.stamp == stamp, 'the elevation')
+        place = {(x, y): (x - part.x) + part.width * (y - part.y) for x, y in ((3, 0), (3, 2), (0, 5))}
+        self.assertEqual(part.ground_height[place[3, 0]], -1.0)
+        self.assertEqual((part.ground_height[place[3, 2]], part.clearance[place[3, 2]]), (-1.0, 2.0))
+        self.assertEqual(bytes(part.ground_class)[place[3, 0]], 9)
+        self.assertNotEqual(part.ground_height[place[0, 5]], part.ground_height[place[0, 5]], 'NaN: not known')
+
+    def test_views_are_limited(self):
+        self.integrate([(3.5, 0.5, 0.5), (3.5, 0.5, 5.5), (100.5, 0.5, 0.5)], [CAR] * 3)
+        markers = MarkerClient()
+        self.addCleanup(markers.listener.close)
+
+        def shows(*points):
+            wait_until(lambda: markers.update() or [p for _, p in markers.cubes()] == sorted(points), f'{points}')
+        shows((3.5, 0.5, 0.5), (3.5, 0.5, 5.5), (100.5, 0.5, 0.5))
+        self.reconfigure(view_range=20.0)
+        shows((3.5, 0.5, 0.5), (3.5, 0.5, 5.5))
+        self.reconfigure(view_max_z=2.0)
+        shows((3.5, 0.5, 0.5))
+        self.integrate([(3.5, 0.2, 0.2)], [CAR], position=(110.0, 0.5, 0.5))  # the view moves on, chunk by chunk
+        shows((100.5, 0.5, 0.5), (113.5, 0.5, 0.5))
+
+    def test_nothing_is_built_while_nobody_listens(self):
+        def connections():
+            code, _, infos = node.getBusInfo('/publishing_rostest')
+            self.assertEqual(code, 1)
+            return [info for info in infos if info[2] == 'o' and info[4].endswith('occupancy_updates')]
+
+        manager = rospy.resolve_name('manager')
+        node = xmlrpc.client.ServerProxy(rosgraph.Master('/publishing_rostest').lookupNode(manager))
+        sequences = []
+        for seeds in (range(3), range(3, 9)):
+            client = MapClient()
+            wait_until(lambda: client.update() or client.wholes == 1, 'the whole map for a new client')
+            self.assertEqual(len(connections()), 1)
+            sequences.append(client.sequence)
+            client.listener.close()
+            wait_until(lambda: not connections(), 'the mapper noticing that nobody listens')
+            stamp = self.drive(seeds)
+        client = MapClient()
+        self.addCleanup(client.listener.close)
+        self.expect_same(client, stamp)
+        self.assertEqual(sequences + [client.sequence], 3 * [client.sequence], 'an update was made for nobody')
+
+    def test_rates_are_limited(self):
+        self.reconfigure(publish_rate=2.0)
+        times = []
+        client = MapClient()
+        self.addCleanup(client.listener.close)
+        wait_until(lambda: client.update() or client.wholes == 1, 'the whole map for a new client')
+        clock = rospy.Subscriber('occupancy_updates', OccupancyUpdate, lambda m: times.append(time.monotonic()))
+        self.addCleanup(clock.unregister)
+        end = time.monotonic() + 3.0
+        scans = 0
+        while time.monotonic() < end:
+            stamp = self.drive(range(scans, scans + 1))
+            scans += 1
+        self.expect_same(client, stamp)  # the last scan is shown, though it came between two times
+        pauses = [after - before for before, after in zip(times, times[1:])]
+        self.assertGreater(scans, 3 * len(times))
+        self.assertGreaterEqual(len(times), 4)
+        self.assertGreater(min(pauses), 0.4)
+
+
+if __name__ == '__main__':
+    rostest.rosrun('bki_mapping', 'publishing', Publishing)
