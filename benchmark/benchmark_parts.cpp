@@ -27,7 +27,7 @@ struct Fixture {
   GridGeometry geometry{config.resolution};
   std::shared_ptr<const ClassTable> classes =
       std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
-  Scan scan = simulation::Drive(5, simulation::LidarConfig(), 8.0, 1).frame(4).scan();
+  Scan scan = simulation::Drive({5, 8.0, 1, {}}).frame(4).scan();
   Workers workers;
   Observer observer;
   Observation seen;

@@ -63,7 +63,7 @@ int measure(const po::variables_map& given) {
   while (ros::ok() && !all()) ros::WallDuration(0.05).sleep();
   connections.callAvailable(ros::WallDuration(0.5));
 
-  const simulation::Drive drive(scans, simulation::LidarConfig(), 8.0, 1);
+  const simulation::Drive drive({static_cast<int>(scans), 8.0, 1, {}});
   std::ofstream csv;
   if (given.count("csv") > 0) csv.open(given["csv"].as<std::string>());
   csv << "topic,scan,blocks,ms\n";

@@ -1,20 +1,16 @@
 #include "curves.h"
 
-#include <sys/wait.h>
-
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <stdexcept>
 
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/core/stopwatch.h"
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/report.h"
-#include "bki_mapping/io/share_path.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/simulation/lidar.h"
+#include "bki_mapping/tools/draw.h"
 #include "cases.h"
 
 namespace bki_mapping::benchmark {
@@ -57,7 +53,7 @@ std::vector<Scan> shortDrive(int beams, int columns) {
   simulation::LidarConfig lidar;
   lidar.beams = beams;
   lidar.columns = columns;
-  const simulation::Drive drive(kWarmUp + kTimed, lidar, kSpeed, 1);
+  const simulation::Drive drive({kWarmUp + kTimed, kSpeed, 1, lidar});
   std::vector<Scan> scans;
   for (std::size_t i = 0; i < drive.size(); ++i) scans.push_back(drive.frame(i).scan());
   return scans;
@@ -74,7 +70,7 @@ const std::vector<Case>& curveCases() {
 
 /// Time against the size of the map: all modes see each scan, one after the other.
 std::string growth(std::size_t count) {
-  const simulation::Drive drive(count, simulation::LidarConfig(), kSpeed, 1);
+  const simulation::Drive drive({static_cast<int>(count), kSpeed, 1, {}});
   std::string csv = "mode,scan,blocks,map_bytes,ms\n";
   std::vector<std::unique_ptr<SemanticMapper>> all;
   for (const Case& c : curveCases()) {
@@ -146,17 +142,7 @@ void measureCurves(const std::string& folder, std::size_t scans) {
   write("points.csv", points());
   write("resolution.csv", resolution());
   write("growth.csv", growth(scans));
-  const std::string program = sharePath() + "/scripts/plot_curves.py";
-  const auto quoted = [](const std::string& text) {
-    std::string result = "'";
-    for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return result + "'";
-  };
-  const int status = std::system(("/usr/bin/python3 " + quoted(program) + " " + quoted(folder)).c_str());
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    throw std::runtime_error("the curves were measured but not drawn: " + program +
-                             " failed; it needs python3-matplotlib");
-  }
+  tools::draw("plot_curves.py", {folder});
 }
 
 }  // namespace bki_mapping::benchmark

@@ -15,10 +15,15 @@ add_library(bki_mapping_io SHARED
   src/io/sequence_writer.cpp
   src/io/share_path.cpp
   src/io/voxel_pcl.cpp
+  src/simulation/drive_file.cpp
   src/simulation/lidar.cpp
   src/simulation/scene.cpp
   src/simulation/street.cpp
+  src/simulation/truth_quality.cpp
+  src/simulation/voxel_truth.cpp
+  src/tools/draw.cpp
   src/tools/options.cpp
+  src/tools/quality_report.cpp
 )
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io

@@ -25,7 +25,8 @@ foreach(name
     parallel_for_test sampling_test semantic_map_test semantic_quality_test)
   bki_mapping_unit_test(${name})
 endforeach()
-foreach(name class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test)
+foreach(name class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
+    truth_quality_test)
   bki_mapping_unit_test(${name} bki_mapping_io)
 endforeach()
 target_link_libraries(map_export_test PRIVATE pcl_io)
@@ -36,6 +37,7 @@ function(bki_mapping_script_test name)
   set_tests_properties(${name} PROPERTIES TIMEOUT 300
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
 endfunction()
+bki_mapping_script_test(figures_test)
 bki_mapping_script_test(layering_test)
 bki_mapping_script_test(tools_test)
 

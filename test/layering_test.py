@@ -11,8 +11,9 @@ LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 LIBRARIES = {
     'inference/beam_rtree.cpp': ('boost/geometry',),
     'io': ('pcl/', 'yaml-cpp/', 'nlohmann/'),
+    'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
-    'tools': ('boost/program_options', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
+    'tools': ('boost/program_options', 'nlohmann/', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
 }
 MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')
 POSIX = ('immintrin.h', 'dlfcn.h', 'fcntl.h', 'sys/', 'unistd.h')

@@ -37,7 +37,7 @@ TEST(Shape, HitsOfABoxACylinderAndAnEllipsoid) {
 }
 
 TEST(Lidar, BeamsEndWhereTheWorldBegins) {
-  const Drive drive(5, smallLidar(), 8.0, 3);
+  const Drive drive({5, 8.0, 3, smallLidar()});
   const SequenceFrame frame = drive.frame(4);
   ASSERT_GT(frame.points.size(), 1000u);
   std::size_t checked = 0;
@@ -54,7 +54,7 @@ TEST(Lidar, BeamsEndWhereTheWorldBegins) {
 
 TEST(Lidar, SeesAllKindsOfThings) {
   std::set<std::uint32_t> labels;
-  const Drive drive(20, LidarConfig(), 8.0, 1);
+  const Drive drive({20, 8.0, 1, LidarConfig()});
   for (const std::size_t i : {0u, 19u}) {
     const SequenceFrame frame = drive.frame(i);
     labels.insert(frame.labels.begin(), frame.labels.end());
@@ -68,8 +68,8 @@ TEST(Lidar, NoiseIsAsAsked) {
   LidarConfig noisy = smallLidar();
   noisy.range_noise = 0.05;
   noisy.label_noise = 0.3;
-  const SequenceFrame clean = Drive(1, smallLidar(), 8.0, 1).frame(0),
-                      other = Drive(1, noisy, 8.0, 1).frame(0);
+  const SequenceFrame clean = Drive({1, 8.0, 1, smallLidar()}).frame(0),
+                      other = Drive({1, 8.0, 1, noisy}).frame(0);
   ASSERT_EQ(clean.points.size(), other.points.size());
   double squares = 0.0, wrong = 0.0;
   for (std::size_t i = 0; i < clean.points.size(); ++i) {
@@ -83,7 +83,7 @@ TEST(Lidar, NoiseIsAsAsked) {
 }
 
 TEST(Drive, IsRepeatableAndStartsAtTheMapsOrigin) {
-  const Drive a(3, smallLidar(), 8.0, 5), b(3, smallLidar(), 8.0, 5), c(3, smallLidar(), 8.0, 6);
+  const Drive a({3, 8.0, 5, smallLidar()}), b({3, 8.0, 5, smallLidar()}), c({3, 8.0, 6, smallLidar()});
   EXPECT_EQ(a.frame(2).points, b.frame(2).points);
   EXPECT_NE(a.frame(2).points, c.frame(2).points);
   EXPECT_TRUE(a.frame(0).T_map_sensor.isApprox(Eigen::Isometry3d::Identity()));

@@ -83,6 +83,28 @@ class Tools(unittest.TestCase):
         self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
         self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
 
+    def test_evaluation_against_the_truth_of_the_simulation(self):
+        hits_alone, lines = self.evaluation('free_space/mode=none'), self.evaluation()
+        self.assertEqual(hits_alone['truth']['free_recall'], 0.0)
+        self.assertGreater(lines['truth']['free_recall'], 0.8)
+        self.assertGreater(lines['truth']['free_precision'], 0.5)
+        self.assertGreater(hits_alone['truth']['movable_voxels'], lines['truth']['movable_voxels'])
+        self.assertGreater(hits_alone['truth']['occupied_recall'], lines['truth']['occupied_recall'])
+        self.assertEqual(len(lines['truth']['by_distance']), 4)
+        self.assertGreater(lines['voxels_by_class']['road'], 100)
+
+    def test_errors_are_drawn(self):
+        picture = self.path('errors.png')
+        self.fails('must end in .png', 'evaluate_map', '--sequence', self.drive, '--errors', self.path('errors.jpg'))
+        result = call('evaluate_map', '--sequence', self.drive, '--errors', picture)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(picture, 'rb') as file:
+            self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+        with open(self.path('errors.csv'), newline='') as file:
+            kinds = [row['what'] for row in csv.DictReader(file)]
+        self.assertGreater(kinds.count('kept'), kinds.count('lost'))
+        self.assertGreater(kinds.count('lost'), 0)
+
     def test_presets(self):
         folder = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets')
         figures = {}
@@ -159,7 +181,7 @@ class Tools(unittest.TestCase):
         self.fails('cannot be read', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)
-        self.fails('--beams must be', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
+        self.fails('beams must be', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
 
     def test_occupancy_table_maps_everything_as_one_class(self):
         report = self.path('one.json')

@@ -58,6 +58,11 @@ VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
   return view;
 }
 
+VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel) {
+  const Block* block = map.find(GridGeometry::blockOf(voxel));
+  return block ? judgeVoxel(map, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
+}
+
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {
   const VoxelIndex voxel = map.geometry().voxelAt(point);
   const Block* block = map.find(GridGeometry::blockOf(voxel));

@@ -101,44 +101,6 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
   return report.dump(2) + "\n";
 }
 
-std::string qualityJson(const DynamicsQuality& q, const SemanticQuality& semantics, const ClassTable& classes,
-                        double median_ms) {
-  nlohmann::json figures = {{"static_points", q.static_points},
-                            {"static_kept", q.static_kept},
-                            {"moving_points", q.moving_points},
-                            {"moving_removed", q.moving_removed},
-                            {"floor_voxels", q.floor_voxels},
-                            {"floor_holes", q.holes()},
-                            {"sa", q.staticAccuracy()},
-                            {"sa_ground", q.groundAccuracy()},
-                            {"sa_standing", q.standingAccuracy()},
-                            {"sa_other", q.otherAccuracy()},
-                            {"da", q.dynamicAccuracy()},
-                            {"aa", q.accuracy()},
-                            {"ha", q.harmonicAccuracy()},
-                            {"miou_map", semantics.map.meanIou()},
-                            {"miou_input", semantics.input.meanIou()},
-                            {"accuracy_map", semantics.map.accuracy()},
-                            {"accuracy_input", semantics.input.accuracy()},
-                            {"calibration_error", semantics.calibrationError()},
-                            {"sparsification_error", semantics.sparsificationError},
-                            {"median_ms", median_ms}};
-  for (const SemanticClass& c : classes.classes()) {
-    if (semantics.map.points(c.id) == 0) continue;
-    figures["classes"].push_back({{"name", c.name},
-                                  {"points", semantics.map.points(c.id)},
-                                  {"iou_map", semantics.map.iou(c.id)},
-                                  {"iou_input", semantics.input.iou(c.id)}});
-  }
-  for (const SemanticQuality::Bin& bin : semantics.bins) {
-    const auto points = static_cast<double>(bin.points);
-    figures["reliability"].push_back({{"points", bin.points},
-                                      {"confidence", bin.confidence / points},
-                                      {"right", static_cast<double>(bin.right) / points}});
-  }
-  return figures.dump(2) + "\n";
-}
-
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans) {
   const VoxelCounts counts = countVoxels(mapper.map());
   std::ostringstream out;

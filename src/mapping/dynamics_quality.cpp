@@ -30,12 +30,23 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
   ++added_;
 }
 
+std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map) const {
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
+  for (const Voxel& voxel : voxels_) {
+    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
+    if (voxel.ground_points + voxel.standing_points + voxel.other_points > 0) {
+      fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
+    } else if (voxel.early_moving_points > 0 && !voxel.hit_late) {
+      fates.emplace_back(voxel.index, occupied ? VoxelFate::kLeft : VoxelFate::kForgotten);
+    }
+  }
+  return fates;
+}
+
 DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
   DynamicsQuality quality;
   for (const Voxel& voxel : voxels_) {
-    const Block* block = map.find(GridGeometry::blockOf(voxel.index));
-    const bool occupied = block && judgeVoxel(map, *block, GridGeometry::offsetInBlock(voxel.index)).state ==
-                                       VoxelState::kOccupied;
+    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
     quality.other_points += voxel.other_points;

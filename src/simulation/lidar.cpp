@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "bki_mapping/inference/counter_random.h"
 #include "bki_mapping/inference/parallel_for.h"
@@ -55,6 +56,18 @@ std::uint32_t randomLabel(const Scene& scene, double pick) {
   return scene.shapes[static_cast<std::size_t>(pick * static_cast<double>(scene.shapes.size()))].label;
 }
 
+const DriveConfig& checked(const DriveConfig& config) {
+  const LidarConfig& lidar = config.lidar;
+  if (config.scans < 1 || config.scans > 1000000 || !(config.speed >= 0.0 && config.speed <= 100.0)) {
+    throw std::invalid_argument("scans must be 1 to 1000000, speed 0 to 100 m/s");
+  }
+  if (lidar.beams < 1 || lidar.beams > 1024 || lidar.columns < 1 || lidar.columns > 100000 ||
+      !(lidar.rate > 0.0)) {
+    throw std::invalid_argument("beams must be 1 to 1024, columns 1 to 100000, rate above 0");
+  }
+  return config;
+}
+
 }  // namespace
 
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
@@ -92,15 +105,14 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
   return frame;
 }
 
-Drive::Drive(std::size_t scans, const LidarConfig& lidar, double speed, std::uint64_t seed)
-    : scans_(scans),
-      lidar_(lidar),
-      speed_(speed),
-      scene_(makeStreet(speed * static_cast<double>(scans) / lidar.rate + 110.0, seed)) {}
+Drive::Drive(const DriveConfig& config)
+    : config_(checked(config)),
+      scene_(makeStreet(config.speed * static_cast<double>(config.scans) / config.lidar.rate + 110.0,
+                        config.seed)) {}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
   // In the right lane, weaving a little, 1.73 m above the ground.
-  const double x = speed_ * timeOf(i), wave = 0.06;
+  const double x = config_.speed * timeOf(i), wave = 0.06;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translation() = Eigen::Vector3d(x, -1.5 + 0.3 * std::sin(wave * x), 1.73);
   T.linear() = Eigen::AngleAxisd(std::atan(0.3 * wave * std::cos(wave * x)), Eigen::Vector3d::UnitZ())
@@ -109,7 +121,7 @@ Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
 }
 
 SequenceFrame Drive::frame(std::size_t i) const {
-  SequenceFrame frame = scan(scene_, lidar_, T_world_sensor(i), timeOf(i), i);
+  SequenceFrame frame = scan(scene_, config_.lidar, T_world_sensor(i), timeOf(i), i);
   frame.T_map_sensor = T_world_sensor(0).inverse() * T_world_sensor(i);
   frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(timeOf(i) * 1e9));
   return frame;

@@ -1,23 +1,31 @@
 // Maps a sequence with labels of moving things, and measures what the map kept and what it forgot.
-#include <iomanip>
+#include <filesystem>
 #include <iostream>
 
+#include "bki_mapping/core/map_query.h"
+#include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/report.h"
 #include "bki_mapping/io/sequence.h"
-#include "bki_mapping/mapping/dynamics_quality.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/mapping/semantic_quality.h"
+#include "bki_mapping/simulation/drive_file.h"
+#include "bki_mapping/tools/draw.h"
 #include "bki_mapping/tools/options.h"
+#include "bki_mapping/tools/quality_report.h"
 
 namespace {
 
 using namespace bki_mapping;
 namespace po = tools::po;
 
+/// On simulated drives, ghosts are counted after every so many scans.
+constexpr std::size_t kGhostsEvery = 10;
+
 po::options_description options() {
   po::options_description options("Options");
   options.add_options()("json", po::value<std::string>()->value_name("FILE.json"), "figures to write")(
+      "errors", po::value<std::string>()->value_name("FILE.png"),
+      "picture of the errors from above to draw, with their FILE.csv beside it")(
       "late", po::value<std::size_t>()->value_name("N")->default_value(3),
       "voxels hit in the last N scans need not be cleared")(
       "label-noise", po::value<double>()->value_name("SHARE")->default_value(0.0),
@@ -28,20 +36,66 @@ po::options_description options() {
   return options;
 }
 
-void print(const char* name, double share, const char* meaning) {
-  std::cout << name << std::setw(7) << std::fixed << std::setprecision(1) << 100.0 * share << " %  "
-            << meaning << "\n";
+/// All that is compared with the map of one run.
+struct Evaluation {
+  DynamicsEvaluation dynamics;
+  SemanticEvaluation semantics;
+  std::optional<simulation::TruthEvaluation> truth;
+  double end = 0.0;  ///< time of the last scan since the start of the drive [s]
+
+  tools::MapQuality compare(const SemanticMap& map) const {
+    tools::MapQuality quality;
+    quality.dynamics = dynamics.compare(map);
+    quality.semantics = semantics.compare(map);
+    if (truth) quality.truth = truth->compare(map, end);
+    forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
+      if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
+    });
+    return quality;
+  }
+
+  /// One row a voxel: its centre and what became of it; errors last, so that they are seen.
+  std::string errorRows(const SemanticMap& map) const {
+    std::string csv = "x,y,z,what\n";
+    const auto add = [&](const VoxelIndex& voxel, const char* what) {
+      const Eigen::Vector3d p = map.geometry().voxelCentre(voxel);
+      csv += numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
+    };
+    constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
+    for (const auto& [voxel, fate] : dynamics.fates(map)) add(voxel, kNames[static_cast<int>(fate)]);
+    for (const VoxelIndex& voxel : semantics.wrongVoxels(map)) add(voxel, "wrong class");
+    if (!truth) return csv;
+    for (const VoxelIndex& voxel : truth->ghosts(map, end)) add(voxel, "ghost");
+    return csv;
+  }
+};
+
+void drawErrors(const std::string& picture, const std::string& rows) {
+  const std::filesystem::path path(picture);
+  const std::string table = std::filesystem::path(path).replace_extension(".csv").string();
+  writeTextFile(table, rows);
+  tools::draw("plot_errors.py", {table, picture});
 }
 
 int evaluate(const po::variables_map& given) {
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
-  DynamicsEvaluation evaluation(mapper.map().geometry(), DynamicsEvaluation::movingOfSemanticKitti(),
-                                last - first, given["late"].as<std::size_t>());
-  SemanticEvaluation semantics(mapper.map().geometry());
   const double noise = given["label-noise"].as<double>();
   if (!(noise >= 0.0 && noise <= 1.0)) throw std::invalid_argument("--label-noise must be a share, 0 to 1");
+  if (given.count("errors") &&
+      std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
+    throw std::invalid_argument("--errors must end in .png");
+  }
+  const GridGeometry& geometry = mapper.map().geometry();
+  Evaluation evaluation{DynamicsEvaluation(geometry, DynamicsEvaluation::movingOfSemanticKitti(),
+                                           last - first, given["late"].as<std::size_t>()),
+                        SemanticEvaluation(geometry), std::nullopt};
+  std::optional<simulation::Drive> drive;
+  if (const auto config = simulation::readDriveFile(given["sequence"].as<std::string>())) {
+    drive.emplace(*config);
+    evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
+  }
   std::vector<double> times;
   for (std::size_t i = first; i < last; ++i) {
     const Scan scan = sequence.read(i).scan();
@@ -50,33 +104,24 @@ int evaluate(const po::variables_map& given) {
       told.labels = withLabelNoise(scan, mapper.classes(), noise, given["noise-seed"].as<std::uint64_t>());
     }
     times.push_back(mapper.integrate(told).totalMs());
-    evaluation.add(scan, mapper.classes());
-    semantics.add(scan, told.labels, mapper.classes());
+    evaluation.dynamics.add(scan, mapper.classes());
+    evaluation.semantics.add(scan, told.labels, mapper.classes());
+    if (drive) {
+      evaluation.truth->add(scan);
+      evaluation.end = drive->timeOf(i);
+      const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;
+      if (count) evaluation.truth->countGhosts(mapper.map(), evaluation.end);
+    }
     tools::showProgress(times.size(), last - first, "");
   }
-  const DynamicsQuality quality = evaluation.compare(mapper.map());
-  const double median_ms = quantile(times, 0.5);
-  print("SA", quality.staticAccuracy(), "of the points of standing things are in occupied voxels");
-  print("  ground  ", quality.groundAccuracy(), "of those of ground");
-  print("  standing", quality.standingAccuracy(), "of those of things that could move, but stand");
-  print("  other   ", quality.otherAccuracy(), "of the others");
-  print("holes", quality.holes(), "of the voxels that hold points of ground are not occupied");
-  print("DA", quality.dynamicAccuracy(), "of the early points of moving things are not");
-  print("AA", quality.accuracy(), "sqrt(SA DA)");
-  print("HA", quality.harmonicAccuracy(), "2 SA DA / (SA + DA)");
-  const SemanticQuality semantic = semantics.compare(mapper.map());
-  print("mIoU of the map", semantic.map.meanIou(), "at the labelled points");
-  print("mIoU of the input", semantic.input.meanIou(), "of the labels given to the mapper");
-  print("ECE", semantic.calibrationError(), "expected calibration error of the class's probability");
-  print("AUSE", semantic.sparsificationError, "area under the sparsification error curve, by variance");
-  std::cout << quality.static_points << " points of standing and " << quality.moving_points
-            << " of moving things; median " << median_ms << " ms a scan\n";
-  if (quality.moving_points == 0) {
-    std::cout << "there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known\n";
-  }
+  tools::MapQuality quality = evaluation.compare(mapper.map());
+  quality.median_ms = quantile(times, 0.5);
+  std::cout << tools::qualityTable(quality, mapper.classes());
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(),
-                  qualityJson(quality, semantic, mapper.classes(), median_ms));
+    writeTextFile(given["json"].as<std::string>(), tools::qualityJson(quality, mapper.classes()));
+  }
+  if (given.count("errors")) {
+    drawErrors(given["errors"].as<std::string>(), evaluation.errorRows(mapper.map()));
   }
   return 0;
 }

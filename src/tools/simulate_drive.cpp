@@ -1,7 +1,7 @@
 // Writes a simulated drive as a folder in SemanticKITTI's layout.
 #include <iostream>
 
-#include "bki_mapping/simulation/lidar.h"
+#include "bki_mapping/simulation/drive_file.h"
 #include "bki_mapping/tools/options.h"
 
 namespace {
@@ -30,41 +30,36 @@ po::options_description options() {
   return options;
 }
 
-simulation::LidarConfig lidarConfig(const po::variables_map& given) {
-  simulation::LidarConfig lidar;
-  lidar.beams = given["beams"].as<int>();
-  lidar.columns = given["columns"].as<int>();
-  lidar.rate = given["rate"].as<double>();
-  lidar.max_range = given["max-range"].as<double>();
-  lidar.range_noise = given["range-noise"].as<double>();
-  lidar.label_noise = given["label-noise"].as<double>();
-  lidar.seed = given["seed"].as<std::uint64_t>();
-  if (lidar.beams < 1 || lidar.beams > 1024 || lidar.columns < 1 || lidar.columns > 100000 ||
-      !(lidar.rate > 0.0)) {
-    throw std::invalid_argument("--beams must be 1 to 1024, --columns 1 to 100000, --rate above 0");
-  }
-  return lidar;
+simulation::DriveConfig driveConfig(const po::variables_map& given) {
+  simulation::DriveConfig drive;
+  drive.scans = given["scans"].as<int>();
+  drive.speed = given["speed"].as<double>();
+  drive.seed = given["seed"].as<std::uint64_t>();
+  drive.lidar.beams = given["beams"].as<int>();
+  drive.lidar.columns = given["columns"].as<int>();
+  drive.lidar.rate = given["rate"].as<double>();
+  drive.lidar.max_range = given["max-range"].as<double>();
+  drive.lidar.range_noise = given["range-noise"].as<double>();
+  drive.lidar.label_noise = given["label-noise"].as<double>();
+  drive.lidar.seed = drive.seed;
+  return drive;
 }
 
 int simulate(const po::variables_map& given) {
-  const int scans = given["scans"].as<int>();
-  const double speed = given["speed"].as<double>();
-  if (scans < 1 || scans > 1000000 || !(speed >= 0.0 && speed <= 100.0)) {
-    throw std::invalid_argument("--scans must be 1 to 1000000, --speed 0 to 100");
-  }
-  const auto count = static_cast<std::size_t>(scans);
-  const simulation::Drive drive(count, lidarConfig(given), speed, given["seed"].as<std::uint64_t>());
-  SequenceWriter writer(given["output"].as<std::string>());
+  const simulation::DriveConfig config = driveConfig(given);
+  const simulation::Drive drive(config);
+  const std::string folder = given["output"].as<std::string>();
+  SequenceWriter writer(folder);
   std::size_t points = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < drive.size(); ++i) {
     const SequenceFrame frame = drive.frame(i);
     writer.write(frame);
     points += frame.points.size();
-    tools::showProgress(i + 1, count, "scans");
+    tools::showProgress(i + 1, drive.size(), "scans");
   }
   writer.finish();
-  std::cout << count << " scans, " << points / count << " points a scan, in "
-            << given["output"].as<std::string>() << "\n";
+  simulation::writeDriveFile(folder, config);
+  std::cout << drive.size() << " scans, " << points / drive.size() << " points a scan, in " << folder << "\n";
   return 0;
 }
 

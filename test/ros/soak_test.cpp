@@ -133,7 +133,7 @@ class Robot {
       : random_(seed),
         clouds_(node.advertise<sensor_msgs::PointCloud2>("/soak_cloud", 100)),
         poses_(node.advertise<tf2_msgs::TFMessage>("/tf", 100)),
-        drive_(kTurns, lidar(), 8.0, seed) {}
+        drive_({kTurns, 8.0, seed, lidar()}) {}
 
   /// One turn of the lidar. @return how many clouds were sent.
   std::size_t turn(std::size_t number) {

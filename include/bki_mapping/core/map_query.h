@@ -30,6 +30,8 @@ struct VoxelView {
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
 /// The same, but with entropy 0: most of the time goes into its logarithms.
 VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset);
+/// The same for a voxel by its index; unknown where there is no block.
+VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel);
 /// @param point in the map frame [m].
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
 

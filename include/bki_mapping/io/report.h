@@ -4,9 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/mapping/dynamics_quality.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/mapping/semantic_quality.h"
 
 namespace bki_mapping {
 
@@ -24,10 +22,6 @@ std::size_t peakResidentBytes();
 
 /// The report of a run; docs/files.md describes its fields.
 std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanReport>& scans);
-
-/// The figures of evaluate_map; docs/files.md describes them. Shares of nothing are null.
-std::string qualityJson(const DynamicsQuality& quality, const SemanticQuality& semantics,
-                        const ClassTable& classes, double median_ms);
 
 /// A few lines for people: times, voxels by state and by class.
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans);

@@ -46,6 +46,14 @@ struct DynamicsQuality {
   }
 };
 
+/// What became of a voxel: things in it stand, or moved.
+enum class VoxelFate {
+  kKept,       ///< they stand, and it is occupied
+  kLost,       ///< they stand, and it is not
+  kForgotten,  ///< they moved, and it is not occupied
+  kLeft,       ///< they moved, and it still is
+};
+
 /// Collects the labelled points of a drive, voxel by voxel, and compares a map with them.
 class DynamicsEvaluation {
  public:
@@ -62,6 +70,8 @@ class DynamicsEvaluation {
   void add(const Scan& scan, const ClassTable& classes);
 
   DynamicsQuality compare(const SemanticMap& map) const;
+  /// Voxel by voxel; those that only late or unlabelled points are in are left out.
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map) const;
 
  private:
   struct Voxel {

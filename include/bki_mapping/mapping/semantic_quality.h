@@ -65,6 +65,8 @@ class SemanticEvaluation {
   void add(const Scan& scan, const std::vector<std::uint32_t>& told, const ClassTable& classes);
 
   SemanticQuality compare(const SemanticMap& map) const;
+  /// The voxels that the map calls occupied by a class that no point in them has.
+  std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map) const;
 
  private:
   GridGeometry geometry_;

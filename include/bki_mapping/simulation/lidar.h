@@ -24,23 +24,29 @@ struct LidarConfig {
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
                    double time, std::uint64_t scan);
 
+/// All that a drive depends on.
+struct DriveConfig {
+  int scans = 100;         ///< length of the drive
+  double speed = 8.0;      ///< [m/s]
+  std::uint64_t seed = 1;  ///< of the street
+  LidarConfig lidar;
+};
+
 /// A drive along the street of makeStreet.
 class Drive {
  public:
-  /// @param scans length of the drive. @param seed of street and noise.
-  Drive(std::size_t scans, const LidarConfig& lidar, double speed, std::uint64_t seed);
+  /// @throws std::invalid_argument if a setting is out of its limits.
+  explicit Drive(const DriveConfig& config);
 
-  std::size_t size() const { return scans_; }
+  std::size_t size() const { return static_cast<std::size_t>(config_.scans); }
   const Scene& scene() const { return scene_; }
-  double timeOf(std::size_t i) const { return static_cast<double>(i) / lidar_.rate; }  ///< [s]
+  double timeOf(std::size_t i) const { return static_cast<double>(i) / config_.lidar.rate; }  ///< [s]
   Eigen::Isometry3d T_world_sensor(std::size_t i) const;
   /// Frame i, with its pose in the map frame (the sensor's at frame 0) and its stamp.
   SequenceFrame frame(std::size_t i) const;
 
  private:
-  std::size_t scans_;
-  LidarConfig lidar_;
-  double speed_;
+  DriveConfig config_;
   Scene scene_;
 };
 

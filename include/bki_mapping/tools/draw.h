@@ -1,0 +1,12 @@
+/// @file Pictures, drawn by the scripts of the package.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace bki_mapping::tools {
+
+/// Runs scripts/NAME with python3 and matplotlib. @throws std::runtime_error if it fails.
+void draw(const std::string& name, const std::vector<std::string>& arguments);
+
+}  // namespace bki_mapping::tools

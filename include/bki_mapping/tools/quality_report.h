@@ -1,0 +1,27 @@
+/// @file The figures of evaluate_map, for people and programs.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "bki_mapping/mapping/dynamics_quality.h"
+#include "bki_mapping/mapping/semantic_quality.h"
+#include "bki_mapping/simulation/truth_quality.h"
+
+namespace bki_mapping::tools {
+
+struct MapQuality {
+  DynamicsQuality dynamics;
+  SemanticQuality semantics;
+  std::optional<simulation::TruthQuality> truth;   ///< of simulated drives
+  std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
+  double median_ms = 0.0;                          ///< time of a scan
+};
+
+/// A table, one figure a line, with what it means.
+std::string qualityTable(const MapQuality& quality, const ClassTable& classes);
+
+/// JSON; docs/files.md describes it. Shares of nothing are null.
+std::string qualityJson(const MapQuality& quality, const ClassTable& classes);
+
+}  // namespace bki_mapping::tools

@@ -1,0 +1,64 @@
+#include "bki_mapping/simulation/voxel_truth.h"
+
+#include <map>
+#include <utility>
+
+namespace bki_mapping::simulation {
+
+VoxelTruth::VoxelTruth(Scene scene, const Eigen::Isometry3d& T_world_map, const GridGeometry& geometry)
+    : scene_(std::move(scene)), geometry_(geometry), T_world_map_(T_world_map) {}
+
+template <typename Visit>
+bool VoxelTruth::anyPoint(const VoxelIndex& voxel, Visit&& visit) const {
+  const Eigen::Vector3d corner = Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
+  for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
+    const Eigen::Vector3d inside(i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints));
+    const Eigen::Vector3d place = corner + (inside + Eigen::Vector3d::Constant(0.5)) / kPoints;
+    if (visit(T_world_map_ * (place * geometry_.resolution()))) return true;
+  }
+  return false;
+}
+
+std::vector<Shape> VoxelTruth::shapesAt(const VoxelIndex& voxel, double time, double margin) const {
+  const Eigen::Vector3d centre = T_world_map_ * geometry_.voxelCentre(voxel);
+  const double reach = 0.87 * geometry_.resolution();  // half the diagonal of a voxel
+  std::vector<Shape> shapes;
+  for (const Shape& shape : scene_.shapes) {
+    Shape grown = shape;
+    grown.half.array() += margin;
+    const double radius = grown.half.norm() + reach;
+    if ((shape.centreAt(time) - centre).squaredNorm() <= radius * radius) shapes.push_back(grown);
+  }
+  return shapes;
+}
+
+std::optional<std::uint32_t> VoxelTruth::labelAt(const VoxelIndex& voxel, double time) const {
+  const Scene near{scene_.ground, shapesAt(voxel, time, 0.0)};
+  std::map<std::uint32_t, int> votes;
+  anyPoint(voxel, [&](const Eigen::Vector3d& point) {
+    if (const auto label = near.labelAt(point, time)) ++votes[*label];
+    return false;
+  });
+  std::optional<std::uint32_t> most;
+  for (const auto& [label, count] : votes) {
+    if (!most || count > votes[*most]) most = label;
+  }
+  return most;
+}
+
+bool VoxelTruth::isNear(const VoxelIndex& voxel, double time, double margin,
+                        const std::function<bool(std::uint32_t)>& wanted) const {
+  for (const Shape& shape : shapesAt(voxel, time, margin)) {
+    if (!wanted(shape.label)) continue;
+    if (anyPoint(voxel, [&](const Eigen::Vector3d& point) { return shape.contains(point, time); }))
+      return true;
+  }
+  return false;
+}
+
+bool VoxelTruth::isNearAnything(const VoxelIndex& voxel, double time, double margin) const {
+  return anyPoint(voxel, [&](const Eigen::Vector3d& point) { return point.z() <= margin; }) ||
+         isNear(voxel, time, margin, [](std::uint32_t) { return true; });
+}
+
+}  // namespace bki_mapping::simulation

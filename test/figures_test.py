@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""The figures of scripts/reproduce: on small cases, each is drawn, and its table says what it must."""
+import csv
+import os
+import re
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
+sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
+
+import matplotlib  # noqa: E402
+matplotlib.use('Agg')
+
+from figures import complexity, frontier, plane, tradeoff  # noqa: E402
+from figures.programs import Programs  # noqa: E402
+
+
+class Figures(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.output = cls.folder.name
+        cls.programs = Programs(os.environ['BKI_MAPPING_BIN'], os.path.join(cls.output, 'scratch'))
+        cls.drive = cls.programs.simulate('drive', scans=4, beams=24, columns=600)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def rows(self, name):
+        with open(os.path.join(self.output, name), newline='') as file:
+            return list(csv.DictReader(file))
+
+    def expect_pictures(self, text, count):
+        pictures = re.findall(r'!\[.*?\]\((.*?)\)', text)
+        self.assertEqual(len(pictures), count)
+        for picture in pictures:
+            with open(os.path.join(self.output, picture), 'rb') as file:
+                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+
+    def test_plane(self):
+        self.expect_pictures(plane.draw(self.programs, self.output), 2)
+
+        def crowding(pattern):  # near the sensor against far from it
+            density = [float(row['samples_per_m2']) for row in self.rows('figure1.csv') if row['pattern'] == pattern]
+            return density[0] / density[3]
+        self.assertLess(crowding('linear, 5 a beam'), 2.5)
+        self.assertGreater(crowding('uniform, 5 a beam'), 5)
+        free = {row['representation']: int(row['free_voxels']) for row in self.rows('figure2.csv')}
+        self.assertGreater(free['lines, uniform'], 1.3 * free['linear, 5 a beam'])
+
+    def test_tradeoff_and_views(self):
+        modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}
+        with unittest.mock.patch.object(tradeoff, 'MODES', modes):
+            self.expect_pictures(tradeoff.draw(self.programs, self.drive, 'small', 'a test', self.output), 2)
+        rows = self.rows('figure4_small.csv')
+        self.assertEqual([row['mode'] for row in rows], ['none', 'linear', 'linear', 'line, bilinear'])
+        self.assertEqual(int(rows[0]['samples_or_beams']), 0)
+        self.assertGreater(int(rows[2]['samples_or_beams']), int(rows[1]['samples_or_beams']))
+        self.assertGreater(int(rows[0]['car_voxels']), int(rows[3]['car_voxels']))
+
+    def test_frontier(self):
+        options = {name: frontier.OPTIONS[name] for name in ('linear, 1', 'line, observed')}
+        with unittest.mock.patch.object(frontier, 'OPTIONS', options):
+            presets = os.path.join(SOURCE, 'config', 'presets')
+            self.expect_pictures(frontier.draw(self.programs, self.drive, 'small', 'a test', presets, self.output), 1)
+        rows = {row['option']: row for row in self.rows('frontier_small.csv')}
+        self.assertEqual(len(rows), len(os.listdir(presets)) + 2)
+        self.assertEqual(float(rows['preset paper_none']['sa']), 100.0)
+        self.assertGreater(float(rows['line, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
+
+    def test_complexity(self):
+        self.assertAlmostEqual(complexity.exponent([1, 2, 4], [3, 12, 48]), 2.0)
+        small = {'MODES': {'linear, 1 sample': {'free_space/mode': 'linear'}, 'uniform, 1 sample': {}},
+                 'RESOLUTIONS': (0.4, 0.3), 'COLUMNS': (450, 1800), 'SAMPLES': (1, 2), 'RANGES': (10, 20), 'REPEATS': 1}
+        with unittest.mock.patch.multiple(complexity, **small):
+            self.expect_pictures(complexity.draw(self.programs, self.output, 2), 1)
+        rows = self.rows('complexity.csv')
+        self.assertEqual(len(rows), 2 * (2 + 2 + 2) + 4)
+        points = [float(row['value']) for row in rows if row['varied'] == 'points']
+        self.assertGreater(points[1], 3 * points[0])
+
+
+if __name__ == '__main__':
+    unittest.main()
