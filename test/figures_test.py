@@ -63,14 +63,14 @@ class Figures(unittest.TestCase):
         self.assertGreater(int(rows[0]['car_voxels']), int(rows[3]['car_voxels']))
 
     def test_frontier(self):
-        options = {name: frontier.OPTIONS[name] for name in ('linear, 1', 'line, observed')}
+        options = {name: frontier.OPTIONS[name] for name in ('linear, 1', 'line, bilinear, observed')}
         with unittest.mock.patch.object(frontier, 'OPTIONS', options):
             presets = os.path.join(SOURCE, 'config', 'presets')
             self.expect_pictures(frontier.draw(self.programs, self.drive, 'small', 'a test', presets, self.output), 1)
         rows = {row['option']: row for row in self.rows('frontier_small.csv')}
         self.assertEqual(len(rows), len(os.listdir(presets)) + 2)
         self.assertEqual(float(rows['preset paper_none']['sa']), 100.0)
-        self.assertGreater(float(rows['line, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
+        self.assertGreater(float(rows['line, bilinear, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
 
     def test_complexity(self):
         self.assertAlmostEqual(complexity.exponent([1, 2, 4], [3, 12, 48]), 2.0)

@@ -279,13 +279,17 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   config.free_gain.dynamic_classes = 30.0;
   config.free_gain.static_classes = 0.1;
   const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-  EXPECT_EQ(mapper.map().freeGain(0), 1.0f);  // unlabelled
-  EXPECT_EQ(mapper.map().freeGain(1), 0.1f);
-  EXPECT_EQ(mapper.map().freeGain(2), 30.0f);
-  EXPECT_EQ(mapper.map().freeGain(kFreeClass), 1.0f);
+  EXPECT_EQ(mapper.map().freeGain(0, 5.0f), 1.0f);  // unlabelled
+  EXPECT_EQ(mapper.map().freeGain(1, 5.0f), 0.1f);
+  EXPECT_EQ(mapper.map().freeGain(2, 5.0f), 30.0f);
+  EXPECT_EQ(mapper.map().freeGain(kFreeClass, 5.0f), 1.0f);
   classes[2].free_gain = 7.0;
   const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_EQ(own.map().freeGain(2), 7.0f);
+  EXPECT_EQ(own.map().freeGain(2, 5.0f), 7.0f);
+  config.free_gain.persistence = 2.0;
+  const SemanticMapper persistent(config, std::make_shared<ClassTable>("gains", classes));
+  EXPECT_FLOAT_EQ(persistent.map().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
+  EXPECT_EQ(persistent.map().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
 }
 
 }  // namespace

@@ -71,6 +71,21 @@ TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
   EXPECT_EQ(view().state, VoxelState::kFree);
 }
 
+TEST(MapQuery, WhatIsHitAgainAndAgainStands) {
+  // Seen free as often as hit, or twice as often; a gain of 4, and a persistence of 1.
+  const auto state = [](float hits, float free, double persistence) {
+    SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
+    map.setFreeGain(1, 4.0);
+    map.setGainPersistence(persistence);
+    return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
+  };
+  EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
+  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have passed";  // gain 3.5
+  EXPECT_EQ(state(4.0f, 2.0f, 0.0), VoxelState::kFree);
+  EXPECT_EQ(state(4.0f, 2.0f, 1.0), VoxelState::kOccupied) << "twenty hits: it stands";  // gain 1.05
+  EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
+}
+
 TEST(MapQuery, GainsAloneMakeNothingFree) {
   SemanticMap map = mapWith({{1, 0.4f}}, 77);
   map.setFreeGain(1, 1000.0);

@@ -6,9 +6,27 @@ import matplotlib.pyplot as plt
 from .tables import markdown, save, write_csv
 
 
-def line(extent='mapped', weight='bilinear', **options):
-    settings = {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
-    return settings | {name.replace('__', '/'): value for name, value in options.items()}
+def line(extent='mapped', weight='bilinear'):
+    return {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
+
+
+# What turns plain lines into the preset `robot`, one after the other.
+STEPS = {
+    '+ hits before misses': {'free_space/hits_before_misses': 'true'},
+    '+ free_gain/static 0.1': {'free_gain/static': 0.1},
+    '+ evidence before misses': {'free_space/evidence_before_misses': 'true'},
+    '+ scan_limit 0.2, 0.1': {'scan_limit/hits': 0.2, 'scan_limit/free': 0.1, 'kernel/scale': 100},
+    '+ free_gain/dynamic 8': {'free_gain/dynamic': 8},
+    '+ free_gain/persistence 0.5': {'free_gain/persistence': 0.5},
+}
+
+
+def cumulative(settings, steps):
+    options = {}
+    for name, step in steps.items():
+        settings = settings | step
+        options[name] = settings
+    return options
 
 
 OPTIONS = {
@@ -19,13 +37,8 @@ OPTIONS = {
     'line, uniform': line(weight='uniform'),
     'line, linear': line(weight='linear'),
     'line, bilinear': line(),
-    'line, observed': line('observed'),
-    '+ hits before misses': line('observed', free_space__hits_before_misses='true'),
-    '+ free_gain/static 0.1': line('observed', free_space__hits_before_misses='true', free_gain__static=0.1),
-    '+ evidence before misses': line('observed', free_space__hits_before_misses='true', free_gain__static=0.1,
-                                     free_space__evidence_before_misses='true'),
-    '+ free_gain/dynamic 4': line('observed', free_space__hits_before_misses='true', free_gain__static=0.1,
-                                  free_space__evidence_before_misses='true', free_gain__dynamic=4),
+    'line, bilinear, observed': line('observed'),
+    **cumulative(line('observed'), STEPS),
 }
 PERCENT = ('sa', 'sa_standing', 'floor_holes', 'da', 'aa', 'miou_map')
 OF_TRUTH = ('free_precision', 'free_recall', 'occupied_precision', 'occupied_recall', 'voxel_miou')

@@ -29,7 +29,7 @@ VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset) {
   }
   view.evidence = static_cast<float>(total);
   if (total > 0.0) {
-    view.state = best >= map.freeGain(view.label) * free ? VoxelState::kOccupied : VoxelState::kFree;
+    view.state = best >= map.freeGain(view.label, best) * free ? VoxelState::kOccupied : VoxelState::kFree;
   } else if (block.occlusion()[static_cast<std::size_t>(offset)]) {
     view.state = VoxelState::kOccluded;
   }

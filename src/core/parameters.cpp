@@ -81,6 +81,12 @@ std::vector<Parameter> mapperParameters() {
           "The same for classes not flagged dynamic; below 1, beams that graze a surface do not eat it.",
           [](MapperConfig & c) -> auto& { return c.free_gain.static_classes; }, positive),
       realParameter<MapperConfig>(
+          "free_gain/persistence", "a number >= 0", "",
+          "Evidence of hits over which a gain above 1 falls to 1/e of what it is above 1: what is hit scan "
+          "after "
+          "scan stands, even if its class can move; 0: gains do not fall.",
+          [](MapperConfig & c) -> auto& { return c.free_gain.persistence; }, notNegative),
+      realParameter<MapperConfig>(
           "scan_limit/hits", "a number >= 0", "",
           "The most evidence that the hits of one scan add to a voxel, shared by its classes in proportion; "
           "0: no limit.",

@@ -49,6 +49,7 @@ void SemanticMapper::applySettings() {
   if (config_.scan_limit.hits > 0.0) limits.hits = static_cast<float>(config_.scan_limit.hits);
   if (config_.scan_limit.free > 0.0) limits.free = static_cast<float>(config_.scan_limit.free);
   updater_.setLimits(limits);
+  map_.setGainPersistence(config_.free_gain.persistence);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     const double of_kind = c.unlabelled ? 1.0 : (c.dynamic ? gain.dynamic_classes : gain.static_classes);

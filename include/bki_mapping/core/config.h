@@ -33,6 +33,8 @@ struct FreeSpaceConfig {
 struct FreeGainConfig {
   double dynamic_classes = 1.0;  ///< classes flagged dynamic
   double static_classes = 1.0;   ///< the others
+  /// Evidence of hits over which a gain above 1 falls to 1/e of what it is above 1; 0: it does not.
+  double persistence = 0.0;
 };
 
 /// What one scan may add at most to one voxel; 0: no limit.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -35,9 +36,18 @@ class SemanticMap {
   /// Sum of a voxel's concentrations before any scan.
   double priorSum() const { return prior_ * static_cast<double>(class_count_ + 1); }
 
-  /// Gain on the evidence for `free` when the state of a voxel of this class is decided; 1 unless set.
-  float freeGain(ClassId id) const { return free_gains_[id]; }
+  /// Gain on the evidence for `free` when the state of a voxel is decided whose likeliest class is `id`; 1
+  /// unless set. With a persistence P > 0, a gain above 1 falls towards 1 with the evidence for the class, by
+  /// exp(-hits / P): what is hit scan after scan stands, even if it could move.
+  /// @param hits evidence for the class.
+  float freeGain(ClassId id, float hits) const {
+    const float gain = free_gains_[id];
+    if (gain <= 1.0f || gain_persistence_ <= 0.0f) return gain;
+    return 1.0f + (gain - 1.0f) * std::exp(-hits / gain_persistence_);
+  }
   void setFreeGain(ClassId id, double gain) { free_gains_[id] = static_cast<float>(gain); }
+  /// @param persistence in units of evidence; 0: gains are the same however much evidence there is.
+  void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
 
   /// All blocks, in no promised order.
   const std::vector<Entry>& entries() const { return entries_; }
@@ -91,6 +101,7 @@ class SemanticMap {
   double prior_;
   std::size_t class_count_;
   std::array<float, 256> free_gains_;
+  float gain_persistence_ = 0.0f;
   std::vector<Entry> entries_;
   GridTable place_;                                  ///< of each block in entries_
   std::vector<std::vector<std::uint32_t>> regions_;  ///< places of their blocks in entries_
