@@ -66,10 +66,12 @@ class Figures(unittest.TestCase):
         options = {name: frontier.OPTIONS[name] for name in ('linear, 1', 'line, bilinear, observed')}
         with unittest.mock.patch.object(frontier, 'OPTIONS', options):
             presets = os.path.join(SOURCE, 'config', 'presets')
-            self.expect_pictures(frontier.draw(self.programs, self.drive, 'small', 'a test', presets, self.output), 1)
+            self.expect_pictures(frontier.draw(self.programs, self.drive, 'small', 'a test', presets, self.output), 2)
         rows = {row['option']: row for row in self.rows('frontier_small.csv')}
         self.assertEqual(len(rows), len(os.listdir(presets)) + 2)
         self.assertEqual(float(rows['preset paper_none']['sa']), 100.0)
+        curves = {(row['preset'], row['of']) for row in self.rows('calibration_small.csv')}
+        self.assertEqual(curves, {(os.path.splitext(p)[0], of) for p in os.listdir(presets) for of in ('class', 'occupancy')})
         self.assertGreater(float(rows['line, bilinear, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
 
     def test_complexity(self):

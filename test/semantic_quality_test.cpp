@@ -83,9 +83,10 @@ TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
   set(1, 2, 1.0f);
   see(1, 20, 20, 4);  // all are right at probability 1
   const SemanticQuality quality = evaluation_.compare(map_);
-  EXPECT_EQ(quality.bins[8].points + quality.bins[7].points, 4u);  // 0.8 may round either way
-  EXPECT_EQ(quality.bins[9].points, 4u);
-  EXPECT_NEAR(quality.calibrationError(), (std::abs(3 - 3.2) + 0.0) / 8, 1e-5);
+  EXPECT_EQ(quality.reliability.bins()[8].count + quality.reliability.bins()[7].count,
+            4u);  // 0.8 may round either way
+  EXPECT_EQ(quality.reliability.bins()[9].count, 4u);
+  EXPECT_NEAR(quality.reliability.error(), (std::abs(3 - 3.2) + 0.0) / 8, 1e-5);
 }
 
 TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {

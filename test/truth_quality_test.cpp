@@ -94,6 +94,10 @@ TEST_F(Truth, VoxelsAreComparedOneByOne) {
   EXPECT_EQ(quality.all.occupied_recall.right, 2u);
   EXPECT_GT(quality.all.free_recall.all, 5u);
   EXPECT_EQ(quality.all.free_recall.right, 1u);
+  EXPECT_EQ(quality.occupancy.bins()[9].right, 2u) << "the car and the pole";
+  EXPECT_EQ(quality.occupancy.bins()[9].count, 2u);
+  EXPECT_EQ(quality.occupancy.bins()[0].right, 0u) << "the voxel at the sensor";
+  EXPECT_EQ(quality.occupancy.bins()[0].count, 1u);
   EXPECT_EQ(quality.movable, 3u);
   EXPECT_EQ(quality.ghosts, 1u);
   EXPECT_EQ(quality.by_distance[0].occupied_precision.all, 2u) << "up to 10 m";

@@ -53,25 +53,71 @@ def row_of(name, figures):
         [truth.get('ghost_voxels', '')]
 
 
-def draw(programs, sequence, name, title, presets, output):
-    rows = [row_of(option, programs.evaluate(sequence, settings)) for option, settings in OPTIONS.items()]
-    for preset in sorted(os.listdir(presets)):
-        more = ['--config', os.path.join(presets, preset)]
-        rows.append(row_of('preset ' + preset[:-len('.yaml')], programs.evaluate(sequence, {}, more)))
+def draw_calibration(figures_of, name, output):
+    """Reliability curves of the class's probability and, on simulated drives, of occupancy. Returns the section."""
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4))
+    rows = []
+    for preset, figures in figures_of.items():
+        truth = figures.get('truth', {})
+        curves = (('class', figures['reliability']), ('occupancy', truth.get('occupancy_reliability', [])))
+        for place, (what, bins) in zip(axes, curves):
+            seen = [b for b in bins if b['count'] > 0]
+            place.plot([b['probability'] for b in seen], [b['right'] for b in seen], 'o-', markersize=4, label=preset)
+            rows += [[preset, what, b['count'], b['probability'], b['right']] for b in seen]
+    for place, what in zip(axes, ("of the voxel's class, at points", 'of being occupied, of voxels')):
+        place.plot((0, 1), (0, 1), 'k:')
+        place.set_xlabel('probability ' + what)
+        place.set_ylabel('share that is so')
+        place.grid(True, alpha=0.3)
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    save(figure, output, f'calibration_{name}.png')
+    write_csv(output, f'calibration_{name}.csv', ['preset', 'of', 'count', 'probability', 'right'], rows)
+
+    def percent(value):
+        return '' if value is None else f'{100 * value:.1f}'
+    table = [[preset, percent(f['calibration_error']), percent(f.get('truth', {}).get('occupancy_calibration_error')),
+              percent(f['sparsification_error'])] for preset, f in figures_of.items()]
+    return f'''Reliability: how often what was told with a probability is so ([calibration_{name}.csv](calibration_{name}.csv)).
+
+![calibration](calibration_{name}.png)
+
+{markdown(['preset', 'ECE of the class [%]', 'ECE of occupancy [%]', 'AUSE [%]'], table)}'''
+
+
+def draw_frontier(rows, name, title, output):
+    """AA against time; the scale spreads what is near 100 %."""
     figure, axes = plt.subplots(figsize=(12, 5.6))
     for number, row in enumerate(rows, 1):
         preset = row[0].startswith('preset')
-        axes.plot(row[1], row[6], 's' if preset else 'o', color='tab:red' if preset else 'tab:blue',
+        lacking = 100.0 - float(row[6])
+        axes.plot(float(row[1]), lacking, 's' if preset else 'o', color='tab:red' if preset else 'tab:blue',
                   label=f'{number}  {row[0]}')
-        axes.annotate(number, (row[1], row[6]), fontsize=8, textcoords='offset points', xytext=(4, 3))
+        axes.annotate(number, (float(row[1]), lacking), fontsize=8, textcoords='offset points', xytext=(4, 3))
     axes.legend(fontsize=8, loc='center left', bbox_to_anchor=(1.01, 0.5), markerscale=0.7, frameon=False)
+    axes.set_yscale('log')
+    ticks = (1, 2, 5, 10, 20, 50, 100)
+    axes.set_yticks(ticks, [f'{100 - tick}' for tick in ticks])
+    axes.minorticks_off()
+    axes.set_ylim(105, 0.9)
     axes.set_xlabel('time of a scan [ms], median')
     axes.set_ylabel('AA = sqrt(SA DA) [%]')
     axes.set_title(title)
     axes.grid(True, alpha=0.3)
-    axes.set_xlim(left=0, right=1.1 * max(row[1] for row in rows))
+    axes.set_xlim(left=0, right=1.1 * max(float(row[1]) for row in rows))
     figure.tight_layout()
     save(figure, output, f'frontier_{name}.png')
+
+
+def draw(programs, sequence, name, title, presets, output):
+    rows = [row_of(option, programs.evaluate(sequence, settings)) for option, settings in OPTIONS.items()]
+    figures_of = {}
+    for file in sorted(os.listdir(presets)):
+        preset = file[:-len('.yaml')]
+        figures_of[preset] = programs.evaluate(sequence, {}, ['--config', os.path.join(presets, file)])
+        rows.append(row_of('preset ' + preset, figures_of[preset]))
+    calibration = draw_calibration(figures_of, name, output)
+    draw_frontier(rows, name, title, output)
     header = ['option', 'median_ms', *PERCENT, 'car_voxels', *OF_TRUTH, 'ghost_voxels']
     write_csv(output, f'frontier_{name}.csv', header, rows)
     return f'''## The frontier: {title}
@@ -81,4 +127,5 @@ to the row above it. [frontier_{name}.csv](frontier_{name}.csv):
 
 ![frontier](frontier_{name}.png)
 
-{markdown([h.replace('_', ' ') for h in header], rows)}'''
+{markdown([h.replace('_', ' ') for h in header], rows)}
+{calibration}'''

@@ -84,13 +84,20 @@ double Confusion::accuracy() const {
   return all == 0 ? kNan : static_cast<double>(right) / static_cast<double>(all);
 }
 
-double SemanticQuality::calibrationError() const {
-  double error = 0.0, points = 0.0;
-  for (const Bin& bin : bins) {
-    error += std::abs(static_cast<double>(bin.right) - bin.confidence);
-    points += static_cast<double>(bin.points);
+void Reliability::add(double probability, std::size_t count, std::size_t right) {
+  Bin& bin = bins_[static_cast<std::size_t>(10.0 * std::min(probability, 0.999999))];
+  bin.count += count;
+  bin.right += right;
+  bin.probability += probability * static_cast<double>(count);
+}
+
+double Reliability::error() const {
+  double error = 0.0, count = 0.0;
+  for (const Bin& bin : bins_) {
+    error += std::abs(static_cast<double>(bin.right) - bin.probability);
+    count += static_cast<double>(bin.count);
   }
-  return error / points;
+  return error / count;
 }
 
 void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>& told,
@@ -125,11 +132,7 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
     }
     if (view.state != VoxelState::kOccupied) continue;
     ranked.push_back(voxel);
-    const auto place = static_cast<std::size_t>(10.0f * std::min(view.probability, 0.999999f));
-    SemanticQuality::Bin& bin = quality.bins[place];
-    bin.points += voxel.points;
-    bin.right += voxel.points - voxel.wrong;
-    bin.confidence += static_cast<double>(view.probability) * static_cast<double>(voxel.points);
+    quality.reliability.add(static_cast<double>(view.probability), voxel.points, voxel.points - voxel.wrong);
   }
   quality.sparsificationError = sparsificationError(std::move(ranked));
   return quality;

@@ -110,6 +110,9 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
     const ClassId truth = classAt(voxel.index, time);
     const VoxelView view = judgeVoxel(map, voxel.index);
     quality.voxels.add(truth, view.label);
+    if (view.evidence > 0.0f) {
+      quality.occupancy.add(static_cast<double>(view.occupancy), 1, truth == kFreeClass ? 0 : 1);
+    }
     if (voxel.crossed && truth == kFreeClass) {
       add(&SpaceQuality::free_recall, bin, view.state == VoxelState::kFree);
     }

@@ -37,10 +37,23 @@ Json spaceJson(const SpaceQuality& space) {
   return figures;
 }
 
+Json reliabilityJson(const Reliability& reliability) {
+  Json bins;
+  for (const Reliability::Bin& bin : reliability.bins()) {
+    const auto count = static_cast<double>(bin.count);
+    bins.push_back({{"count", bin.count},
+                    {"probability", bin.probability / count},
+                    {"right", static_cast<double>(bin.right) / count}});
+  }
+  return bins;
+}
+
 Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
   Json figures = spaceJson(truth.all);
   figures["voxel_miou"] = truth.meanIou(classes);
   figures["voxel_occupied_iou"] = truth.occupiedIou(classes);
+  figures["occupancy_calibration_error"] = truth.occupancy.error();
+  figures["occupancy_reliability"] = reliabilityJson(truth.occupancy);
   figures["movable_voxels"] = truth.movable;
   figures["ghost_voxels"] = truth.ghosts;
   figures["mean_ghost_voxels"] = truth.mean_ghosts;
@@ -75,6 +88,8 @@ void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table
   }
   table.share("voxel mIoU", truth.meanIou(classes), "of the classes of voxels, over those there are");
   table.share("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
+  table.share("occupancy ECE", truth.occupancy.error(),
+              "expected calibration error of the probability of occupancy");
   std::ostringstream mean;
   mean << std::fixed << std::setprecision(1) << truth.mean_ghosts;
   table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
@@ -98,7 +113,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.share("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   table.share("mIoU of the map", s.map.meanIou(), "at the labelled points");
   table.share("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
-  table.share("ECE", s.calibrationError(), "expected calibration error of the class's probability");
+  table.share("ECE", s.reliability.error(), "expected calibration error of the class's probability");
   table.share("AUSE", s.sparsificationError, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
   std::ostringstream end;
@@ -131,7 +146,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"miou_input", s.input.meanIou()},
                   {"accuracy_map", s.map.accuracy()},
                   {"accuracy_input", s.input.accuracy()},
-                  {"calibration_error", s.calibrationError()},
+                  {"calibration_error", s.reliability.error()},
                   {"sparsification_error", s.sparsificationError},
                   {"median_ms", quality.median_ms}};
   for (const SemanticClass& c : classes.classes()) {
@@ -143,12 +158,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                                   {"iou_map", s.map.iou(c.id)},
                                   {"iou_input", s.input.iou(c.id)}});
   }
-  for (const SemanticQuality::Bin& bin : s.bins) {
-    const auto points = static_cast<double>(bin.points);
-    figures["reliability"].push_back({{"points", bin.points},
-                                      {"confidence", bin.confidence / points},
-                                      {"right", static_cast<double>(bin.right) / points}});
-  }
+  figures["reliability"] = reliabilityJson(s.reliability);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";
 }

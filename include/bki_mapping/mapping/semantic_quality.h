@@ -31,22 +31,32 @@ class Confusion {
   std::map<std::pair<ClassId, ClassId>, std::size_t> counts_;
 };
 
+/// Probabilities that were told, in ten bins of equal width, and how often what they were told of was so.
+class Reliability {
+ public:
+  struct Bin {
+    std::size_t count = 0, right = 0;
+    double probability = 0.0;  ///< sum over the count
+  };
+
+  /// @param right how many of `count` were so.
+  void add(double probability, std::size_t count, std::size_t right);
+  const std::array<Bin, 10>& bins() const { return bins_; }
+  /// Expected calibration error: the mean of |share that is right - mean probability| of the bin. NaN of
+  /// none.
+  double error() const;
+
+ private:
+  std::array<Bin, 10> bins_;
+};
+
 /// What a map says of labelled points, and what their own labels said (the protocol of Gan et al., RA-L 2020:
 /// the final map at each point of the ground truth, unlabelled ones left out).
 struct SemanticQuality {
   Confusion map;    ///< told by the voxel that holds the point
   Confusion input;  ///< told by the label that the mapper was given
 
-  /// Points in occupied voxels, by the probability of the voxel's class: ten bins of equal width.
-  struct Bin {
-    std::size_t points = 0, right = 0;
-    double confidence = 0.0;  ///< sum over the points
-  };
-  std::array<Bin, 10> bins;
-
-  /// Expected calibration error: mean over those points of |share that is right - mean probability| of their
-  /// bin.
-  double calibrationError() const;
+  Reliability reliability;  ///< of the probability of the voxel's class, over points in occupied voxels
 
   /// Area under the sparsification error curve (Ilg et al., ECCV 2018): how much more error is left, on
   /// average over all shares of points left out, if the voxels of greatest variance are left out first, than

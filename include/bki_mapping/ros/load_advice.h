@@ -13,8 +13,7 @@ namespace bki_mapping::ros_shell {
 double loadOf(double integration_ms, double received_hz);
 
 /// One sentence that says how far mapping is behind and which settings would help, each with an estimate of
-/// the time then: that of the mode from docs/performance.md, that of the resolution by 1 / resolution^2, that
-/// of the range in proportion. "" while the load is at most 1.
+/// the time then, from measurements (docs/performance.md). "" while the load is at most 1.
 std::string loadAdvice(const MapperConfig& config, double integration_ms, double received_hz);
 
 }  // namespace bki_mapping::ros_shell

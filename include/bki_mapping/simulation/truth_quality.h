@@ -38,6 +38,7 @@ struct TruthQuality {
   SpaceQuality all;
   /// Classes of the voxels that were hit or crossed, or are called occupied; kFreeClass for free ones.
   Confusion voxels;
+  Reliability occupancy;     ///< 1 - p(free) of the known voxels that were hit or crossed
   std::size_t movable = 0;   ///< voxels that the map calls occupied by a class that can move
   std::size_t ghosts = 0;    ///< of these, where no such thing has been near for half a second
   double mean_ghosts = 0.0;  ///< the mean of the same over the moments that countGhosts was called at
