@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "bki_mapping/mapping/dynamics_quality.h"
 #include "reference/scenes.h"
@@ -40,7 +41,15 @@ TEST(DynamicsQuality, CountsPointByPoint) {
                  *classes);
   evaluation.add(scanOf({{{11.5f, 0, 0}, 20}, {{3.5f, 0, 0}, 99}, {{NAN, 0, 0}, 10}}), *classes);
   evaluation.add(scanOf({{{9.5f, 0, 0}, 10}}), *classes);
-  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}, {7.5, 0, 0}, {9.5, 0, 0}}));
+  const SemanticMap map = mapOf({{0.5, 0, 0}, {7.5, 0, 0}, {9.5, 0, 0}});
+  std::map<int, VoxelFate> fates;
+  for (const auto& [voxel, fate] : evaluation.fates(map)) fates[voxel.x] = fate;
+  EXPECT_EQ(fates, (std::map<int, VoxelFate>{{0, VoxelFate::kKept},
+                                             {2, VoxelFate::kLost},
+                                             {5, VoxelFate::kForgotten},
+                                             {7, VoxelFate::kLeft},
+                                             {9, VoxelFate::kKept}}));
+  const DynamicsQuality quality = evaluation.compare(map);
   EXPECT_EQ(quality.static_points, 4u);
   EXPECT_EQ(quality.static_kept, 3u);    // two at 0.5, one at 9.5; 2.5 is lost
   EXPECT_EQ(quality.moving_points, 3u);  // at 5.5, 5.6, 7.5; 9.5 is hit late, 11.5 is not early

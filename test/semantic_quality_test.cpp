@@ -75,6 +75,18 @@ TEST_F(Quality, ComparesWhatMapAndInputTell) {
   EXPECT_EQ(quality.map.points(0), 0u);
 }
 
+TEST_F(Quality, WrongVoxelsAreOccupiedByAClassThatNoPointHas) {
+  see(0, 10, 10);
+  see(1, 20, 20);
+  see(2, 30, 30);
+  set(0, 1, 1.0f);
+  set(1, 1, 1.0f);           // wrong
+  set(2, kFreeClass, 1.0f);  // lost, but not of a wrong class
+  const auto wrong = evaluation_.wrongVoxels(map_);
+  ASSERT_EQ(wrong.size(), 1u);
+  EXPECT_EQ(wrong[0].x, 1);
+}
+
 TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
   set(0, 1, 0.8f);
   set(0, 2, 0.2f);
