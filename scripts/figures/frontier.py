@@ -45,6 +45,7 @@ OF_TRUTH = ('free_precision', 'free_recall', 'occupied_precision', 'occupied_rec
 
 
 def row_of(name, figures):
+
     def percent(value):
         return '' if value is None else round(100.0 * value, 1)
     truth = figures.get('truth', {})

@@ -53,6 +53,7 @@ class Live(MapperTest):
 
     def integrated(self, stamps):
         return [self.deal_with(stamp).integrated_last for stamp in stamps]
+
     def test_the_queue_is_bounded_and_keeps_the_newest(self):
         stamps = self.fill_queue(8)
         self.assertEqual(self.integrated(stamps), 5 * [False] + QUEUE * [True])
