@@ -13,7 +13,7 @@ namespace bki_mapping::ros_shell {
 double loadOf(double integration_ms, double received_hz);
 
 /// One sentence that says how far mapping is behind and which settings would help, each with an estimate of
-/// the time then, from measurements (docs/performance.md). "" while the load is at most 1.
+/// the time then, from measurements (docs/performance.md, docs/tuning.md). "" while the load is at most 1.
 std::string loadAdvice(const MapperConfig& config, double integration_ms, double received_hz);
 
 }  // namespace bki_mapping::ros_shell
