@@ -45,6 +45,19 @@ TEST(SemanticMap, EqualsAPlainMapWhateverComesAndGoes) {
   }
 }
 
+TEST(SemanticMap, AWindowThatMovesOnTakesNoMoreMemory) {
+  SemanticMap map(GridGeometry(0.3), 0.001, 3);
+  std::size_t at_start = 0;
+  for (int x = 0; x < 100000; ++x) {
+    float plane[kBlockVoxels] = {1.0f};
+    map.getOrAllocate({{x, x / 7, 0}}).add(1, plane);
+    map.erase({{x - 50, (x - 50) / 7, 0}});
+    if (x == 1000) at_start = map.bytes();
+  }
+  EXPECT_EQ(map.size(), 50u);
+  EXPECT_LE(map.bytes(), at_start);
+}
+
 TEST(SemanticMap, FindsAllBlocksNearAPointAndNoneTwice) {
   std::mt19937 random(6);
   SemanticMap map(GridGeometry(0.3), 0.001, 3);

@@ -1,6 +1,7 @@
 #include "bki_mapping/core/semantic_map.h"
 
 #include <stdexcept>
+#include <utility>
 
 namespace bki_mapping {
 
@@ -12,8 +13,26 @@ GridIndex SemanticMap::regionOf(const BlockIndex& block) {
 std::vector<std::uint32_t>& SemanticMap::regionAt(const BlockIndex& block) {
   const auto fresh = static_cast<std::uint32_t>(regions_.size());
   const std::uint32_t number = region_number_.insert(regionOf(block), fresh);
-  if (number == fresh) regions_.emplace_back();
-  return regions_[number];
+  if (number == fresh) {
+    regions_.push_back({regionOf(block), {}});
+    if (!spare_places_.empty()) {
+      regions_.back().places = std::move(spare_places_.back());
+      spare_places_.pop_back();
+    }
+  }
+  return regions_[number].places;
+}
+
+void SemanticMap::dropIfEmpty(const BlockIndex& block) {
+  const std::uint32_t number = region_number_.find(regionOf(block));
+  if (!regions_[number].places.empty()) return;
+  spare_places_.push_back(std::move(regions_[number].places));
+  region_number_.erase(regions_[number].index);
+  if (number + 1 != regions_.size()) {
+    regions_[number] = std::move(regions_.back());
+    region_number_.set(regions_[number].index, number);
+  }
+  regions_.pop_back();
 }
 
 const Block* SemanticMap::find(const BlockIndex& index) const {
@@ -47,6 +66,7 @@ void SemanticMap::erase(const BlockIndex& index) {
     region.pop_back();
   };
   removeFrom(regionAt(index), entries_[hole].place_in_region);
+  dropIfEmpty(index);
   place_.erase(index);
   if (entries_[hole].block->empty()) spare_.push_back(std::move(entries_[hole].block));
   if (hole + 1 != entries_.size()) {
@@ -83,7 +103,9 @@ std::size_t SemanticMap::bytes() const {
   std::size_t sum = entries_.capacity() * sizeof(Entry) + place_.bytes() + region_number_.bytes() +
                     regions_.capacity() * sizeof(regions_[0]) + spare_.capacity() * sizeof(spare_[0]) +
                     spare_.size() * sizeof(Block);
-  for (const auto& region : regions_) sum += region.capacity() * sizeof(region[0]);
+  sum += spare_places_.capacity() * sizeof(spare_places_[0]);
+  for (const Region& region : regions_) sum += region.places.capacity() * sizeof(region.places[0]);
+  for (const auto& places : spare_places_) sum += places.capacity() * sizeof(places[0]);
   for (const Entry& entry : entries_) sum += entry.block->bytes();
   return sum;
 }

@@ -77,7 +77,7 @@ class SemanticMap {
         for (int x = first.x(); x <= last.x(); ++x) {
           const std::uint32_t number = region_number_.find({x, y, z});
           if (number == GridTable::kNone) continue;
-          for (const std::uint32_t place : regions_[number]) visit(entries_[place].index);
+          for (const std::uint32_t place : regions_[number].places) visit(entries_[place].index);
         }
       }
     }
@@ -95,7 +95,15 @@ class SemanticMap {
   static constexpr int kRegionEdge = 8;
 
   static GridIndex regionOf(const BlockIndex& block);
+  /// A cube of blocks.
+  struct Region {
+    GridIndex index;
+    std::vector<std::uint32_t> places;  ///< of its blocks in entries_
+  };
+
   std::vector<std::uint32_t>& regionAt(const BlockIndex& block);
+  /// Forgets the region of a block if it holds none.
+  void dropIfEmpty(const BlockIndex& block);
 
   GridGeometry geometry_;
   double prior_;
@@ -103,10 +111,11 @@ class SemanticMap {
   std::array<float, 256> free_gains_;
   float gain_persistence_ = 0.0f;
   std::vector<Entry> entries_;
-  GridTable place_;                                  ///< of each block in entries_
-  std::vector<std::vector<std::uint32_t>> regions_;  ///< places of their blocks in entries_
+  GridTable place_;  ///< of each block in entries_
+  std::vector<Region> regions_;
   GridTable region_number_;
-  std::vector<std::unique_ptr<Block>> spare_;  ///< empty blocks, for use again
+  std::vector<std::unique_ptr<Block>> spare_;             ///< empty blocks, for use again
+  std::vector<std::vector<std::uint32_t>> spare_places_;  ///< of regions that are gone, for use again
 };
 
 }  // namespace bki_mapping
