@@ -24,7 +24,7 @@ STEPS = {
 def cumulative(settings, steps):
     options = {}
     for name, step in steps.items():
-        settings = settings | step
+        settings = {**settings, **step}
         options[name] = settings
     return options
 
@@ -98,8 +98,9 @@ def draw_frontier(rows, name, title, output):
     axes.legend(fontsize=8, loc='center left', bbox_to_anchor=(1.01, 0.5), markerscale=0.7, frameon=False)
     axes.set_yscale('log')
     ticks = (1, 2, 5, 10, 20, 50, 100)
-    axes.set_yticks(ticks, [f'{100 - tick}' for tick in ticks])
     axes.minorticks_off()
+    axes.set_yticks(ticks)
+    axes.set_yticklabels([f'{100 - tick}' for tick in ticks])
     axes.set_ylim(105, 0.9)
     axes.set_xlabel('time of a scan [ms], median')
     axes.set_ylabel('AA = sqrt(SA DA) [%]')

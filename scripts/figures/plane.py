@@ -20,7 +20,7 @@ PATTERNS = {
 }
 WEIGHTS = {f'lines, {weight}': {'free_space/mode': 'line', 'free_space/weight': weight,
                                 'free_space/extent': 'observed'} for weight in ('uniform', 'linear', 'bilinear')}
-DENSITIES = {name: PATTERNS[name] for name in list(PATTERNS)[1:4]} | WEIGHTS
+DENSITIES = {**{name: PATTERNS[name] for name in list(PATTERNS)[1:4]}, **WEIGHTS}
 
 
 def ranges(directions):
