@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -35,6 +36,29 @@ class Tools(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stdout)
         self.assertIn(words, result.stderr)
         self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
+
+    def rows_of_document(self):
+        """Rows of docs/files.md by the name that they begin with."""
+        with open(os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'docs', 'files.md')) as file:
+            return {row.split('`')[1]: row for row in file.read().splitlines() if row.startswith('| `')}
+
+    def test_programs_are_documented_with_all_options(self):
+        rows = self.rows_of_document()
+        for program in ('map_sequence', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+            options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
+            self.assertGreater(len(options), 4, program)
+            for option in options:
+                self.assertIn(option, rows[program], program)
+
+    def test_scripts_are_documented_with_all_options(self):
+        source = os.environ['BKI_MAPPING_SOURCE_DIR']
+        rows = self.rows_of_document()
+        for script in ('demo', 'reproduce', 'soak', 'test'):
+            with open(os.path.join(source, 'scripts', script)) as file:
+                options = set(re.findall(r'^ +(--[a-z-]+)\)', file.read(), re.MULTILINE)) - {'--help'}
+            self.assertTrue(options, script)
+            for option in options:
+                self.assertIn(f'[{option}', rows[f'scripts/{script}'])
 
     def test_help(self):
         for program in ('map_sequence', 'simulate_drive'):
