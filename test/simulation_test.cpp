@@ -82,6 +82,12 @@ TEST(Lidar, NoiseIsAsAsked) {
   EXPECT_LT(wrong / n, 0.35);
 }
 
+TEST(Drive, RefusesAStreetWithoutEnd) {
+  DriveConfig config{100, 8.0, 1, smallLidar()};
+  config.lidar.rate = 1e-9;
+  EXPECT_THROW(Drive{config}, std::invalid_argument);
+}
+
 TEST(Drive, IsRepeatableAndStartsAtTheMapsOrigin) {
   const Drive a({3, 8.0, 5, smallLidar()}), b({3, 8.0, 5, smallLidar()}), c({3, 8.0, 6, smallLidar()});
   EXPECT_EQ(a.frame(2).points, b.frame(2).points);

@@ -65,6 +65,10 @@ const DriveConfig& checked(const DriveConfig& config) {
       !(lidar.rate > 0.0)) {
     throw std::invalid_argument("beams must be 1 to 1024, columns 1 to 100000, rate above 0");
   }
+  if (!(config.speed * config.scans / lidar.rate <= 1e6)) {  // before the street takes memory
+    throw std::invalid_argument(
+        "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
+  }
   return config;
 }
 

@@ -120,6 +120,7 @@ class Live(MapperTest):
         self.assertNotIn((0, 3, 0), blocks, 'hits beyond the range are not mapped')
         answer = self.reconfigure(resolution=0.5, view_range=3.0)
         self.assertEqual((answer.resolution, answer.view_range), (1.0, 0.0), 'refused as a whole')
+        self.log.wait_for(lambda m: 'resolution cannot change while mapping' in m.msg, 'the reason in the log')
 
     def test_window_and_memory_are_bounded(self):
         self.reconfigure(window=40.0)
