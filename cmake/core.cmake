@@ -10,14 +10,17 @@ add_library(bki_mapping_core SHARED
   src/inference/beam_rtree.cpp
   src/inference/beam_table.cpp
   src/inference/block_walk.cpp
+  src/inference/cell_merger.cpp
   src/inference/downsample.cpp
   src/inference/inner_loops.cpp
   src/inference/inner_loops_generic.cpp
   src/inference/map_updater.cpp
   src/inference/occlusion.cpp
   src/inference/parallel_for.cpp
+  src/inference/point_bins.cpp
   src/inference/point_evidence.cpp
   src/inference/soft_point_evidence.cpp
+  src/inference/tile_grid.cpp
   src/free_space/beam_lines.cpp
   src/free_space/even_samples.cpp
   src/free_space/no_free_space.cpp

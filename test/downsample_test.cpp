@@ -9,17 +9,23 @@ namespace bki_mapping {
 namespace {
 
 LabelledPoints downsample(const Eigen::Vector3d& origin, const LabelledPoints& input, double cell,
-                          int threads = 2) {
+                          int threads = 2, double tile = 2.4, const std::string& instruction_set = "") {
   Workers workers(threads);
-  Downsampler downsampler;
+  Downsampler downsampler(cell, tile, instruction_set);
   LabelledPoints output;
   for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
     const std::size_t chunks = 3;
-    downsampler.start(origin, cell, chunks);
-    for (std::size_t i = 0; i < input.points.size(); ++i) {
-      downsampler.add(i * chunks / input.points.size(), input.points[i], input.labels[i]);
-    }
-    downsampler.finish(workers, output);
+    downsampler.start(origin, chunks, workers, true);
+    const std::size_t share = input.points.size() / chunks + 1;
+    workers.forEach(chunks, [&](std::size_t c, std::size_t worker) {
+      Downsampler::Input& into = downsampler.open(c, worker);
+      for (std::size_t i = c * share; i < std::min(input.points.size(), (c + 1) * share); ++i) {
+        into.add(input.points[i], input.labels[i]);
+      }
+      downsampler.close(c, worker);
+    });
+    downsampler.finish(workers);
+    downsampler.inOrder(workers, output);
   }
   return output;
 }
@@ -33,14 +39,32 @@ TEST(Downsample, EqualsReferenceOnNastyScenes) {
       input.labels.push_back(static_cast<ClassId>(scene.scan.labels[i] / 10));
       points.push_back({scene.scan.points[i].cast<double>(), input.labels.back()});
     }
-    const LabelledPoints fast = downsample(scene.scan.origin, input, 0.4);
     const auto slow = reference::downsample(scene.scan.origin, points, 0.4);
-    ASSERT_EQ(fast.points.size(), slow.size()) << scene.name;
     EXPECT_LT(slow.size(), points.size()) << scene.name;
-    for (std::size_t i = 0; i < slow.size(); ++i) {
-      EXPECT_LT((fast.points[i].cast<double>() - slow[i].p).norm(), 1e-6) << scene.name;
-      EXPECT_EQ(fast.labels[i], slow[i].label) << scene.name;
+    // Tiles that cells fill, that they do not, of one cell, and cut in parts since they would hold too many.
+    for (const double tile : {2.4, 0.7, 0.1, 16.0}) {
+      for (const std::string& set : instructionSets()) {
+        const LabelledPoints fast = downsample(scene.scan.origin, input, 0.4, 2, tile, set);
+        ASSERT_EQ(fast.points.size(), slow.size()) << scene.name << ", tile " << tile;
+        for (std::size_t i = 0; i < slow.size(); ++i) {
+          EXPECT_LT((fast.points[i].cast<double>() - slow[i].p).norm(), 1e-6)
+              << scene.name << ", tile " << tile;
+          EXPECT_EQ(fast.labels[i], slow[i].label) << scene.name << ", tile " << tile;
+        }
+      }
     }
+  }
+}
+
+TEST(Downsample, ThreadsDoNotShow) {
+  const reference::Scene scene = reference::nastyScenes(2000).front();
+  LabelledPoints input{scene.scan.points, {}};
+  for (std::size_t i = 0; i < input.points.size(); ++i) input.labels.push_back(static_cast<ClassId>(i % 3));
+  const LabelledPoints one = downsample(scene.scan.origin, input, 0.4, 1);
+  for (const int threads : {2, 5}) {
+    const LabelledPoints several = downsample(scene.scan.origin, input, 0.4, threads);
+    EXPECT_EQ(one.points, several.points) << threads;  // to the bit
+    EXPECT_EQ(one.labels, several.labels) << threads;
   }
 }
 

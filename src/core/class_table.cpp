@@ -31,6 +31,12 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
       }
     }
   }
+  constexpr std::uint32_t kSmall = 4096;
+  for (const auto& [raw, id] : class_of_raw_) {
+    if (raw >= kSmall) continue;
+    if (class_of_small_raw_.size() <= raw) class_of_small_raw_.resize(raw + 1, -1);
+    class_of_small_raw_[raw] = id;
+  }
   if (!faults.empty()) throw std::invalid_argument("class table '" + name_ + "' is wrong: " + faults);
 }
 
@@ -39,6 +45,10 @@ const SemanticClass* ClassTable::find(ClassId id) const {
 }
 
 std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
+  if (raw < class_of_small_raw_.size()) {
+    const std::int16_t id = class_of_small_raw_[raw];
+    return id < 0 ? any_raw_ : static_cast<ClassId>(id);
+  }
   const auto found = class_of_raw_.find(raw);
   if (found == class_of_raw_.end()) return any_raw_;
   return found->second;

@@ -5,6 +5,7 @@ namespace {
 
 /// Maps hits alone: nothing is ever free.
 class NoFreeSpace : public FreeSpaceModel {
+  bool needsBeams() const override { return false; }
   FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t, Workers&) override { return {}; }
 };
 

@@ -19,16 +19,18 @@ float weightAt(BeamWeight weight, float rho) {
 
 }  // namespace
 
-void BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) {
+const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {
   const double reach = field_->reachMetres();
+  touched_.clear();
   if (extent_ == FreeSpaceExtent::kMapped) {
-    insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched);
+    insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {
-    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, workers, touched);
+    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, workers, touched_);
   }
+  return touched_.members();
 }
 
-void BeamEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
+void BeamEvidence::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
   float* sums = scratch.sums.data();
   scratch.sums.fill(0.0f);
   if (field_->kernel().type == KernelType::kCounting) {

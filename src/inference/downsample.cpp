@@ -1,142 +1,235 @@
 #include "bki_mapping/inference/downsample.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bki_mapping {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-constexpr std::uint32_t kPartitionBits = 6, kCellBits = 32 - kPartitionBits;
+/// A group and a cell in it share one number.
+constexpr std::uint32_t kGroupBits = 6, kCellBits = 32 - kGroupBits;
+constexpr std::size_t kGroups = 1u << kGroupBits;
 
-/// Cells of a cube of 8 x 8 x 8 share a partition, so that the neighbours of which a scan is made mostly do.
-std::size_t partitionOf(const VoxelIndex& cell) {
-  return GridIndexHash()(GridGeometry::blockOf(cell)) >> (64 - kPartitionBits);
+/// The edge of a tile [cells]: tiles of the size asked for, or of a whole fraction of it.
+int tileEdge(double cell, double tile) {
+  const double ratio = tile / cell;
+  if (!(ratio > 1.0)) return 1;
+  const double parts = std::ceil(ratio / TileGrid::kMostEdge - 1e-6);
+  return std::max(1, static_cast<int>(std::lround(ratio / parts)));
 }
 
-/// A partition and a cell in it, in one number.
-std::uint32_t codeOf(std::size_t partition, std::size_t cell) {
-  return static_cast<std::uint32_t>(partition << kCellBits | cell);
+/// Runs of points are fetched so many runs before they are merged.
+constexpr std::size_t kAhead = 3;
+
+/// Tiles that are neighbours have different numbers.
+std::size_t shortCode(const GridIndex& tile) {
+  return (tile.x & 15) | (tile.y & 15) << 4 | (tile.z & 3) << 8;
 }
+constexpr std::size_t kShortCodes = 1024;
 
 }  // namespace
 
-void Downsampler::start(const Eigen::Vector3d& origin, double cell, std::size_t chunks) {
-  static_assert(kPartitions == 1u << kPartitionBits);
-  origin_ = origin;
-  cell_ = cell;
-  grid_ = GridGeometry(cell > 0.0 ? cell : 1.0);
+Downsampler::Downsampler(double cell, double tile, const std::string& instruction_set)
+    : loops_(&innerLoopsFor(instruction_set)),
+      merges_(cell > 0.0),
+      cells_(merges_ ? cell : tile),
+      edge_(merges_ ? tileEdge(cell, tile) : 1) {}
+
+void Downsampler::start(const Eigen::Vector3d& origin, std::size_t chunks, const Workers& workers,
+                        bool ordered) {
+  ordered_ = ordered;
+  grid_.emplace(cells_, origin, edge_);
   used_ = chunks;
   if (chunks_.size() < chunks) chunks_.resize(chunks);
+  inputs_.resize(workers.count());
+  mergers_.resize(workers.count());
+  // Who gets which chunk is chance: all have room for what one has met.
+  std::size_t most = 0, most_tiles = 0;
+  for (const Input& input : inputs_) {
+    most = std::max(most, input.points_.size());
+    most_tiles = std::max(most_tiles, input.begin_.capacity());
+  }
+  for (Input& input : inputs_) {
+    input.points_.resize(most);
+    input.tile_of_.resize(most);
+    input.begin_.reserve(most_tiles);
+  }
+  for (std::size_t m = 0; m < mergers_.size(); ++m) {
+    for (const CellMerger& other : mergers_) mergers_[m].reserveAs(other);
+  }
+}
+
+Downsampler::Input& Downsampler::open(std::size_t chunk, std::size_t worker) {
+  Input& input = inputs_[worker];
+  input.owner_ = this;
+  input.tiles_ = &chunks_[chunk].tiles;
+  input.tiles_->clear();
+  input.known_.assign(kShortCodes, {{}, kNone});
+  input.size_ = 0;
+  input.begin_.clear();
+  input.count_ = 0;
+  return input;
+}
+
+std::uint32_t Downsampler::Input::findNumber(const GridIndex& tile, KnownTile& known) {
+  known = {tile, tiles_->insert(tile)};
+  if (known.number == begin_.size()) begin_.push_back(0);
+  return known.number;
+}
+
+void Downsampler::Input::place() {
+  const std::size_t count = count_;
+  owner_->loops_->place_points(*owner_->grid_, {{x_, y_, z_}}, count, places_);
+  if (points_.size() < size_ + count) {
+    points_.resize(2 * (size_ + count));
+    tile_of_.resize(points_.size());
+  }
+  TilePoint* const points = points_.data() + size_;
+  std::uint32_t* const tile_of = tile_of_.data() + size_;
+  for (std::size_t i = 0; i < count; ++i) {
+    points[i].x = x_[i];
+    points[i].y = y_[i];
+    points[i].z = z_[i];
+    points[i].cell = static_cast<std::uint16_t>(places_.cell[i]);
+    points[i].label = labels_[i];
+    const GridIndex tile = places_.tileOf(i);
+    KnownTile& known = known_[shortCode(tile)];
+    const bool is_known = known.index == tile && known.number != kNone;
+    tile_of[i] = is_known ? known.number : findNumber(tile, known);
+    ++begin_[tile_of[i]];
+  }
+  size_ += count;
+  count_ = 0;
+}
+
+void Downsampler::close(std::size_t chunk_number, std::size_t worker) {
+  Chunk& chunk = chunks_[chunk_number];
+  Input& input = inputs_[worker];
+  input.place();
+  const std::size_t count = input.size_, tiles = chunk.tiles.size();
+  chunk.begin.resize(tiles + 1);
+  std::uint32_t begin = 0;
+  for (std::size_t t = 0; t < tiles; ++t) {
+    chunk.begin[t] = begin;
+    begin += input.begin_[t];
+    input.begin_[t] = chunk.begin[t];
+  }
+  chunk.begin[tiles] = begin;
+  chunk.points.resize(count);
+  if (ordered_) {
+    chunk.place.resize(count);
+    chunk.cell_of.assign(count, kNone);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t to = input.begin_[input.tile_of_[i]]++;
+    chunk.points[to] = input.points_[i];
+    if (ordered_) chunk.place[to] = static_cast<std::uint32_t>(i);
+  }
+}
+
+void Downsampler::collectRuns() {
+  tiles_.clear();
+  tile_of_run_.clear();
+  run_begin_.assign(1, 0);
   for (std::size_t c = 0; c < used_; ++c) {
-    for (auto& records : chunks_[c].records) records.clear();
-    chunks_[c].cell_of.clear();
-  }
-}
-
-void Downsampler::add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label) {
-  Chunk& into = chunks_[chunk];
-  const VoxelIndex cell = grid_.voxelAt(origin_ + point.cast<double>());
-  const std::size_t partition = partitionOf(cell);
-  into.records[partition].push_back({point, cell, static_cast<std::uint32_t>(into.cell_of.size()), label});
-  into.cell_of.push_back(kNone);
-}
-
-void Downsampler::vote(Cell& cell, ClassId label, std::vector<Votes>& votes) {
-  if (label == cell.label) {
-    ++cell.votes;
-    return;
-  }
-  for (std::uint32_t v = cell.more; v != kNone; v = votes[v].next) {
-    if (votes[v].label == label) {
-      ++votes[v].count;
-      return;
+    for (const GridIndex& member : chunks_[c].tiles.members()) {
+      const std::uint32_t tile = tiles_.insert(member);
+      tile_of_run_.push_back(tile);
+      if (tile + 1 == run_begin_.size()) run_begin_.push_back(0);
+      ++run_begin_[tile + 1];
     }
   }
-  votes.push_back({label, 1, cell.more});
-  cell.more = static_cast<std::uint32_t>(votes.size() - 1);
-}
-
-ClassId Downsampler::majority(const Cell& cell, const std::vector<Votes>& votes) {
-  ClassId label = cell.label;
-  std::uint32_t most = cell.votes;
-  for (std::uint32_t v = cell.more; v != kNone; v = votes[v].next) {
-    if (votes[v].count > most || (votes[v].count == most && votes[v].label < label)) {
-      most = votes[v].count;
-      label = votes[v].label;
+  for (std::size_t t = 1; t < run_begin_.size(); ++t) run_begin_[t] += run_begin_[t - 1];
+  runs_.resize(tile_of_run_.size());
+  std::size_t run = 0;
+  // run_begin_[t] runs up to the next tile's begin, and is then put back.
+  for (std::uint32_t c = 0; c < used_; ++c) {
+    const std::vector<std::uint32_t>& begin = chunks_[c].begin;
+    for (std::size_t t = 0; t + 1 < begin.size(); ++t) {
+      runs_[run_begin_[tile_of_run_[run++]]++] = {c, begin[t], begin[t + 1]};
     }
   }
-  return label;
+  std::copy_backward(run_begin_.begin(), run_begin_.end() - 1, run_begin_.end());
+  run_begin_.front() = 0;
 }
 
-std::uint32_t Downsampler::mergeRecord(const Record& record, Scratch& scratch) {
-  const std::size_t mask = scratch.slots.size() - 1;
-  std::size_t s = GridIndexHash()(record.cell) & mask;
-  while (scratch.slots[s] != kNone && scratch.cells[scratch.slots[s]].index != record.cell)
-    s = (s + 1) & mask;
-  const Eigen::Vector3d point = record.point.cast<double>();
-  if (scratch.slots[s] == kNone) {
-    scratch.slots[s] = static_cast<std::uint32_t>(scratch.cells.size());
-    scratch.cells.push_back({record.cell, point, 1, 1, kNone, record.label});
-    return scratch.slots[s];
+void Downsampler::splitIntoGroups(std::size_t points) {
+  const std::size_t share = points / kGroups + 1;
+  if (groups_.size() < kGroups) groups_.resize(kGroups);
+  used_groups_ = 0;
+  const auto tiles = static_cast<std::uint32_t>(tiles_.size());
+  for (std::uint32_t tile = 0; tile < tiles;) {
+    Group& group = groups_[used_groups_++];
+    group.first_tile = tile;
+    for (std::size_t size = 0; tile < tiles && (size < share || used_groups_ == kGroups); ++tile) {
+      for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r)
+        size += runs_[r].end - runs_[r].begin;
+    }
+    group.end_tile = tile;
   }
-  Cell& cell = scratch.cells[scratch.slots[s]];
-  cell.sum += point;
-  ++cell.count;
-  vote(cell, record.label, scratch.votes);
-  return kNone;
 }
 
-void Downsampler::merge(std::size_t p, Scratch& scratch) {
-  merged_[p].clear();
-  if (cell_ == 0.0) {  // each point is its own cell
-    for (std::size_t c = 0; c < used_; ++c) {
-      Chunk& chunk = chunks_[c];
-      for (const Record& record : chunk.records[p]) {
-        chunk.cell_of[record.place] = codeOf(p, merged_[p].size());
-        merged_[p].push_back({record.point, record.label});
+void Downsampler::prefetch(const Run& run) const {
+  constexpr std::uint32_t kPointsALine = 64 / sizeof(TilePoint), kMostLines = 8;
+  const std::uint32_t end = std::min(run.end, run.begin + kMostLines * kPointsALine);
+  const TilePoint* const points = chunks_[run.chunk].points.data();
+  for (std::uint32_t i = run.begin; i < end; i += kPointsALine) __builtin_prefetch(points + i);
+}
+
+void Downsampler::merge(std::uint32_t g, CellMerger& merger) {
+  Group& group = groups_[g];
+  group.merged.resize(0);
+  for (std::uint32_t tile = group.first_tile; tile < group.end_tile; ++tile) {
+    const auto before = static_cast<std::uint32_t>(group.merged.size());
+    std::size_t points = 0;
+    for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r) {
+      points += runs_[r].end - runs_[r].begin;
+    }
+    merger.startTile(points);
+    for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r) {
+      const Run& run = runs_[r];
+      Chunk& chunk = chunks_[run.chunk];
+      if (r + kAhead < runs_.size()) prefetch(runs_[r + kAhead]);
+      for (std::uint32_t i = run.begin; i < run.end; ++i) {
+        const std::uint32_t cell = merges_ ? merger.add(chunk.points[i]) : merger.addAlone(chunk.points[i]);
+        if (ordered_ && cell != CellMerger::kKnown) {
+          chunk.cell_of[chunk.place[i]] = g << kCellBits | (before + cell);
+        }
       }
     }
-    return;
-  }
-  std::size_t records = 0, slots = 64;
-  for (std::size_t c = 0; c < used_; ++c) records += chunks_[c].records[p].size();
-  while (slots < 2 * records) slots *= 2;
-  scratch.slots.assign(slots, kNone);
-  scratch.cells.clear();
-  scratch.votes.clear();
-  for (std::size_t c = 0; c < used_; ++c) {
-    Chunk& chunk = chunks_[c];
-    for (const Record& record : chunk.records[p]) {
-      const std::uint32_t cell = mergeRecord(record, scratch);
-      if (cell != kNone) chunk.cell_of[record.place] = codeOf(p, cell);
-    }
-  }
-  for (const Cell& cell : scratch.cells) {
-    merged_[p].push_back({(cell.sum * (1.0 / cell.count)).cast<float>(), majority(cell, scratch.votes)});
-  }
-}
-
-void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
-  std::size_t place = chunk.begin;
-  for (const std::uint32_t code : chunk.cell_of) {
-    if (code == kNone) continue;
-    const Merged& merged = merged_[code >> kCellBits][code & ((1u << kCellBits) - 1)];
-    output.points[place] = merged.point;
-    output.labels[place++] = merged.label;
+    merger.finishTile(group.merged);
   }
 }
 
 void Downsampler::finish(Workers& workers) {
-  scratch_.resize(workers.count());
-  workers.forEach(kPartitions, [&](std::size_t p, std::size_t worker) { merge(p, scratch_[worker]); });
+  std::size_t points = 0;
+  for (std::size_t c = 0; c < used_; ++c) points += chunks_[c].points.size();
+  collectRuns();
+  splitIntoGroups(points);
+  workers.forEach(used_groups_, [&](std::size_t g, std::size_t worker) {
+    merge(static_cast<std::uint32_t>(g), mergers_[worker]);
+  });
+  size_ = 0;
+  for (std::size_t g = 0; g < used_groups_; ++g) size_ += groups_[g].merged.size();
 }
 
-void Downsampler::finish(Workers& workers, LabelledPoints& output) {
-  finish(workers);
+void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
+  std::size_t place = chunk.output;
+  for (const std::uint32_t code : chunk.cell_of) {
+    if (code == kNone) continue;
+    const MergedPoints& merged = groups_[code >> kCellBits].merged;
+    const std::size_t cell = code & ((1u << kCellBits) - 1);
+    output.points[place] = {merged.x[cell], merged.y[cell], merged.z[cell]};
+    output.labels[place++] = merged.labels[cell];
+  }
+}
+
+void Downsampler::inOrder(Workers& workers, LabelledPoints& output) {
   std::size_t cells = 0;
   for (std::size_t c = 0; c < used_; ++c) {
     const auto& cell_of = chunks_[c].cell_of;
-    chunks_[c].begin = cells;
+    chunks_[c].output = cells;
     cells += cell_of.size() - static_cast<std::size_t>(std::count(cell_of.begin(), cell_of.end(), kNone));
   }
   output.points.resize(cells);

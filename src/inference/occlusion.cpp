@@ -2,14 +2,17 @@
 
 namespace bki_mapping {
 
-void Occlusion::collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) {
+const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, Workers& workers) {
   const double reach = field_->reachMetres();
-  insertMappedBlocks(map, field_->origin(), range_ + reach, touched);
-  if (extent_ != OcclusionExtent::kAll) return;
-  walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, workers, touched);
+  touched_.clear();
+  insertMappedBlocks(map, field_->origin(), range_ + reach, touched_);
+  if (extent_ == OcclusionExtent::kAll) {
+    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, workers, touched_);
+  }
+  return touched_.members();
 }
 
-void Occlusion::addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
+void Occlusion::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
   Block::Occlusion behind, crossed;
   const auto range = static_cast<float>(range_);
   field_->forEachVoxelNear(index, range_, scratch, [&](int offset, float rho, float length) {

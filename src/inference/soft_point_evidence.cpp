@@ -53,8 +53,8 @@ void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledP
   }
 }
 
-void SoftPointEvidence::collectBlocks(const SemanticMap&, Workers&, IndexNumbering& touched) {
-  for (const GridIndex& block : blocks_.members()) touched.insert(block);
+const std::vector<GridIndex>& SoftPointEvidence::collectBlocks(const SemanticMap&, Workers&) {
+  return blocks_.members();
 }
 
 void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
@@ -73,9 +73,8 @@ void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
   }
 }
 
-void SoftPointEvidence::addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
-  const std::uint32_t number = blocks_.find(index);
-  if (number == IndexNumbering::kNone) return;
+void SoftPointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
+                              EvidenceScratch& scratch) const {
   const std::vector<Record>& records = records_[number];
   const bool limited = std::isfinite(scratch.limits.hits);
   if (limited) {

@@ -1,7 +1,9 @@
 #include "bki_mapping/mapping/observation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "bki_mapping/core/grid_geometry.h"
@@ -33,11 +35,44 @@ std::optional<ClassId> classOf(std::uint32_t label, LabelValues values, const Cl
   return id;
 }
 
-void appendBeams(const std::vector<Eigen::Vector3f>& ends, Beams& beams) {
-  for (const Eigen::Vector3f& end : ends) {
-    if (end.norm() >= kSensorRadius) beams.ends.push_back(end);
+/// Which ranges hits can have.
+class RangeLimits {
+ public:
+  RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
+      : sensor_(sensor), limited_(sensor.max_range > 0.0), none_at_max_(limited_ && none_at_max) {}
+
+  /// False for NaN and infinity.
+  bool contain(float range) const {
+    return range >= kSensorRadius && range >= sensor_.min_range &&
+           range <= (limited_ ? sensor_.max_range : std::numeric_limits<float>::max()) && !isAtMax(range);
   }
-}
+  bool isAtMax(float range) const {
+    return none_at_max_ && std::abs(range - sensor_.max_range) <= kAtMaxRange * sensor_.max_range;
+  }
+  /// Counts a point that no hit can be. @return whether its beam met nothing up to max_range.
+  bool countOutside(const Eigen::Vector3f& point, float range, PointCounts& counts) const {
+    if (!point.allFinite()) {
+      ++counts.not_finite;
+    } else if (range < kSensorRadius) {
+      ++counts.at_sensor;
+    } else if (range < sensor_.min_range) {
+      ++counts.too_near;
+    } else if (isAtMax(range)) {
+      ++counts.no_returns;
+      return true;
+    } else if (limited_) {
+      ++counts.beyond_max;
+      return true;
+    } else {
+      ++counts.outside_map;  // squares overflow
+    }
+    return false;
+  }
+
+ private:
+  const SensorModelConfig& sensor_;
+  bool limited_, none_at_max_;
+};
 
 }  // namespace
 
@@ -51,44 +86,34 @@ PointCounts& PointCounts::operator+=(const PointCounts& other) {
   return *this;
 }
 
-void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t chunk, std::size_t first,
-                          std::size_t last, PointCounts& counts) {
+void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
+                          const Sorted& into) const {
   const double cell = config_.downsample_resolution;
   const GridGeometry geometry(cell > 0.0 ? std::min(cell, config_.resolution) : config_.resolution);
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const LabelValues values = scan.labels_are_ids ? LabelValues::kId : config_.label_values;
-  const bool limited = sensor.max_range > 0.0;
-  const auto cut = [&](const Eigen::Vector3f& point, float range) {
-    cut_.add(chunk, point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
-  };
+  const RangeLimits limits(sensor, scan.no_returns_at_max_range);
+  PointCounts& counts = into.counts;
+  counts.points += last - first;
   for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3f& point = scan.points[i];
     const float range = point.norm();
-    ++counts.points;
-    if (!point.allFinite()) {
-      ++counts.not_finite;
-    } else if (range < kSensorRadius) {
-      ++counts.at_sensor;
-    } else if (range < sensor.min_range) {
-      ++counts.too_near;
-    } else if (limited && scan.no_returns_at_max_range &&
-               std::abs(range - sensor.max_range) <= kAtMaxRange * sensor.max_range) {
-      ++counts.no_returns;
-      cut(point, range);
-    } else if (limited && range > sensor.max_range) {
-      ++counts.beyond_max;
-      if (config_.clear_beyond_max_range) cut(point, range);
+    if (!limits.contain(range)) {
+      if (limits.countOutside(point, range, counts) &&
+          (config_.clear_beyond_max_range || limits.isAtMax(range))) {
+        into.cut.add(point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
+      }
     } else if (!geometry.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
     } else if (const auto id = classOf(scan.labels[i], values, classes, config_, counts)) {
       ++counts.used;
-      hits_.add(chunk, point, *id);
-      if (!scan.soft.empty()) used_[chunk].push_back({static_cast<std::uint32_t>(i), *id});
+      into.hits.add(point, *id);
+      if (!scan.soft.empty()) into.used.push_back({static_cast<std::uint32_t>(i), *id});
     }
   }
 }
 
-void Observer::addNoReturns(const Scan& scan) {
+void Observer::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     const float length = direction.norm();
@@ -98,11 +123,12 @@ void Observer::addNoReturns(const Scan& scan) {
       continue;
     }
     ++seen_.counts.no_returns;
-    cut_.add(0, direction * (static_cast<float>(sensor.max_range) / length), kFreeClass);
+    cut.add(direction * (static_cast<float>(sensor.max_range) / length), kFreeClass);
   }
 }
 
-const Observation& Observer::observe(const Scan& scan, const ClassTable& classes, Workers& workers) {
+const Observation& Observer::observe(const Scan& scan, const ClassTable& classes, Workers& workers,
+                                     bool beams) {
   if (scan.labels.size() != scan.points.size()) {
     throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
                                 std::to_string(scan.labels.size()) + " labels; give one label a point");
@@ -113,24 +139,54 @@ const Observation& Observer::observe(const Scan& scan, const ClassTable& classes
   const Chunks chunks(scan.points.size());
   if (used_.size() < chunks.count()) used_.resize(chunks.count());
   for (auto& used : used_) used.clear();
-  hits_.start(scan.origin, config_.downsample_resolution, chunks.count());
-  cut_.start(scan.origin, config_.downsample_resolution, std::max<std::size_t>(chunks.count(), 1));
+  const bool ordered = beams || !scan.soft.empty();
+  const std::size_t no_returns = chunks.count();  // a chunk of its own
+  hits_.start(scan.origin, chunks.count(), workers, ordered);
+  cut_.start(scan.origin, chunks.count() + 1, workers, true);
   counts_.assign(chunks.count(), {});
-  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-    sortPoints(scan, classes, c, chunks.begin(c), chunks.end(c), counts_[c]);
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
+    sortPoints(scan, classes, chunks.begin(c), chunks.end(c),
+               {hits_.open(c, worker), cut_.open(c, worker), used_[c], counts_[c]});
+    hits_.close(c, worker);
+    cut_.close(c, worker);
   });
   seen_.counts = {};
   for (const PointCounts& counts : counts_) seen_.counts += counts;
-  addNoReturns(scan);
-  hits_.finish(workers, seen_.hits);
+  addNoReturns(scan, cut_.open(no_returns, 0));
+  cut_.close(no_returns, 0);
+  hits_.finish(workers);
+  seen_.hits.points.clear();
+  seen_.hits.labels.clear();
+  if (ordered) hits_.inOrder(workers, seen_.hits);
   seen_.soft.clear();
   if (!scan.soft.empty()) mergeSoftLabels(scan, used_, config_.downsample_resolution, seen_.hits, seen_.soft);
-  cut_.finish(workers, cut_points_);
   seen_.beams.origin = scan.origin;
   seen_.beams.ends.clear();
-  appendBeams(seen_.hits.points, seen_.beams);
-  appendBeams(cut_points_.points, seen_.beams);
+  if (beams) {
+    cut_.finish(workers);
+    cut_.inOrder(workers, cut_points_);
+    appendBeams(seen_.hits.points, workers);
+    appendBeams(cut_points_.points, workers);
+  }
   return seen_;
+}
+
+void Observer::appendBeams(const std::vector<Eigen::Vector3f>& ends, Workers& workers) {
+  std::vector<Eigen::Vector3f>& beams = seen_.beams.ends;
+  const std::size_t before = beams.size();
+  beams.resize(before + ends.size());
+  const Chunks chunks(ends.size());
+  std::atomic<bool> any_too_short{false};
+  const auto isTooShort = [](const Eigen::Vector3f& end) { return end.norm() < kSensorRadius; };
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    bool too_short = false;
+    for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
+      beams[before + i] = ends[i];
+      too_short |= isTooShort(ends[i]);
+    }
+    if (too_short) any_too_short = true;
+  });
+  if (any_too_short) beams.erase(std::remove_if(beams.begin(), beams.end(), isTooShort), beams.end());
 }
 
 }  // namespace bki_mapping

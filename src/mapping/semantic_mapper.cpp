@@ -84,22 +84,24 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
   }
   ScanStats stats;
   Stopwatch watch;
-  const Observation& seen = observer_.observe(scan, *classes_, workers_);
+  const bool occludes = config_.occlusion != OcclusionExtent::kNone;
+  const Observation& seen =
+      observer_.observe(scan, *classes_, workers_, free_space_->needsBeams() || occludes);
   stats.counts = seen.counts;
-  stats.hits = seen.hits.points.size();
+  stats.hits = observer_.hits().size();
   stats.observe_ms = watch.lap();
 
   const bool soft = !seen.soft.empty();
   if (soft) {
     soft_hits_.setPoints(scan.origin, seen.hits, seen.soft);
   } else {
-    hits_.setPoints(scan.origin, seen.hits, workers_);
+    hits_.setPoints(scan.origin, observer_.hits(), workers_);
   }
   beams_.setBeams(seen.beams);
   const FreeSpaceEvidence free = free_space_->observe(beams_, scan.stamp, workers_);
   evidence_.assign(1, soft ? static_cast<Evidence*>(&soft_hits_) : &hits_);
   if (free.evidence) evidence_.push_back(free.evidence);
-  if (config_.occlusion != OcclusionExtent::kNone) {
+  if (occludes) {
     const double max_range = scan.sensor_model.value_or(config_.sensor_model).max_range;
     const BeamField& field = beams_.field(workers_);
     occlusion_.setField(field, max_range > 0.0 ? max_range : field.longest());

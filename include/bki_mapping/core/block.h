@@ -27,8 +27,14 @@ class Block {
   /// The plane at the given place of classes().
   const float* plane(std::size_t place) const { return planes_.data() + place * kBlockVoxels; }
 
+  /// Some layers of voxels: those from `begin` to before `end`, by their z in the block.
+  struct Layers {
+    int begin = 0, end = kBlockEdge;
+  };
+
   /// Adds one value a voxel to the plane of a class, made of zeros where missing.
-  void add(ClassId id, const float* values) {
+  /// @param layers outside of which all values are 0.
+  void add(ClassId id, const float* values, Layers layers) {
     auto place = static_cast<std::size_t>(std::find(classes_.begin(), classes_.end(), id) - classes_.begin());
     if (place == classes_.size()) {
       classes_.push_back(id);
@@ -36,8 +42,9 @@ class Block {
       planes_.resize(planes_.size() + kBlockVoxels, 0.0f);
     }
     float* plane = planes_.data() + place * kBlockVoxels;
-    for (int v = 0; v < kBlockVoxels; ++v) plane[v] += values[v];
+    for (int v = layers.begin * kLayer; v < layers.end * kLayer; ++v) plane[v] += values[v];
   }
+  void add(ClassId id, const float* values) { add(id, values, Layers()); }
 
   /// Voxels that the last scan to reach them saw only behind its hits.
   const Occlusion& occlusion() const { return occlusion_; }
@@ -52,6 +59,8 @@ class Block {
   }
 
  private:
+  static constexpr int kLayer = kBlockEdge * kBlockEdge;
+
   std::vector<ClassId> classes_;
   std::vector<float> planes_;
   Occlusion occlusion_;

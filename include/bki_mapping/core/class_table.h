@@ -51,6 +51,7 @@ class ClassTable {
   std::vector<SemanticClass> classes_;
   std::array<std::int16_t, 256> place_of_id_;
   std::unordered_map<std::uint32_t, ClassId> class_of_raw_;
+  std::vector<std::int16_t> class_of_small_raw_;  ///< the same of numbers below its size; -1 for none
   std::optional<ClassId> unlabelled_;
   std::optional<ClassId> any_raw_;
 };

@@ -9,10 +9,13 @@ namespace bki_mapping {
 
 /// The largest whole number not above x. @param x within the range of an int. Unlike std::floor it needs no
 /// instruction beyond the basic set of a processor.
-inline std::int32_t floorToInt(double x) {
+[[gnu::always_inline]] inline std::int32_t floorToInt(double x) {
   const auto towards_zero = static_cast<std::int32_t>(x);
   return towards_zero - static_cast<std::int32_t>(x < towards_zero);
 }
+
+/// So near to a face between two cells [cells] rounding of a quotient matters.
+constexpr double kFaceMargin = 1e-6;
 
 /// A grid of cubic voxels of edge `resolution` [m]; voxel (0,0,0) spans [0, resolution) on each axis.
 /// Blocks hold 8 x 8 x 8 voxels.
@@ -64,7 +67,7 @@ class GridGeometry {
     const double quotient = metres * per_metre_;
     const std::int32_t floor = floorToInt(quotient);
     const double above = quotient - floor;
-    return above > 1e-6 && above < 1.0 - 1e-6 ? floor : floorToInt(metres / resolution_);
+    return above > kFaceMargin && above < 1.0 - kFaceMargin ? floor : floorToInt(metres / resolution_);
   }
   static std::int32_t floorDivide(std::int32_t i) {
     static_assert(kBlockEdge == 8 && -1 >> 1 == -1, "a shift divides by the edge, towards minus infinity");

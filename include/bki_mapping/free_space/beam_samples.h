@@ -24,23 +24,26 @@ inline double linearDistance(double u, double length) {
 class BeamSamples {
  public:
   explicit BeamSamples(const MapperConfig& config)
-      : cell_(config.downsample_resolution), evidence_(GridGeometry(config.resolution), config.kernel) {}
+      : downsampler_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
+        evidence_(GridGeometry(config.resolution), config.kernel) {}
 
   /// @param forEachDistance called as forEachDistance(beam number, length [m], add) shall call add(distance
   /// [m]) for each sample, 0 <= distance < length; from several threads at once.
   template <typename ForEachDistance>
   FreeSpaceEvidence sample(const Beams& beams, Workers& workers, ForEachDistance&& forEachDistance) {
     const Chunks chunks(beams.ends.size());
-    downsampler_.start(beams.origin, cell_, chunks.count());
-    workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    downsampler_.start(beams.origin, chunks.count(), workers, false);
+    workers.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
+      Downsampler::Input& samples = downsampler_.open(c, worker);
       for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
         const Eigen::Vector3d end = beams.ends[b].cast<double>();
         const double length = end.norm();
         const Eigen::Vector3d direction = end / length;
         forEachDistance(b, length, [&](double distance) {
-          downsampler_.add(c, (direction * distance).cast<float>(), kFreeClass);
+          samples.add((direction * distance).cast<float>(), kFreeClass);
         });
       }
+      downsampler_.close(c, worker);
     });
     downsampler_.finish(workers);
     evidence_.setPoints(beams.origin, downsampler_, workers);
@@ -48,7 +51,6 @@ class BeamSamples {
   }
 
  private:
-  double cell_;
   Downsampler downsampler_;
   PointEvidence evidence_;
 };

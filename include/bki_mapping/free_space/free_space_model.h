@@ -15,6 +15,8 @@ struct FreeSpaceEvidence {
 class FreeSpaceModel {
  public:
   virtual ~FreeSpaceModel() = default;
+  /// Whether observe() looks at beams.
+  virtual bool needsBeams() const { return true; }
   /// @param beams of one scan. @param stamp of the scan [ns], a key of random samples.
   virtual FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, Workers& workers) = 0;
 };

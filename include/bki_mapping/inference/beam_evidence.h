@@ -20,8 +20,9 @@ class BeamEvidence : public Evidence {
   /// Replaces the beams. @param field must stay where it is until the scan is done.
   void setField(const BeamField& field) { field_ = &field; }
 
-  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
-  void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  void addTo(std::size_t number, const BlockIndex& index, Block& block,
+             EvidenceScratch& scratch) const override;
 
  private:
   const BeamField* field_ = nullptr;
@@ -29,6 +30,7 @@ class BeamEvidence : public Evidence {
   FreeSpaceExtent extent_;
   const InnerLoops& loops_;
   BlockWalk walk_;
+  IndexNumbering touched_;
 };
 
 }  // namespace bki_mapping

@@ -1,11 +1,15 @@
 /// @file One point a cell.
 #pragma once
 
-#include <array>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/inference/cell_merger.h"
+#include "bki_mapping/inference/index_numbering.h"
+#include "bki_mapping/inference/inner_loops.h"
 #include "bki_mapping/inference/parallel_for.h"
+#include "bki_mapping/inference/tile_grid.h"
 
 namespace bki_mapping {
 
@@ -16,81 +20,112 @@ struct LabelledPoints {
 };
 
 /// Merges the points of each cubic cell of the map frame into their centroid, labelled by the majority
-/// (ties: the smaller id). Cells come in the order in which they are first hit. Points are added in chunks,
-/// which several threads may fill side by side; the points' order is chunk by chunk. Keeps its memory from
-/// scan to scan.
+/// (ties: the smaller id). Points are added in chunks, which several threads may fill side by side; the
+/// points' order is chunk by chunk. Keeps its memory from scan to scan.
+///
+/// Each chunk is sorted by tiles, cubes of some thousand cells about as large as a block of the map, while it
+/// is in a core's cache; then tiles are merged one by one. A tile needs no hash table, and what it gives lies
+/// together in space, which makes sorting it into blocks cheap.
 class Downsampler {
  public:
-  /// Forgets all points.
-  /// @param origin of the points in the map frame [m]. @param cell edge [m]; 0 merges nothing.
-  void start(const Eigen::Vector3d& origin, double cell, std::size_t chunks);
+  /// @param cell edge [m]; 0 merges nothing. @param tile edge [m] that tiles shall have, if they can.
+  /// @param instruction_set one of instructionSets(); the best there is if empty.
+  Downsampler(double cell, double tile, const std::string& instruction_set = "");
 
-  /// Adds a point relative to the origin. Two threads must not add to the same chunk at once.
-  void add(std::size_t chunk, const Eigen::Vector3f& point, ClassId label);
+  /// Takes the points of one chunk; each thread has its own.
+  class Input {
+   public:
+    void add(const Eigen::Vector3f& point, ClassId label) {
+      x_[count_] = point.x();
+      y_[count_] = point.y();
+      z_[count_] = point.z();
+      labels_[count_] = label;
+      if (++count_ == kBatch) place();
+    }
 
-  /// Merges the points. @param[out] output one point a cell, in the order promised.
-  void finish(Workers& workers, LabelledPoints& output);
-  /// Merges the points; the result stays here, partition by partition, in an order that does not depend on
-  /// the number of workers. Cheaper than finish.
-  void finish(Workers& workers);
+   private:
+    friend class Downsampler;
+    struct KnownTile {
+      GridIndex index;
+      std::uint32_t number;
+    };
+    void place();
+    /// Of a tile that is not the one last met with its short code.
+    std::uint32_t findNumber(const GridIndex& tile, KnownTile& known);
 
-  /// A point of the result.
-  struct Merged {
-    Eigen::Vector3f point;
-    ClassId label;
+    Downsampler* owner_ = nullptr;
+    IndexNumbering* tiles_ = nullptr;  ///< of the chunk
+    alignas(64) float x_[kBatch], y_[kBatch], z_[kBatch];
+    ClassId labels_[kBatch];
+    std::size_t count_ = 0;
+    TilePlaces places_;
+    std::vector<KnownTile> known_;        ///< tiles met last, by a few bits of their index
+    std::size_t size_ = 0;                ///< of the two that follow; they are longer
+    std::vector<TilePoint> points_;       ///< of the chunk
+    std::vector<std::uint32_t> tile_of_;  ///< number of the tile of each
+    std::vector<std::uint32_t> begin_;    ///< of each tile's points, once sorted
   };
-  static constexpr std::size_t partitions() { return kPartitions; }
-  const std::vector<Merged>& merged(std::size_t partition) const { return merged_[partition]; }
+
+  /// Forgets all points. @param origin of the points in the map frame [m]. @param ordered whether inOrder is
+  /// to be called.
+  void start(const Eigen::Vector3d& origin, std::size_t chunks, const Workers& workers, bool ordered);
+  /// Begins a chunk, to be ended by the same thread before it begins another one.
+  Input& open(std::size_t chunk, std::size_t worker);
+  void close(std::size_t chunk, std::size_t worker);
+
+  /// Merges the points, once all chunks are closed.
+  void finish(Workers& workers);
+  std::size_t size() const { return size_; }  ///< points of the result
+
+  /// The result is split into groups, the same for any number of workers. Points of a group are near each
+  /// other.
+  std::size_t groups() const { return used_groups_; }
+  const MergedPoints& merged(std::size_t group) const { return groups_[group].merged; }
+
+  /// The result in the order in which cells were first hit.
+  void inOrder(Workers& workers, LabelledPoints& output);
 
  private:
-  /// Cells are spread over this many partitions by a hash, so that each can be merged by one thread, in a
-  /// table that fits its cache.
-  static constexpr std::size_t kPartitions = 64;
-
-  struct Record {
-    Eigen::Vector3f point;
-    GridIndex cell;
-    std::uint32_t place;  ///< in the chunk
-    ClassId label;
-  };
   struct Chunk {
-    std::array<std::vector<Record>, kPartitions> records;
-    std::vector<std::uint32_t> cell_of;  ///< partition and cell of each point that is its cell's first
-    std::size_t begin = 0;               ///< of these cells in the output
+    IndexNumbering tiles;
+    std::vector<std::uint32_t> begin;  ///< of each tile's points; one more than tiles
+    std::vector<TilePoint> points;     ///< by tile
+    // Where the order counts:
+    std::vector<std::uint32_t> place;    ///< of each point in the chunk as it was filled
+    std::vector<std::uint32_t> cell_of;  ///< by that place: group and cell of which this is the first point
+    std::size_t output = 0;              ///< where its cells begin in the ordered result
   };
-  struct Cell {
-    GridIndex index;
-    Eigen::Vector3d sum;
-    std::uint32_t count;
-    std::uint32_t votes;  ///< for `label`
-    std::uint32_t more;   ///< first of the votes for other labels
-    ClassId label;
+  /// Points of one tile in one chunk.
+  struct Run {
+    std::uint32_t chunk, begin, end;
   };
-  struct Votes {
-    ClassId label;
-    std::uint32_t count, next;
-  };
-  /// Working memory of one thread, for one partition at a time.
-  struct Scratch {
-    std::vector<std::uint32_t> slots;  ///< of a hash table: number of a cell, or kNone
-    std::vector<Cell> cells;
-    std::vector<Votes> votes;
+  /// Consecutive tiles.
+  struct Group {
+    std::uint32_t first_tile, end_tile;
+    MergedPoints merged;
   };
 
-  void merge(std::size_t partition, Scratch& scratch);
-  /// @return the cell's number if the record is its first.
-  static std::uint32_t mergeRecord(const Record& record, Scratch& scratch);
+  void collectRuns();
+  void splitIntoGroups(std::size_t points);
+  void prefetch(const Run& run) const;
+  void merge(std::uint32_t group, CellMerger& merger);
   void write(const Chunk& chunk, LabelledPoints& output) const;
-  static void vote(Cell& cell, ClassId label, std::vector<Votes>& votes);
-  static ClassId majority(const Cell& cell, const std::vector<Votes>& votes);
 
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  double cell_ = 0.0;
-  GridGeometry grid_{1.0};
-  std::size_t used_ = 0;  ///< chunks of this scan
+  const InnerLoops* loops_;
+  bool merges_;
+  bool ordered_ = false;
+  GridGeometry cells_;
+  int edge_;  ///< of a tile [cells]
+  std::optional<TileGrid> grid_;
+  std::size_t used_ = 0, used_groups_ = 0, size_ = 0;
   std::vector<Chunk> chunks_;
-  std::vector<Scratch> scratch_;
-  std::array<std::vector<Merged>, kPartitions> merged_;
+  std::vector<Input> inputs_;        ///< one a worker
+  std::vector<CellMerger> mergers_;  ///< one a worker
+  IndexNumbering tiles_;
+  std::vector<std::uint32_t> run_begin_;  ///< of each tile; one more than tiles
+  std::vector<std::uint32_t> tile_of_run_;
+  std::vector<Run> runs_;  ///< by tile, then chunk
+  std::vector<Group> groups_;
 };
 
 }  // namespace bki_mapping

@@ -44,6 +44,7 @@ struct EvidenceScratch {
   }
   /// Keeps evidence for `free` within its limit.
   void limitFree() {
+    if (limits.free == std::numeric_limits<float>::infinity()) return;
     for (float& sum : sums) sum = std::min(sum, limits.free);
   }
   /// Sets `share`, by which the hits of each class are multiplied, from the sums of all classes.
@@ -61,12 +62,14 @@ class Evidence {
  public:
   virtual ~Evidence() = default;
 
-  /// Names the blocks to which addTo may add; naming too many is allowed. `map` already has the blocks of the
-  /// evidence that stands before this one in the update.
-  virtual void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) = 0;
+  /// The blocks to which addTo may add, each once; too many are allowed. They stay until the next call.
+  /// @param map has already the blocks of the evidence that stands before this one in the update.
+  virtual const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) = 0;
 
   /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
-  virtual void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const = 0;
+  /// @param number of the block in what collectBlocks gave.
+  virtual void addTo(std::size_t number, const BlockIndex& index, Block& block,
+                     EvidenceScratch& scratch) const = 0;
 };
 
 }  // namespace bki_mapping

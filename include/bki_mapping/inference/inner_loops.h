@@ -5,25 +5,32 @@
 #include <string>
 #include <vector>
 
+#include "bki_mapping/core/block.h"
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_block.h"
 #include "bki_mapping/inference/beam_cells.h"
 #include "bki_mapping/inference/local_point.h"
+#include "bki_mapping/inference/tile_grid.h"
 
 namespace bki_mapping {
 
-/// The loops for one instruction set. All sums are of the 512 voxels of a block, and of the sparse kernel of
-/// unit scale.
+/// The loops for one instruction set. All sums are of the 512 voxels of a block, and of the sparse kernel.
 struct InnerLoops {
   const char* instruction_set;
-  /// Adds k(|x - c|) of each point that reaches the block. @param reach length of the kernel [voxels].
-  void (*add_points)(const LocalPoint* points, std::size_t count, float reach, float* sums);
-  /// Adds w(rho) k(d) of each beam: d the distance to the beam's line, w the weight along it, 0 unless
-  /// 0 < rho < 1.
+  /// Sets the sums to those of k(|x - c|) over points that reach the block. @param reach length of the kernel
+  /// [voxels]. @param scale of the kernel. @return the layers outside of which all sums are 0.
+  Block::Layers (*sum_points)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
+  /// Adds w(rho) k(d) of each beam, the kernel being of unit scale: d the distance to the beam's line, w the
+  /// weight along it, 0 unless 0 < rho < 1.
   void (*add_beams)(const BeamArrays& beams, const BeamBlock& block, BeamWeight weight, float* sums);
   /// The same, of the given beams alone.
   void (*add_some_beams)(const BeamArrays& beams, const BeamRange* ranges, std::size_t count,
                          const BeamBlock& block, BeamWeight weight, float* sums);
+  /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
+  /// GridGeometry::voxelAt, to the bit.
+  void (*place_points)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
+  /// Finds the blocks that placed points reach, tiles being blocks. @param reach [voxels], at most 8.
+  void (*reach_blocks)(std::size_t count, float reach, TilePlaces& places);
 };
 
 /// The instruction sets that this build and this processor have: "generic" first, better ones behind it.

@@ -1,6 +1,7 @@
 /// @file A point in the coordinates of one block.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace bki_mapping {
@@ -12,6 +13,12 @@ struct LocalPoint {
   float x, y, z;
   std::uint16_t label;
   std::uint16_t voxel;  ///< that holds it, or kOutside if that is in another block
+};
+
+/// Some of the points of a block.
+struct PointRun {
+  const LocalPoint* points;
+  std::size_t count;
 };
 
 }  // namespace bki_mapping

@@ -21,25 +21,31 @@ class MapUpdater {
 
   /// Adds all pieces of evidence of one scan, in the order given. The result does not depend on the number of
   /// workers, to the bit. Blocks about which nothing is known afterwards are not kept.
-  /// @param evidence at most 32 pieces.
   MapUpdateStats update(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
 
   /// The blocks that the last update may have changed, made or erased; each once.
   const std::vector<GridIndex>& touched() const { return numbering_.members(); }
 
  private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
   struct Job {
     BlockIndex index;
     Block* block;
-    std::uint32_t pieces;  ///< bit e: evidence e touches the block
-    std::size_t bytes;     ///< of the block before the update; 0 for new ones
+    bool is_new;
+    // Once done:
+    bool empty;
+    std::ptrdiff_t bytes;  ///< by which the block grew
   };
 
   void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
+  void work(const std::vector<Evidence*>& evidence, std::size_t number, EvidenceScratch& scratch);
 
   EvidenceLimits limits_;
-  IndexNumbering touched_, numbering_;
+  IndexNumbering numbering_;
   std::vector<Job> jobs_;
+  /// Of each piece of evidence, by job: the block's number there, or kNone; none behind its end.
+  std::vector<std::vector<std::uint32_t>> number_of_;
   std::vector<EvidenceScratch> scratch_;  ///< one a worker
 };
 

@@ -19,14 +19,16 @@ class Occlusion : public Evidence {
     range_ = range;
   }
 
-  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
-  void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  void addTo(std::size_t number, const BlockIndex& index, Block& block,
+             EvidenceScratch& scratch) const override;
 
  private:
   OcclusionExtent extent_;
   const BeamField* field_ = nullptr;
   double range_ = 0.0;
   BlockWalk walk_;
+  IndexNumbering touched_;
 };
 
 }  // namespace bki_mapping

@@ -3,13 +3,9 @@
 
 #include <array>
 #include <string>
-#include <vector>
 
-#include "bki_mapping/inference/downsample.h"
 #include "bki_mapping/inference/evidence.h"
-#include "bki_mapping/inference/inner_loops.h"
-#include "bki_mapping/inference/kernel.h"
-#include "bki_mapping/inference/local_point.h"
+#include "bki_mapping/inference/point_bins.h"
 
 namespace bki_mapping {
 
@@ -34,41 +30,25 @@ class PointEvidence : public Evidence {
   void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point.
-  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
-  void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  void addTo(std::size_t number, const BlockIndex& index, Block& block,
+             EvidenceScratch& scratch) const override;
 
  private:
-  /// Blocks are spread over this many partitions by a hash, so that each can be sorted by one thread.
-  static constexpr std::size_t kPartitions = 64;
+  /// Where the points of each class end.
+  using ClassEnds = std::array<std::uint32_t, kMaxClasses + 3>;
+  /// Brings the points of a block into `scratch.points`, class by class. @return how many they are.
+  std::size_t sortByClass(std::size_t block, EvidenceScratch& scratch, ClassEnds& end) const;
+  void addClass(ClassId label, const PointRun* runs, std::size_t count, bool limited, Block& block,
+                EvidenceScratch& scratch) const;
+  /// Sets `scratch.sums` to those of the points. @return the layers outside of which all are 0.
+  Block::Layers sumPoints(const PointRun* runs, std::size_t count, EvidenceScratch& scratch) const;
 
-  struct Record {
-    GridIndex block;
-    LocalPoint point;
-  };
-  using Chunk = std::array<std::vector<Record>, kPartitions>;
-  struct Partition {
-    IndexNumbering blocks;
-    std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
-    std::vector<LocalPoint> points;    ///< by block, then in the order of the scan
-    std::vector<std::uint32_t> block_of_record;
-  };
-
-  static std::size_t partitionOf(const GridIndex& block) { return GridIndexHash()(block) >> 58; }
-  void bin(const Eigen::Vector3d& point, ClassId label, Chunk& chunk) const;
-  /// Clears the given number of chunks for bin.
-  void start(std::size_t points, std::size_t chunks);
-  void sort(std::size_t partition, std::size_t chunks);
-  /// The sums of points of one class.
-  void addPoints(const LocalPoint* points, std::size_t count, float* sums) const;
-
-  GridGeometry geometry_;
-  double per_metre_;  ///< voxels
   VoxelKernel kernel_;
   const InnerLoops& loops_;
+  PointBins bins_;
   bool protect_ = false, protect_evidence_ = false;
   std::size_t size_ = 0;
-  std::vector<Chunk> chunks_;
-  std::array<Partition, kPartitions> partitions_;
 };
 
 }  // namespace bki_mapping

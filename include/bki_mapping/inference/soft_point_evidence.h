@@ -25,8 +25,9 @@ class SoftPointEvidence : public Evidence {
   void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point, or, if protected, with a point.
-  void collectBlocks(const SemanticMap& map, Workers& workers, IndexNumbering& touched) override;
-  void addTo(const BlockIndex& index, Block& block, EvidenceScratch& scratch) const override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  void addTo(std::size_t number, const BlockIndex& index, Block& block,
+             EvidenceScratch& scratch) const override;
 
  private:
   struct Record {

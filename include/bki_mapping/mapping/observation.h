@@ -41,19 +41,35 @@ struct Observation {
 /// Turns scans into observations. Keeps its memory from scan to scan.
 class Observer {
  public:
-  explicit Observer(const MapperConfig& config) : config_(config) {}
+  explicit Observer(const MapperConfig& config)
+      : config_(config),
+        hits_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
+        cut_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()) {}
 
+  /// @param beams whether they are wanted, and hits in their order; without soft labels and beams `hits` of
+  /// what is returned is empty, too.
   /// @return what was seen; stays until the next call.
   /// @throws std::invalid_argument if the scan's labels are not as many as its points.
-  const Observation& observe(const Scan& scan, const ClassTable& classes, Workers& workers);
+  const Observation& observe(const Scan& scan, const ClassTable& classes, Workers& workers,
+                             bool beams = true);
+  /// The hits of the last scan, in groups of neighbours.
+  const Downsampler& hits() const { return hits_; }
 
  private:
+  /// Where one thread puts the points of a chunk.
+  struct Sorted {
+    Downsampler::Input& hits;
+    Downsampler::Input& cut;
+    std::vector<UsedPoint>& used;
+    PointCounts& counts;
+  };
   /// Sorts points first to before last into hits, cut beams and counts.
-  void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t chunk, std::size_t first,
-                  std::size_t last, PointCounts& counts);
+  void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
+                  const Sorted& into) const;
 
-  /// Beams that met nothing, into the first chunk of the cut ones.
-  void addNoReturns(const Scan& scan);
+  /// Beams that met nothing, into the chunk of cut ones behind those of the points.
+  void addNoReturns(const Scan& scan, Downsampler::Input& cut);
+  void appendBeams(const std::vector<Eigen::Vector3f>& ends, Workers& workers);
 
   MapperConfig config_;
   std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels

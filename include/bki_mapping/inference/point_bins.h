@@ -1,0 +1,86 @@
+/// @file Points sorted by the blocks that they reach.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "bki_mapping/inference/downsample.h"
+#include "bki_mapping/inference/index_numbering.h"
+#include "bki_mapping/inference/inner_loops.h"
+#include "bki_mapping/inference/kernel.h"
+#include "bki_mapping/inference/local_point.h"
+#include "bki_mapping/inference/parallel_for.h"
+
+namespace bki_mapping {
+
+/// Points, each in every block that has a voxel centre within its kernel's reach; with the counting kernel in
+/// the block that holds it. Keeps its memory from scan to scan.
+class PointBins {
+ public:
+  /// @throws std::invalid_argument if the kernel is longer than 72 voxels.
+  PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops);
+
+  /// Replaces the points. @param origin of the points in the map frame [m].
+  /// @param home_always whether a point is sorted into the block that holds it even if it reaches none of its
+  /// centres.
+  void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, bool home_always,
+                 Workers& workers);
+  /// The same, of points that a down-sampler has merged: cheaper, since neighbours stand together.
+  void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
+                 Workers& workers);
+
+  /// Exactly the blocks that points reach, or, with `home_always`, are in.
+  const IndexNumbering& blocks() const { return blocks_; }
+
+  /// The points of a block by its number in blocks(), run by run, in an order that does not depend on the
+  /// number of workers.
+  const PointRun* begin(std::size_t block) const { return runs_.data() + run_begin_[block]; }
+  const PointRun* end(std::size_t block) const { return runs_.data() + run_begin_[block + 1]; }
+  /// Whether all points are of one class.
+  bool oneClass() const { return one_class_; }
+
+ private:
+  /// Working memory of one thread.
+  struct Scratch {
+    MergedPoints points_of_chunk;  ///< where they do not come axis by axis
+    TilePlaces places;
+    const ClassId* labels = nullptr;     ///< of the batch
+    std::array<std::uint32_t, 27> near;  ///< numbers of the blocks around `home`, or none
+    GridIndex home;
+    IndexNumbering blocks;             ///< of the group
+    std::vector<std::uint32_t> begin;  ///< of each block's points
+    std::vector<LocalPoint> points;    ///< of the group, as they come
+    std::vector<std::uint32_t> block;  ///< number of the block of each
+    std::size_t size = 0;              ///< of these two; they are longer
+  };
+  /// The points of consecutive numbers, by block.
+  struct Group {
+    std::vector<GridIndex> blocks;
+    std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
+    std::vector<LocalPoint> points;
+    ClassId first_class;  ///< of the first point
+    bool has_other_class;
+  };
+
+  void start(std::size_t groups, const Workers& workers);
+  void binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch, Group& group) const;
+  void binBatch(std::size_t count, Scratch& scratch) const;
+  void binNear(std::size_t count, Scratch& scratch) const;
+  void binFar(std::size_t i, Scratch& scratch) const;
+  void sortGroup(Scratch& scratch, Group& group) const;
+  void collectRuns();
+
+  GridGeometry geometry_;
+  VoxelKernel kernel_;
+  const InnerLoops& loops_;
+  bool home_always_ = false, one_class_ = false;
+  std::size_t used_ = 0;
+  std::vector<Scratch> scratch_;  ///< one a worker
+  std::vector<Group> groups_;
+  IndexNumbering blocks_;
+  std::vector<std::uint32_t> block_of_run_;
+  std::vector<std::uint32_t> run_begin_;  ///< of each block; one more than blocks
+  std::vector<PointRun> runs_;            ///< by block
+};
+
+}  // namespace bki_mapping

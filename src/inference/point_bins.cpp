@@ -1,0 +1,242 @@
+#include "bki_mapping/inference/point_bins.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "bki_mapping/inference/axis_blocks.h"
+#include "bki_mapping/inference/chunks.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr std::uint32_t kNone = IndexNumbering::kNone;
+/// A kernel longer than this reaches a centre of its own voxel wherever the point is: half a diagonal
+/// [voxels].
+constexpr float kHalfDiagonal = 0.8661f;
+
+/// The 3 x 3 x 3 blocks around one, as TilePlaces::reached numbers them.
+struct Away {
+  std::int8_t x, y, z;
+};
+constexpr std::array<Away, 27> kAway = [] {
+  std::array<Away, 27> away{};
+  for (int code = 0; code < 27; ++code) {
+    away[static_cast<std::size_t>(code)] = {static_cast<std::int8_t>(code % 3 - 1),
+                                            static_cast<std::int8_t>(code / 3 % 3 - 1),
+                                            static_cast<std::int8_t>(code / 9 - 1)};
+  }
+  return away;
+}();
+
+/// Appends point i of the batch to a block. @param away of the block from the point's own [blocks].
+template <typename Scratch>
+[[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, int x, int y, int z,
+                                          std::int32_t voxel, Scratch& scratch) {
+  if (block == scratch.begin.size()) scratch.begin.push_back(0);
+  ++scratch.begin[block];
+  const auto edge = static_cast<float>(kBlockEdge);
+  LocalPoint& point = scratch.points[scratch.size];
+  point.x = scratch.places.inside[0][i] - static_cast<float>(x) * edge;
+  point.y = scratch.places.inside[1][i] - static_cast<float>(y) * edge;
+  point.z = scratch.places.inside[2][i] - static_cast<float>(z) * edge;
+  point.label = scratch.labels[i];
+  point.voxel = static_cast<std::uint16_t>(voxel);
+  scratch.block[scratch.size++] = block;
+}
+
+}  // namespace
+
+PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops)
+    : geometry_(geometry), kernel_(kernel), loops_(loops) {
+  const double most = kBlockEdge * (AxisBlocks::kMost - 2) / 2.0;
+  if (!(kernel_.reach < most)) {
+    throw std::invalid_argument("kernel/length is more than " + std::to_string(static_cast<int>(most)) +
+                                " voxels; make it shorter, or resolution coarser");
+  }
+}
+
+/// For kernels that reach the blocks next to a point's own and no others.
+void PointBins::binNear(std::size_t count, Scratch& scratch) const {
+  constexpr std::size_t kHome = 13;
+  for (std::size_t i = 0; i < count; ++i) {
+    const GridIndex home = scratch.places.tileOf(i);
+    if (scratch.home != home) {
+      scratch.home = home;
+      scratch.near.fill(kNone);
+    }
+    for (auto left = static_cast<std::uint32_t>(scratch.places.reached[i]); left != 0; left &= left - 1) {
+      const auto code = static_cast<std::size_t>(__builtin_ctz(left));
+      const int x = kAway[code].x, y = kAway[code].y, z = kAway[code].z;
+      std::uint32_t& near = scratch.near[code];
+      if (near == kNone) near = scratch.blocks.insert({home.x + x, home.y + y, home.z + z});
+      append(near, i, x, y, z, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
+    }
+  }
+}
+
+/// For any kernel.
+void PointBins::binFar(std::size_t i, Scratch& scratch) const {
+  const GridIndex home = scratch.places.tileOf(i);
+  const double reach = kernel_.reach;
+  const AxisBlocks xs(home.x, scratch.places.inside[0][i], reach),
+      ys(home.y, scratch.places.inside[1][i], reach), zs(home.z, scratch.places.inside[2][i], reach);
+  // A kernel may reach hundreds of blocks.
+  const std::size_t room = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
+  if (scratch.points.size() < room) {
+    scratch.points.resize(room);
+    scratch.block.resize(room);
+  }
+  bool at_home = false;
+  for (const AxisBlock& bz : zs) {
+    for (const AxisBlock& by : ys) {
+      for (const AxisBlock& bx : xs) {
+        if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
+        const GridIndex block{bx.block, by.block, bz.block};
+        append(scratch.blocks.insert(block), i, block.x - home.x, block.y - home.y, block.z - home.z,
+               block == home ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
+        at_home |= block == home;
+      }
+    }
+  }
+  // A kernel shorter than half a voxel's diagonal may reach no centre, but the point is in its voxel still.
+  if (home_always_ && !at_home) {
+    append(scratch.blocks.insert(home), i, 0, 0, 0, scratch.places.cell[i], scratch);
+  }
+}
+
+void PointBins::binBatch(std::size_t count, Scratch& scratch) const {
+  const std::size_t room = scratch.size + 27 * count;
+  if (scratch.points.size() < room) {
+    scratch.points.resize(2 * room);
+    scratch.block.resize(2 * room);
+  }
+  if (kernel_.type == KernelType::kCounting) {
+    for (std::size_t i = 0; i < count; ++i) {
+      append(scratch.blocks.insert(scratch.places.tileOf(i)), i, 0, 0, 0, scratch.places.cell[i], scratch);
+    }
+  } else if (kernel_.reach >= kHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
+    loops_.reach_blocks(count, kernel_.reach, scratch.places);
+    binNear(count, scratch);
+  } else {
+    for (std::size_t i = 0; i < count; ++i) binFar(i, scratch);
+  }
+}
+
+void PointBins::sortGroup(Scratch& scratch, Group& group) const {
+  group.blocks = scratch.blocks.members();
+  group.begin.resize(group.blocks.size() + 1);
+  std::uint32_t begin = 0;
+  for (std::size_t b = 0; b < group.blocks.size(); ++b) {
+    group.begin[b] = begin;
+    begin += scratch.begin[b];
+    scratch.begin[b] = group.begin[b];
+  }
+  group.begin.back() = begin;
+  group.points.resize(scratch.size);
+  for (std::size_t i = 0; i < scratch.size; ++i) {
+    group.points[scratch.begin[scratch.block[i]]++] = scratch.points[i];
+  }
+}
+
+void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch,
+                         Group& group) const {
+  scratch.blocks.clear();
+  scratch.begin.clear();
+  scratch.size = 0;
+  scratch.near.fill(kNone);
+  const std::size_t size = points.size();
+  for (std::size_t begin = 0; begin < size; begin += kBatch) {
+    const std::size_t count = std::min(size - begin, kBatch);
+    const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
+    loops_.place_points(grid, span, count, scratch.places);
+    scratch.labels = points.labels.data() + begin;
+    binBatch(count, scratch);
+  }
+  sortGroup(scratch, group);
+  group.first_class = size > 0 ? points.labels[0] : ClassId{0};
+  group.has_other_class = std::any_of(points.labels.begin(), points.labels.end(),
+                                      [&](ClassId label) { return label != group.first_class; });
+}
+
+void PointBins::collectRuns() {
+  one_class_ = true;
+  for (std::size_t g = 0; g < used_; ++g) {
+    one_class_ &= !groups_[g].has_other_class && groups_[g].first_class == groups_[0].first_class;
+  }
+  blocks_.clear();
+  block_of_run_.clear();
+  run_begin_.assign(1, 0);
+  for (std::size_t g = 0; g < used_; ++g) {
+    for (const GridIndex& index : groups_[g].blocks) {
+      const std::uint32_t block = blocks_.insert(index);
+      block_of_run_.push_back(block);
+      if (block + 1 == run_begin_.size()) run_begin_.push_back(0);
+      ++run_begin_[block + 1];
+    }
+  }
+  for (std::size_t b = 1; b < run_begin_.size(); ++b) run_begin_[b] += run_begin_[b - 1];
+  runs_.resize(block_of_run_.size());
+  std::size_t run = 0;
+  // run_begin_[b] runs up to the next block's begin, and is then put back.
+  for (std::size_t g = 0; g < used_; ++g) {
+    const Group& group = groups_[g];
+    for (std::size_t b = 0; b < group.blocks.size(); ++b) {
+      runs_[run_begin_[block_of_run_[run++]]++] = {group.points.data() + group.begin[b],
+                                                   group.begin[b + 1] - group.begin[b]};
+    }
+  }
+  std::copy_backward(run_begin_.begin(), run_begin_.end() - 1, run_begin_.end());
+  run_begin_.front() = 0;
+}
+
+void PointBins::start(std::size_t groups, const Workers& workers) {
+  used_ = groups;
+  if (groups_.size() < groups) groups_.resize(groups);
+  scratch_.resize(workers.count());
+  // Who gets which group is chance: all have room for what one has met.
+  std::size_t points = 0, blocks = 0;
+  for (const Scratch& scratch : scratch_) {
+    points = std::max(points, scratch.points.size());
+    blocks = std::max(blocks, scratch.begin.capacity());
+  }
+  for (Scratch& scratch : scratch_) {
+    scratch.points.resize(points);
+    scratch.block.resize(points);
+    scratch.begin.reserve(blocks);
+  }
+}
+
+void PointBins::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, bool home_always,
+                          Workers& workers) {
+  home_always_ = home_always;
+  const TileGrid grid(geometry_, origin, kBlockEdge);
+  const Chunks chunks(points.points.size());
+  start(chunks.count(), workers);
+  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
+    const std::size_t begin = chunks.begin(c), size = chunks.end(c) - begin;
+    MergedPoints& chunk = scratch_[worker].points_of_chunk;
+    chunk.resize(size);
+    for (std::size_t i = 0; i < size; ++i) {
+      const Eigen::Vector3f& p = points.points[begin + i];
+      chunk.x[i] = p.x();
+      chunk.y[i] = p.y();
+      chunk.z[i] = p.z();
+      chunk.labels[i] = points.labels[begin + i];
+    }
+    binGroup(grid, chunk, scratch_[worker], groups_[c]);
+  });
+  collectRuns();
+}
+
+void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
+                          Workers& workers) {
+  home_always_ = home_always;
+  const TileGrid grid(geometry_, origin, kBlockEdge);
+  start(points.groups(), workers);
+  workers.forEach(points.groups(), [&](std::size_t g, std::size_t worker) {
+    binGroup(grid, points.merged(g), scratch_[worker], groups_[g]);
+  });
+  collectRuns();
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,80 @@
+/// @file Where points lie in a grid of cells: a loop of which compilers make vector instructions. Each
+/// instruction set's file includes it and gets a copy of its own.
+#pragma once
+
+#include "bki_mapping/inference/tile_grid.h"
+
+namespace bki_mapping {
+namespace {
+
+/// One axis of placePointsLoop. @param[in,out] unsure set where rounding may have moved a point across a
+/// face.
+template <int kAxis>
+void placeOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
+                 std::int32_t* unsure) {
+  const double origin = grid.origin[kAxis], per_metre = grid.per_metre;
+  const double edge = grid.edge, per_edge = 1.0 / edge;
+  const std::int32_t whole_edge = grid.edge;
+  const std::int32_t stride = kAxis == 0 ? 1 : (kAxis == 1 ? whole_edge : whole_edge * whole_edge);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double quotient = (origin + static_cast<double>(points.axes[kAxis][i])) * per_metre;
+    const std::int32_t floor = floorToInt(quotient);
+    // Half a cell keeps the quotient by the edge away from whole numbers.
+    const std::int32_t tile = floorToInt((floor + 0.5) * per_edge);
+    const double above = quotient - floor;
+    const std::int32_t near_face = static_cast<std::int32_t>(above <= kFaceMargin) |
+                                   static_cast<std::int32_t>(above >= 1.0 - kFaceMargin);
+    places.tile[kAxis][i] = tile;
+    places.inside[kAxis][i] = static_cast<float>(quotient - (tile * edge + 0.5));
+    places.cell[i] = (kAxis == 0 ? 0 : places.cell[i]) + stride * (floor - tile * whole_edge);
+    unsure[i] = (kAxis == 0 ? 0 : unsure[i]) | near_face;
+  }
+}
+
+void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+  alignas(64) std::int32_t unsure[kBatch];
+  placeOnAxis<0>(grid, points, count, places, unsure);
+  placeOnAxis<1>(grid, points, count, places, unsure);
+  placeOnAxis<2>(grid, points, count, places, unsure);
+  std::int32_t any = 0;
+  for (std::size_t i = 0; i < count; ++i) any |= unsure[i];
+  if (any == 0) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (unsure[i] != 0) grid.placeExactly(points, i, places);
+  }
+}
+
+/// The squared distance from a point to the nearest voxel centre of the block before its own, of its own, and
+/// of the one behind it, on one axis [voxels^2]. @param c from the first centre of its own, -0.5 to 7.5.
+struct AxisDistances {
+  float before, home, behind;
+
+  [[gnu::always_inline]] explicit AxisDistances(float c) {
+    constexpr auto kEdge = static_cast<float>(kBlockEdge);
+    const auto rounded = static_cast<float>(static_cast<std::int32_t>(c + 0.5f));
+    const float nearest = rounded < kEdge - 1.0f ? rounded : kEdge - 1.0f;
+    before = (c + 1.0f) * (c + 1.0f);
+    home = (c - nearest) * (c - nearest);
+    behind = (kEdge - c) * (kEdge - c);
+  }
+};
+
+void reachBlocksLoop(std::size_t count, float reach, TilePlaces& places) {
+  const float reach2 = reach * reach;
+  for (std::size_t i = 0; i < count; ++i) {
+    const AxisDistances x(places.inside[0][i]), y(places.inside[1][i]), z(places.inside[2][i]);
+    const float xs[3] = {x.before, x.home, x.behind}, ys[3] = {y.before, y.home, y.behind},
+                zs[3] = {z.before, z.home, z.behind};
+    std::int32_t reached = 0;
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 3; ++j) {
+        const float room = reach2 - zs[k] - ys[j];
+        for (int n = 0; n < 3; ++n) reached |= xs[n] < room ? 1 << (n + 3 * j + 9 * k) : 0;
+      }
+    }
+    places.reached[i] = reached;
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,107 @@
+// Placing many points at a time gives what placing one gives, on every instruction set.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "bki_mapping/inference/inner_loops.h"
+
+namespace bki_mapping {
+namespace {
+
+struct Points {
+  std::vector<float> x, y, z;
+
+  void add(float px, float py, float pz) {
+    x.push_back(px);
+    y.push_back(py);
+    z.push_back(pz);
+  }
+  PointSpan span() const { return {{x.data(), y.data(), z.data()}}; }
+  Eigen::Vector3d at(std::size_t i) const { return Eigen::Vector3f(x[i], y[i], z[i]).cast<double>(); }
+};
+
+/// Points anywhere, on faces between cells, and a hair beside these; a full batch.
+Points nastyPoints(double cell) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> anywhere(-80.0f, 80.0f);
+  std::uniform_int_distribution<int> face(-300, 300);
+  Points points;
+  while (points.x.size() < kBatch) {
+    const auto on = [&] { return static_cast<float>(face(random) * cell); };
+    points.add(anywhere(random), anywhere(random), anywhere(random));
+    points.add(on(), on(), anywhere(random));
+    points.add(std::nextafter(on(), 1e9f), anywhere(random), std::nextafter(on(), -1e9f));
+    points.add(on(), on(), on());
+  }
+  return points;
+}
+
+int floorDivide(int a, int b) {
+  return a >= 0 ? a / b : -((-a + b - 1) / b);
+}
+
+TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
+  for (const std::string& set : instructionSets()) {
+    for (const double cell : {0.1, 0.3, 1.0}) {
+      for (const int edge : {1, 7, 8, 24, 32}) {
+        for (const Eigen::Vector3d& origin : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(-3.7, 1234.56, 2.1),
+                                              Eigen::Vector3d(0.3, -0.3, 1.2)}) {
+          const Points points = nastyPoints(cell);
+          const GridGeometry geometry(cell);
+          const TileGrid grid(geometry, origin, edge);
+          TilePlaces places;
+          innerLoopsFor(set).place_points(grid, points.span(), kBatch - 3, places);
+          for (std::size_t i = 0; i < kBatch - 3; ++i) {
+            const Eigen::Vector3d p = origin + points.at(i);
+            const VoxelIndex v = geometry.voxelAt(p);
+            const GridIndex tile{floorDivide(v.x, edge), floorDivide(v.y, edge), floorDivide(v.z, edge)};
+            ASSERT_EQ(places.tileOf(i), tile) << set << ", edge " << edge << ", point " << i;
+            const int inside =
+                v.x - tile.x * edge + edge * (v.y - tile.y * edge + edge * (v.z - tile.z * edge));
+            ASSERT_EQ(places.cell[i], inside) << set << ", edge " << edge << ", point " << i;
+            ASSERT_NEAR(places.inside[0][i], p.x() / cell - tile.x * edge - 0.5, 1e-5) << set;
+            ASSERT_NEAR(places.inside[2][i], p.z() / cell - tile.z * edge - 0.5, 1e-5) << set;
+          }
+        }
+      }
+    }
+  }
+}
+
+/// Distance from a point to the nearest voxel centre of the block that is `away` blocks off [voxels]; voxel
+/// by voxel.
+double distanceTo(const Eigen::Vector3d& from_first_centre, const Eigen::Vector3i& away) {
+  double least = 1e9;
+  for (int v = 0; v < kBlockVoxels; ++v) {
+    const Eigen::Vector3d centre(v % 8 + 8 * away.x(), v / 8 % 8 + 8 * away.y(), v / 64 + 8 * away.z());
+    least = std::min(least, (from_first_centre - centre).norm());
+  }
+  return least;
+}
+
+TEST(TileGrid, FindsTheBlocksThatPointsReach) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> in_block(-0.5f, 7.5f);
+  for (const std::string& set : instructionSets()) {
+    for (const float reach : {0.87f, 1.0f, 2.3f, 5.0f, 8.0f}) {
+      TilePlaces places;
+      constexpr std::size_t kCount = 37;
+      for (std::size_t i = 0; i < kCount; ++i) {
+        for (auto& axis : places.inside) axis[i] = in_block(random);
+      }
+      innerLoopsFor(set).reach_blocks(kCount, reach, places);
+      for (std::size_t i = 0; i < kCount; ++i) {
+        const Eigen::Vector3d p(places.inside[0][i], places.inside[1][i], places.inside[2][i]);
+        for (int code = 0; code < 27; ++code) {
+          const double distance = distanceTo(p, {code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1});
+          if (std::abs(distance - static_cast<double>(reach)) < 1e-5) continue;  // rounding decides
+          EXPECT_EQ(places.reached[i] >> code & 1, distance < static_cast<double>(reach))
+              << set << ", reach " << reach << ", block " << code;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping
