@@ -2,6 +2,11 @@
 /// own.
 #pragma once
 
+#include <cmath>
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
 #include "bki_mapping/core/block.h"
 #include "bki_mapping/inference/kernel.h"
 #include "bki_mapping/inference/local_point.h"
@@ -9,63 +14,112 @@
 namespace bki_mapping {
 namespace {
 
-typedef float Two __attribute__((vector_size(2 * sizeof(float))));
-
 /// A block's voxels with one more on each side.
 constexpr int kHaloEdge = kBlockEdge + 2;
 constexpr int kHaloVoxels = kHaloEdge * kHaloEdge * kHaloEdge;
 
-/// The place in the halo of the nearer lower voxel centre. @param c -1 to 8; rounding may have made it 8.
+/// The layers of the halo that points touch.
+struct HaloLayers {
+  int lowest = kHaloEdge, highest = -1;
+};
+
+// Adding points to the eight voxel centres around each, for a kernel that reaches no farther than one voxel:
+// no other can be nearer than that. They may lie outside the block, hence the halo. A point that reaches the
+// block has -1 <= x < 8, and the same for y and z; rounding may have made it 8.
+#if defined(__AVX2__)
+
+typedef float Eight __attribute__((vector_size(8 * sizeof(float))));
+
+HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
+  const __m128i most = _mm_set1_epi32(kHaloEdge - 2);
+  const __m128i steps = _mm_setr_epi16(1, 0, kHaloEdge, 0, kHaloEdge * kHaloEdge, 0, 0, 0);
+  __m128i lowest = most, highest = _mm_setzero_si128();
+  for (std::size_t p = 0; p < run.count; ++p) {
+    // x, y and z side by side; what stands behind them comes to nothing.
+    const __m128 c = _mm_loadu_ps(&run.points[p].x) + 1.0f;
+    const __m128i index = _mm_min_epi32(_mm_cvttps_epi32(c), most);
+    const __m128 inside = c - _mm_cvtepi32_ps(index);
+    lowest = _mm_min_epi32(lowest, index);
+    highest = _mm_max_epi32(highest, index);
+    __m128i first = _mm_madd_epi16(index, steps);
+    first = _mm_add_epi32(first, _mm_shuffle_epi32(first, _MM_SHUFFLE(1, 0, 3, 2)));
+    first = _mm_add_epi32(first, _mm_shuffle_epi32(first, _MM_SHUFFLE(2, 3, 0, 1)));
+
+    const Eight dx = Eight(_mm256_broadcastss_ps(inside)) - Eight{0, 1, 0, 1, 0, 1, 0, 1},
+                dy = Eight(_mm256_broadcastss_ps(_mm_movehdup_ps(inside))) - Eight{0, 0, 1, 1, 0, 0, 1, 1},
+                dz = Eight(_mm256_broadcastss_ps(_mm_movehl_ps(inside, inside))) -
+                     Eight{0, 0, 0, 0, 1, 1, 1, 1};
+    const Eight r = _mm256_sqrt_ps((dx * dx + dy * dy + dz * dz) * inverse_reach2);
+    const Eight values = sparseKernel(r, Eight(_mm256_max_ps(1.0f - r, Eight{})));
+
+    float* out = halo + _mm_cvtsi128_si32(first);
+    const __m128 low = _mm256_castps256_ps128(values), high = _mm256_extractf128_ps(values, 1);
+    for (const __m128& layer : {low, high}) {
+      __m64* const row = reinterpret_cast<__m64*>(out);
+      __m64* const next_row = reinterpret_cast<__m64*>(out + kHaloEdge);
+      const __m128 sum = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + layer;
+      _mm_storel_pi(row, sum);
+      _mm_storeh_pi(next_row, sum);
+      out += kHaloEdge * kHaloEdge;
+    }
+  }
+  return {_mm_extract_epi32(lowest, 2), _mm_extract_epi32(highest, 2) + 1};
+}
+
+#else
+
+/// The place in the halo of the nearer lower voxel centre.
 [[gnu::always_inline]] inline int firstNear(float c) {
   const int first = static_cast<int>(c + 1.0f);
   return first < kHaloEdge - 2 ? first : kHaloEdge - 2;
 }
 
-/// Adds a point to the eight voxel centres around it, for a kernel that reaches no farther than one voxel: no
-/// other can be nearer than that. They may lie outside the block, hence the halo.
-/// @return the lower of their layers in the halo.
-[[gnu::always_inline]] inline int addToNearestEight(const LocalPoint& point, float inverse_reach2,
-                                                    float* halo) {
-  // -1 <= x < 8, and the same for y and z, if the point reaches the block.
-  const int i = firstNear(point.x), j = firstNear(point.y), k = firstNear(point.z);
-  const float x = point.x + 1.0f - static_cast<float>(i), y = point.y + 1.0f - static_cast<float>(j),
-              z = point.z + 1.0f - static_cast<float>(k);
-  alignas(32) float values[8];
-  for (int corner = 0; corner < 8; ++corner) {
-    const float dx = x - static_cast<float>(corner & 1), dy = y - static_cast<float>(corner >> 1 & 1),
-                dz = z - static_cast<float>(corner >> 2);
-    values[corner] = sparseKernel((dx * dx + dy * dy + dz * dz) * inverse_reach2);
+HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
+  HaloLayers layers;
+  for (std::size_t p = 0; p < run.count; ++p) {
+    const LocalPoint& point = run.points[p];
+    const int i = firstNear(point.x), j = firstNear(point.y), k = firstNear(point.z);
+    const float x = point.x + 1.0f - static_cast<float>(i), y = point.y + 1.0f - static_cast<float>(j),
+                z = point.z + 1.0f - static_cast<float>(k);
+    layers.lowest = k < layers.lowest ? k : layers.lowest;
+    layers.highest = k >= layers.highest ? k + 1 : layers.highest;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int di = corner & 1, dj = corner >> 1 & 1, dk = corner >> 2;
+      const float dx = x - static_cast<float>(di), dy = y - static_cast<float>(dj),
+                  dz = z - static_cast<float>(dk);
+      halo[i + di + kHaloEdge * (j + dj + kHaloEdge * (k + dk))] +=
+          sparseKernel((dx * dx + dy * dy + dz * dz) * inverse_reach2);
+    }
   }
-  float* const first = halo + i + kHaloEdge * (j + kHaloEdge * k);
-  for (int row = 0; row < 4; ++row) {
-    float* const out = first + kHaloEdge * ((row & 1) + kHaloEdge * (row >> 1));
-    Two sum, value;
-    __builtin_memcpy(&sum, out, sizeof(Two));
-    __builtin_memcpy(&value, values + 2 * row, sizeof(Two));
-    sum += value;
-    __builtin_memcpy(out, &sum, sizeof(Two));
-  }
-  return k;
+  return layers;
 }
+
+#endif
 
 Block::Layers sumOfNearestEight(const PointRun* runs, std::size_t count, float inverse_reach2, float scale,
                                 float* sums) {
   alignas(64) float halo[kHaloVoxels];
   for (float& sum : halo) sum = 0.0f;
-  int lowest = kBlockEdge, highest = 0;  // of the lower layers, in the halo
+  HaloLayers touched;
   for (const PointRun* run = runs; run != runs + count; ++run) {
-    for (std::size_t p = 0; p < run->count; ++p) {
-      const int layer = addToNearestEight(run->points[p], inverse_reach2, halo);
-      lowest = layer < lowest ? layer : lowest;
-      highest = layer > highest ? layer : highest;
-    }
+    const HaloLayers layers = addToHalo(*run, inverse_reach2, halo);
+    touched.lowest = layers.lowest < touched.lowest ? layers.lowest : touched.lowest;
+    touched.highest = layers.highest > touched.highest ? layers.highest : touched.highest;
   }
-  for (int row = 0; row < kBlockEdge * kBlockEdge; ++row) {
-    const float* in = halo + 1 + kHaloEdge * (row % kBlockEdge + 1 + kHaloEdge * (row / kBlockEdge + 1));
-    for (int i = 0; i < kBlockEdge; ++i) sums[kBlockEdge * row + i] = scale * in[i];
+  const float* in = halo + kHaloEdge * kHaloEdge;
+  float* out = sums;
+  for (int k = 0; k < kBlockEdge; ++k) {
+    in += kHaloEdge + 1;
+    for (int j = 0; j < kBlockEdge; ++j) {
+      for (int i = 0; i < kBlockEdge; ++i) out[i] = scale * in[i];
+      in += kHaloEdge;
+      out += kBlockEdge;
+    }
+    in += kHaloEdge - 1;
   }
   // Layer k of the halo is layer k - 1 of the block.
-  return {lowest > 0 ? lowest - 1 : 0, highest + 1 < kBlockEdge ? highest + 1 : kBlockEdge};
+  const int first = touched.lowest - 1, last = touched.highest - 1;
+  return {first > 0 ? first : 0, last < kBlockEdge - 1 ? last + 1 : kBlockEdge};
 }
 
 /// For a kernel of any reach: the rows of eight voxels that a point may reach.
