@@ -12,10 +12,11 @@ class RandomSamples : public FreeSpaceModel {
   explicit RandomSamples(const MapperConfig& config) : config_(config.free_space), samples_(config) {}
 
   FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, Workers& workers) override {
-    const auto seed = static_cast<std::uint64_t>(config_.seed);
+    const CounterRandom random(static_cast<std::uint64_t>(config_.seed), stamp);
     return samples_.sample(beams.beams(), workers, [&](std::size_t beam, double length, auto&& add) {
+      const std::uint64_t key = random.beamKey(beam);
       for (int n = 0; n < config_.samples_per_beam; ++n) {
-        add(Distance(counterRandom(seed, stamp, beam, static_cast<std::uint64_t>(n)), length));
+        add(Distance(CounterRandom::draw(key, static_cast<std::uint64_t>(n)), length));
       }
     });
   }

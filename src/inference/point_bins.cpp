@@ -16,29 +16,31 @@ constexpr float kHalfDiagonal = 0.8661f;
 
 /// The 3 x 3 x 3 blocks around one, as TilePlaces::reached numbers them.
 struct Away {
-  std::int8_t x, y, z;
+  int blocks[3];
+  float voxels[3];
 };
 constexpr std::array<Away, 27> kAway = [] {
-  std::array<Away, 27> away{};
+  std::array<Away, 27> around{};
   for (int code = 0; code < 27; ++code) {
-    away[static_cast<std::size_t>(code)] = {static_cast<std::int8_t>(code % 3 - 1),
-                                            static_cast<std::int8_t>(code / 3 % 3 - 1),
-                                            static_cast<std::int8_t>(code / 9 - 1)};
+    Away& away = around[static_cast<std::size_t>(code)];
+    away = {{code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1}, {}};
+    for (int axis = 0; axis < 3; ++axis)
+      away.voxels[axis] = static_cast<float>(kBlockEdge * away.blocks[axis]);
   }
-  return away;
+  return around;
 }();
+constexpr std::size_t kHome = 13;
 
-/// Appends point i of the batch to a block. @param away of the block from the point's own [blocks].
+/// Appends point i of the batch to a block. @param away of the block from the point's own [voxels].
 template <typename Scratch>
-[[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, int x, int y, int z,
+[[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* away,
                                           std::int32_t voxel, Scratch& scratch) {
   if (block == scratch.begin.size()) scratch.begin.push_back(0);
   ++scratch.begin[block];
-  const auto edge = static_cast<float>(kBlockEdge);
   LocalPoint& point = scratch.points[scratch.size];
-  point.x = scratch.places.inside[0][i] - static_cast<float>(x) * edge;
-  point.y = scratch.places.inside[1][i] - static_cast<float>(y) * edge;
-  point.z = scratch.places.inside[2][i] - static_cast<float>(z) * edge;
+  point.x = scratch.places.inside[0][i] - away[0];
+  point.y = scratch.places.inside[1][i] - away[1];
+  point.z = scratch.places.inside[2][i] - away[2];
   point.label = scratch.labels[i];
   point.voxel = static_cast<std::uint16_t>(voxel);
   scratch.block[scratch.size++] = block;
@@ -57,7 +59,6 @@ PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, co
 
 /// For kernels that reach the blocks next to a point's own and no others.
 void PointBins::binNear(std::size_t count, Scratch& scratch) const {
-  constexpr std::size_t kHome = 13;
   for (std::size_t i = 0; i < count; ++i) {
     const GridIndex home = scratch.places.tileOf(i);
     if (scratch.home != home) {
@@ -66,10 +67,12 @@ void PointBins::binNear(std::size_t count, Scratch& scratch) const {
     }
     for (auto left = static_cast<std::uint32_t>(scratch.places.reached[i]); left != 0; left &= left - 1) {
       const auto code = static_cast<std::size_t>(__builtin_ctz(left));
-      const int x = kAway[code].x, y = kAway[code].y, z = kAway[code].z;
+      const Away& away = kAway[code];
       std::uint32_t& near = scratch.near[code];
-      if (near == kNone) near = scratch.blocks.insert({home.x + x, home.y + y, home.z + z});
-      append(near, i, x, y, z, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
+      if (near == kNone)
+        near = scratch.blocks.insert(
+            {home.x + away.blocks[0], home.y + away.blocks[1], home.z + away.blocks[2]});
+      append(near, i, away.voxels, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
     }
   }
 }
@@ -92,7 +95,10 @@ void PointBins::binFar(std::size_t i, Scratch& scratch) const {
       for (const AxisBlock& bx : xs) {
         if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
         const GridIndex block{bx.block, by.block, bz.block};
-        append(scratch.blocks.insert(block), i, block.x - home.x, block.y - home.y, block.z - home.z,
+        const float away[3] = {static_cast<float>(kBlockEdge * (block.x - home.x)),
+                               static_cast<float>(kBlockEdge * (block.y - home.y)),
+                               static_cast<float>(kBlockEdge * (block.z - home.z))};
+        append(scratch.blocks.insert(block), i, away,
                block == home ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
         at_home |= block == home;
       }
@@ -100,7 +106,7 @@ void PointBins::binFar(std::size_t i, Scratch& scratch) const {
   }
   // A kernel shorter than half a voxel's diagonal may reach no centre, but the point is in its voxel still.
   if (home_always_ && !at_home) {
-    append(scratch.blocks.insert(home), i, 0, 0, 0, scratch.places.cell[i], scratch);
+    append(scratch.blocks.insert(home), i, kAway[kHome].voxels, scratch.places.cell[i], scratch);
   }
 }
 
@@ -112,7 +118,8 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch) const {
   }
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
-      append(scratch.blocks.insert(scratch.places.tileOf(i)), i, 0, 0, 0, scratch.places.cell[i], scratch);
+      append(scratch.blocks.insert(scratch.places.tileOf(i)), i, kAway[kHome].voxels, scratch.places.cell[i],
+             scratch);
     }
   } else if (kernel_.reach >= kHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
     loops_.reach_blocks(count, kernel_.reach, scratch.places);

@@ -13,11 +13,26 @@ inline std::uint64_t mixBits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// Draws for one scan.
+class CounterRandom {
+ public:
+  CounterRandom(std::uint64_t seed, std::uint64_t scan) : key_(mixBits(mixBits(seed) ^ scan)) {}
+
+  /// Of one beam, to draw from.
+  std::uint64_t beamKey(std::uint64_t beam) const { return mixBits(key_ ^ beam); }
+  /// @return a number uniform on [0, 1).
+  static double draw(std::uint64_t beam_key, std::uint64_t sample) {
+    return static_cast<double>(mixBits(beam_key ^ sample) >> 11) * 0x1.0p-53;
+  }
+
+ private:
+  std::uint64_t key_;
+};
+
 /// @return a number uniform on [0, 1), a function of its four keys alone.
 inline double counterRandom(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam,
                             std::uint64_t sample) {
-  const std::uint64_t bits = mixBits(mixBits(mixBits(mixBits(seed) ^ scan) ^ beam) ^ sample);
-  return static_cast<double>(bits >> 11) * 0x1.0p-53;
+  return CounterRandom::draw(CounterRandom(seed, scan).beamKey(beam), sample);
 }
 
 }  // namespace bki_mapping
