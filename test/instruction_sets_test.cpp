@@ -59,30 +59,49 @@ TEST(InstructionSets, LinesEqualBruteForceOnEach) {
   }
 }
 
-/// More beams near one octant than the loop picks at a time.
-TEST(InstructionSets, ManyBeamsInAPlaceEqualBruteForceOnEach) {
+/// So many beams that octants are added voxel by voxel, and more than the loop picks at a time.
+void expectLinesOfManyBeams(const reference::Scene& scene, BeamWeight weight, BeamIndexType index) {
   Workers workers(2);
+  MapperConfig config;
+  config.downsample_resolution = 0.0;
+  config.free_space.weight = weight;
+  const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
+  const GridGeometry geometry(config.resolution);
+  BeamField field(geometry, config.kernel, index);
+  field.setBeams({scene.scan.origin, scene.scan.points}, workers);
+  for (const std::string& set : instructionSets()) {
+    BeamEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
+    evidence.setField(field);
+    SemanticMap map(geometry, config.prior, 4);
+    MapUpdater().update(map, {&evidence}, workers);
+    ASSERT_GT(map.size(), 0u);
+    // Kernel values are right to 1e-6 of their scale: far less than one beam's own value.
+    const double room = 1e-6 * config.kernel.scale * static_cast<double>(scene.scan.points.size());
+    EXPECT_EQ(faultsOf(map, brute, kFreeClass, config, room), 0u) << set << ", " << scene.name;
+  }
+}
+
+TEST(InstructionSets, ManyBeamsInAPlaceEqualBruteForceOnEach) {
   const reference::Scene scene =
       reference::makeScene("bundle", {0.3, -0.2, 0.1}, 3000, 4, [](std::mt19937& random) {
         std::uniform_real_distribution<double> aside(-0.1, 0.1), along(1.0, 2.0);
         return Eigen::Vector3d(along(random), aside(random), aside(random));
       });
-  MapperConfig config;
-  config.downsample_resolution = 0.0;
-  const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
-  const GridGeometry geometry(config.resolution);
-  BeamField field(geometry, config.kernel, BeamIndexType::kTable);
-  field.setBeams({scene.scan.origin, scene.scan.points}, workers);
-  for (const std::string& set : instructionSets()) {
-    BeamEvidence evidence(BeamWeight::kBilinear, FreeSpaceExtent::kObserved, set);
-    evidence.setField(field);
-    SemanticMap map(geometry, config.prior, 4);
-    MapUpdater().update(map, {&evidence}, workers);
-    ASSERT_GT(map.size(), 0u);
-    // Weights are at most 0.5, kernel values right to 1e-6 of their scale: far less than one beam's own
-    // value.
-    const double room = 0.5e-6 * config.kernel.scale * static_cast<double>(scene.scan.points.size());
-    EXPECT_EQ(faultsOf(map, brute, kFreeClass, config, room), 0u) << set;
+  for (const BeamIndexType index : {BeamIndexType::kTable, BeamIndexType::kRtree}) {
+    expectLinesOfManyBeams(scene, BeamWeight::kBilinear, index);
+  }
+}
+
+TEST(InstructionSets, ManyBeamsAllAroundEqualBruteForceOnEach) {
+  const reference::Scene scene =
+      reference::makeScene("all around", {0.3, -0.2, 0.1}, 8000, 4, [](std::mt19937& random) {
+        std::normal_distribution<double> any;
+        std::uniform_real_distribution<double> along(0.5, 2.0);
+        return Eigen::Vector3d(Eigen::Vector3d(any(random), any(random), any(random)).normalized() *
+                               along(random));
+      });
+  for (const BeamWeight weight : {BeamWeight::kUniform, BeamWeight::kLinear, BeamWeight::kBilinear}) {
+    expectLinesOfManyBeams(scene, weight, BeamIndexType::kTable);
   }
 }
 

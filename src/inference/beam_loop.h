@@ -14,6 +14,7 @@
 #include "bki_mapping/inference/beam_cells.h"
 #include "bki_mapping/inference/kernel.h"
 #include "lanes.h"
+#include "voxel_loop.h"
 
 namespace bki_mapping {
 namespace {
@@ -61,17 +62,6 @@ struct PickedBeams {
   }
   picked.count = end;
 #endif
-}
-
-/// Weights along beams, 0 unless 0 < rho < 1.
-template <BeamWeight kWeight>
-[[gnu::always_inline]] inline FloatLanes weightAt(FloatLanes rho) {
-  if constexpr (kWeight == BeamWeight::kBilinear) {
-    return greater(lesser(rho, 1.0f - rho), FloatLanes{});
-  } else {
-    const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
-    return ((rho > 0.0f) & (rho < 1.0f)) ? weight : FloatLanes{};
-  }
 }
 
 /// A tile and some beams near it. Lengths are in units of the kernel's length, but for rho.
@@ -167,17 +157,20 @@ void addOctant(const BeamBlock& block, const Places& places, int octant, PickedB
   near_octant.count = 0;
 }
 
-/// Adds the beams of a block. @param forEachRange called as forEachRange(octant, visit) shall call
-/// visit(range) for the ranges in which the octant's beams are.
-template <BeamWeight kWeight, typename ForEachRange>
+/// Adds the beams of a block. @param addAlone called as addAlone(octant) may add the octant, and tells
+/// whether it has.
+/// @param forEachRangeOf called as forEachRangeOf(octant, visit) shall call visit(range) for the ranges in
+/// which the octant's beams are.
+template <BeamWeight kWeight, typename AddAlone, typename ForEachRange>
 [[gnu::always_inline]] inline void addBlock(const BeamArrays& beams, const BeamBlock& block, float* sums,
-                                            ForEachRange&& forEachRange) {
+                                            AddAlone&& addAlone, ForEachRange&& forEachRangeOf) {
   Places places;
   findPlaces(block, places);
   PickedBeams near_octant;
   for (int octant = 0; octant < 8; ++octant) {
+    if (addAlone(octant)) continue;
     const Place place = places.octant(octant);
-    forEachRange(octant, [&](BeamRange range) {
+    forEachRangeOf(octant, [&](BeamRange range) {
       for (std::uint32_t b = range.first; b < range.last; b += kLanes) {
         pick(beams.ux + b, beams.uy + b, beams.uz + b, beams.inverse_length + b,
              static_cast<std::int32_t>(range.last - b), place, near_octant);
@@ -192,28 +185,27 @@ template <BeamWeight kWeight, typename ForEachRange>
 
 template <BeamWeight kWeight>
 void addWeightedBeams(const BeamArrays& beams, const BeamBlock& block, float* sums) {
-  Windows windows;
+  Windows<kOctants> windows;
   findWindows(block, windows);
-  addBlock<kWeight>(beams, block, sums, [&](int octant, auto&& visit) {
-    const int first = windows.first_column[octant], last = windows.last_column[octant];
-    for (int row = windows.first_row[octant]; row <= windows.last_row[octant]; ++row) {
-      const std::uint32_t* begin = beams.begin + row * kBeamColumns;
-      if (first <= last) {
-        visit({begin[first], begin[last + 1]});
-      } else {  // over the seam
-        visit({begin[first], begin[kBeamColumns]});
-        visit({begin[0], begin[last + 1]});
-      }
-    }
-  });
+  const auto addAlone = [&](int octant) {
+    std::uint32_t count = 0;
+    forEachRange(beams.begin, windows, octant, [&](BeamRange range) { count += range.last - range.first; });
+    if (count < kManyBeams) return false;
+    addOctantByVoxels<kWeight>(beams, block, octant, sums);
+    return true;
+  };
+  addBlock<kWeight>(beams, block, sums, addAlone,
+                    [&](int octant, auto&& visit) { forEachRange(beams.begin, windows, octant, visit); });
 }
 
 template <BeamWeight kWeight>
 void addSomeWeightedBeams(const BeamArrays& beams, const BeamRange* ranges, std::size_t count,
                           const BeamBlock& block, float* sums) {
-  addBlock<kWeight>(beams, block, sums, [&](int, auto&& visit) {
-    for (std::size_t n = 0; n < count; ++n) visit(ranges[n]);
-  });
+  addBlock<kWeight>(
+      beams, block, sums, [](int) { return false; },
+      [&](int, auto&& visit) {
+        for (std::size_t n = 0; n < count; ++n) visit(ranges[n]);
+      });
 }
 
 void addBeamsLoop(const BeamArrays& beams, const BeamBlock& block, BeamWeight weight, float* sums) {

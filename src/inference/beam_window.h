@@ -111,34 +111,58 @@ void findPlaces(const BeamBlock& block, Places& places) {
   return tile;
 }
 
-/// The cells of the beams that come within reach of each octant.
+/// The cells of the beams that come within reach of each of kCount balls.
+template <int kCount>
 struct Windows {
-  std::int32_t first_row[kOctants], last_row[kOctants];
-  std::int32_t first_column[kOctants], last_column[kOctants];  ///< first > last: over the seam
+  std::int32_t first_row[kCount], last_row[kCount];
+  std::int32_t first_column[kCount], last_column[kCount];  ///< first > last: over the seam
 };
 
-/// The windows: a ball of radius l at distance r subtends delta = asin(l / r) in elevation theta, so that
-/// sin(theta +- delta) = sin(theta) cos(delta) +- cos(theta) sin(delta), and asin(l / rho) in azimuth, with
-/// rho its distance in the plane. A ball that covers a pole reaches up to it, over the whole circle.
-void findWindows(const BeamBlock& block, Windows& windows) {
+/// The window of a ball of radius l about (x, y, z): at distance r it subtends delta = asin(l / r) in
+/// elevation theta, so that sin(theta +- delta) = sin(theta) cos(delta) +- cos(theta) sin(delta), and asin(l
+/// / rho) in azimuth, with rho its distance in the plane. A ball that covers a pole reaches up to it, over
+/// the whole circle.
+template <int kCount>
+[[gnu::always_inline]] inline void findWindow(float x, float y, float z, float l, int n,
+                                              Windows<kCount>& windows) {
+  const float rho2 = x * x + y * y, r2 = rho2 + z * z;
+  const float inverse_r2 = 1.0f / (r2 > 1e-12f ? r2 : 1e-12f), s2 = l * l * inverse_r2;
+  const float a = z * std::sqrt(inverse_r2 * (s2 < 1.0f ? 1.0f - s2 : 0.0f)),
+              b = std::sqrt(rho2 * inverse_r2 * s2);
+  const bool pole = !(rho2 > l * l), all = !(s2 < 1.0f);
+  windows.first_row[n] = beamRow(all || (pole && z < 0.0f) ? -1.0f : a - b);
+  windows.last_row[n] = beamRow(all || (pole && z > 0.0f) ? 1.0f : a + b);
+  const float sine2 = pole ? 1.0f : l * l / rho2;
+  const float s = std::sqrt(sine2), c = std::sqrt(1.0f - sine2);
+  const int low = beamColumn(pseudoAngle(x * c + y * s, y * c - x * s)),
+            high = beamColumn(pseudoAngle(x * c - y * s, y * c + x * s));
+  windows.first_column[n] = pole ? 0 : low;
+  windows.last_column[n] = pole ? kBeamColumns - 1 : high;
+}
+
+/// Of the octants of a block.
+void findWindows(const BeamBlock& block, Windows<kOctants>& windows) {
   const float l = radiusOf<kOctantEdge>(block);
   for (int n = 0; n < kOctants; ++n) {
     const Centre centre = centreOf<kOctantEdge>(block, n);
-    const auto x = static_cast<float>(centre.x), y = static_cast<float>(centre.y),
-               z = static_cast<float>(centre.z);
-    const float rho2 = x * x + y * y, r2 = rho2 + z * z;
-    const float inverse_r2 = 1.0f / (r2 > 1e-12f ? r2 : 1e-12f), s2 = l * l * inverse_r2;
-    const float a = z * std::sqrt(inverse_r2 * (s2 < 1.0f ? 1.0f - s2 : 0.0f)),
-                b = std::sqrt(rho2 * inverse_r2 * s2);
-    const bool pole = !(rho2 > l * l), all = !(s2 < 1.0f);
-    windows.first_row[n] = beamRow(all || (pole && z < 0.0f) ? -1.0f : a - b);
-    windows.last_row[n] = beamRow(all || (pole && z > 0.0f) ? 1.0f : a + b);
-    const float sine2 = pole ? 1.0f : l * l / rho2;
-    const float s = std::sqrt(sine2), c = std::sqrt(1.0f - sine2);
-    const int low = beamColumn(pseudoAngle(x * c + y * s, y * c - x * s)),
-              high = beamColumn(pseudoAngle(x * c - y * s, y * c + x * s));
-    windows.first_column[n] = pole ? 0 : low;
-    windows.last_column[n] = pole ? kBeamColumns - 1 : high;
+    findWindow(static_cast<float>(centre.x), static_cast<float>(centre.y), static_cast<float>(centre.z), l, n,
+               windows);
+  }
+}
+
+/// Calls visit(range) for the beams in the n-th window, row by row.
+template <int kCount, typename Visit>
+[[gnu::always_inline]] inline void forEachRange(const std::uint32_t* beams_begin,
+                                                const Windows<kCount>& windows, int n, Visit&& visit) {
+  const int first = windows.first_column[n], last = windows.last_column[n];
+  for (int row = windows.first_row[n]; row <= windows.last_row[n]; ++row) {
+    const std::uint32_t* const begin = beams_begin + row * kBeamColumns;
+    if (first <= last) {
+      visit(BeamRange{begin[first], begin[last + 1]});
+    } else {  // over the seam
+      visit(BeamRange{begin[first], begin[kBeamColumns]});
+      visit(BeamRange{begin[0], begin[last + 1]});
+    }
   }
 }
 
