@@ -102,6 +102,21 @@ TEST(Observation, PointsFarFromTheMapAreCounted) {
   EXPECT_EQ(mapper.map().size(), before);
 }
 
+TEST(Mapper, SurvivesBeamsWhereCellsHaveNoIndex) {
+  for (const char* mode : {"none", "even", "uniform", "linear"}) {
+    MapperConfig config;
+    config.downsample_resolution = 0.001;
+    config.sensor_model.max_range = 10.0;
+    config.free_space.mode = mode;
+    SemanticMapper mapper(config, reference::smallTable());
+    Scan scan = scanOf({{20, 0, 0}, {0, 20, 1}, {3, 0, 0}}, {10, 10, 10});
+    scan.origin = {7e7, -7e7, 7e7};  // inside the map, but 7e10 cells from its origin
+    const ScanStats stats = mapper.integrate(scan);
+    EXPECT_EQ(stats.counts.beyond_max, 2u) << mode;
+    EXPECT_EQ(stats.counts.outside_map, 1u) << mode;
+  }
+}
+
 TEST(Observation, LabelsMustBeAsManyAsPoints) {
   SemanticMapper mapper(plainConfig(), reference::smallTable());
   EXPECT_THROW(mapper.integrate(scanOf({{1, 0, 0}}, {})), std::invalid_argument);

@@ -68,6 +68,23 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
   }
 }
 
+TEST(TileGrid, PlacesPointsOutOfThisWorldSomewhere) {
+  Points points;
+  for (const float far : {1e9f, -1e9f, 1e12f, -3e38f, 3e38f}) points.add(far, -far, 1.0f);
+  for (const std::string& set : instructionSets()) {
+    for (const int edge : {8, 24, 32}) {
+      TilePlaces places;
+      innerLoopsFor(set).place_points(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(),
+                                      points.x.size(), places);
+      for (std::size_t i = 0; i < points.x.size(); ++i) {
+        EXPECT_GE(places.cell[i], 0) << set << ", point " << i;
+        EXPECT_LT(places.cell[i], edge * edge * edge) << set << ", point " << i;
+        EXPECT_GT(std::abs(static_cast<double>(places.tile[0][i])) * edge, 9e8) << set << ", point " << i;
+      }
+    }
+  }
+}
+
 /// Distance from a point to the nearest voxel centre of the block that is `away` blocks off [voxels]; voxel
 /// by voxel.
 double distanceTo(const Eigen::Vector3d& from_first_centre, const Eigen::Vector3i& away) {

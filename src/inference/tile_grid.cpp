@@ -1,5 +1,7 @@
 #include "bki_mapping/inference/tile_grid.h"
 
+#include <algorithm>
+
 namespace bki_mapping {
 
 TileGrid::TileGrid(const GridGeometry& cell_grid, const Eigen::Vector3d& sensor, int tile_edge)
@@ -10,7 +12,10 @@ TileGrid::TileGrid(const GridGeometry& cell_grid, const Eigen::Vector3d& sensor,
 
 void TileGrid::placeExactly(const PointSpan& points, std::size_t i, TilePlaces& places) const {
   Eigen::Vector3d point;
-  for (int axis = 0; axis < 3; ++axis) point[axis] = origin[axis] + static_cast<double>(points.axes[axis][i]);
+  const double farthest = kFarthest / per_metre;
+  for (int axis = 0; axis < 3; ++axis) {
+    point[axis] = std::clamp(origin[axis] + static_cast<double>(points.axes[axis][i]), -farthest, farthest);
+  }
   const VoxelIndex index = cells.voxelAt(point);
   const std::int32_t floors[3] = {index.x, index.y, index.z};
   places.cell[i] = 0;

@@ -17,7 +17,9 @@ void placeOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t coun
   const std::int32_t whole_edge = grid.edge;
   const std::int32_t stride = kAxis == 0 ? 1 : (kAxis == 1 ? whole_edge : whole_edge * whole_edge);
   for (std::size_t i = 0; i < count; ++i) {
-    const double quotient = (origin + static_cast<double>(points.axes[kAxis][i])) * per_metre;
+    double quotient = (origin + static_cast<double>(points.axes[kAxis][i])) * per_metre;
+    quotient = quotient < TileGrid::kFarthest ? quotient : TileGrid::kFarthest;
+    quotient = quotient > -TileGrid::kFarthest ? quotient : -TileGrid::kFarthest;
     const std::int32_t floor = floorToInt(quotient);
     // Half a cell keeps the quotient by the edge away from whole numbers.
     const std::int32_t tile = floorToInt((floor + 0.5) * per_edge);

@@ -99,7 +99,8 @@ class CellMerger {
   void voteForOther(Cell& cell, ClassId label);
   ClassId majority(const Cell& cell) const;
 
-  std::vector<std::uint16_t> slots_ = std::vector<std::uint16_t>(kMostCells, kEmpty);  ///< cells by place
+  /// Cells by place; one for each number that a place can be.
+  std::vector<std::uint16_t> slots_ = std::vector<std::uint16_t>(std::size_t{1} << 16, kEmpty);
   std::uint32_t count_ = 0;
   std::vector<Cell> cells_;  ///< `count_` of them
   std::vector<Votes> votes_;

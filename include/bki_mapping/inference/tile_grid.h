@@ -32,6 +32,9 @@ struct TilePlaces {
 /// Cells of the map frame, in cubic tiles of edge x edge x edge cells. Tile (0,0,0) begins at cell (0,0,0).
 struct TileGrid {
   static constexpr int kMostEdge = 32;  ///< cells
+  /// Points farther from the map's origin than this [cells] are placed there: indices must stay within their
+  /// type.
+  static constexpr double kFarthest = 1 << 30;
 
   /// @param origin of the points, in the map frame [m]. @param edge [cells], 1 to kMostEdge.
   TileGrid(const GridGeometry& cells, const Eigen::Vector3d& origin, int edge);
