@@ -48,14 +48,14 @@ void observing(benchmark::State& state) {
 void binning(benchmark::State& state) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel);
-  for (auto _ : state) evidence.setPoints(f.scan.origin, f.seen.hits, f.workers);
+  for (auto _ : state) evidence.setPoints(f.scan.origin, f.observer.hits(), f.workers);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
 }
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel, instruction_set);
-  evidence.setPoints(f.scan.origin, f.seen.hits, f.workers);
+  evidence.setPoints(f.scan.origin, f.observer.hits(), f.workers);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
   for (auto _ : state) updater.update(map, {&evidence}, f.workers);

@@ -94,9 +94,9 @@ TEST(InstructionSets, ManyBeamsInAPlaceEqualBruteForceOnEach) {
 
 TEST(InstructionSets, ManyBeamsAllAroundEqualBruteForceOnEach) {
   const reference::Scene scene =
-      reference::makeScene("all around", {0.3, -0.2, 0.1}, 8000, 4, [](std::mt19937& random) {
+      reference::makeScene("all around", {0.3, -0.2, 0.1}, 5000, 4, [](std::mt19937& random) {
         std::normal_distribution<double> any;
-        std::uniform_real_distribution<double> along(0.5, 2.0);
+        std::uniform_real_distribution<double> along(0.5, 1.5);
         return Eigen::Vector3d(Eigen::Vector3d(any(random), any(random), any(random)).normalized() *
                                along(random));
       });
@@ -114,9 +114,14 @@ TEST(InstructionSets, PointsEqualBruteForceOnEach) {
         config.downsample_resolution = 0.0;
         config.kernel.length = length;
         const GridGeometry geometry(config.resolution);
-        LabelledPoints points{scene.scan.points, {}};
-        for (const std::uint32_t raw : scene.scan.labels)
-          points.labels.push_back(static_cast<ClassId>(raw / 10));
+        Downsampler points(0.0, geometry.blockSize(), set);  // merges nothing
+        points.start(scene.scan.origin, 1, workers, false);
+        Downsampler::Input& input = points.open(0, 0);
+        for (std::size_t i = 0; i < scene.scan.points.size(); ++i) {
+          input.add(scene.scan.points[i], static_cast<ClassId>(scene.scan.labels[i] / 10));
+        }
+        points.close(0, 0);
+        points.finish(workers);
         PointEvidence evidence(geometry, config.kernel, set);
         evidence.setPoints(scene.scan.origin, points, workers);
         SemanticMap map(geometry, config.prior, 4);

@@ -50,13 +50,11 @@ KernelConfig kernelOf(double length) {
 
 class Bins {
  public:
-  Bins(double length, bool home_always, const LabelledPoints& points, bool merged)
-      : bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), innerLoopsFor("")) {
+  /// @param tile edge [m] in which neighbours come: blocks, or cubes that are none.
+  Bins(double length, bool home_always, const LabelledPoints& points, double tile)
+      : downsampler_(0.0, tile),
+        bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), innerLoopsFor("")) {
     for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
-      if (!merged) {
-        bins_.setPoints(kOrigin, points, home_always, workers_);
-        continue;
-      }
       downsampler_.start(kOrigin, 1, workers_, false);
       Downsampler::Input& input = downsampler_.open(0, 0);
       for (std::size_t i = 0; i < points.points.size(); ++i) input.add(points.points[i], points.labels[i]);
@@ -69,9 +67,11 @@ class Bins {
 
  private:
   Workers workers_{2};
-  Downsampler downsampler_{0.0, 8 * kResolution};
+  Downsampler downsampler_;
   PointBins bins_;
 };
+
+constexpr double kBlock = kBlockEdge * kResolution;
 
 TEST(PointBins, HoldsEachPointInTheBlocksThatItReaches) {
   const LabelledPoints points = randomPoints(300);
@@ -80,8 +80,8 @@ TEST(PointBins, HoldsEachPointInTheBlocksThatItReaches) {
     for (const Eigen::Vector3f& p : points.points) {
       for (const GridIndex& block : blocksReached(kOrigin + p.cast<double>(), length)) expected.insert(block);
     }
-    for (const bool merged : {false, true}) {
-      const Bins made(length, false, points, merged);
+    for (const double tile : {kBlock, 1.7, 100.0}) {
+      const Bins made(length, false, points, tile);
       const PointBins& bins = made.bins();
       std::multiset<GridIndex> found;
       for (std::size_t b = 0; b < bins.blocks().size(); ++b) {
@@ -89,7 +89,7 @@ TEST(PointBins, HoldsEachPointInTheBlocksThatItReaches) {
           for (std::size_t i = 0; i < run->count; ++i) found.insert(bins.blocks().members()[b]);
         }
       }
-      EXPECT_EQ(found, expected) << "length " << length << ", merged " << merged;
+      EXPECT_EQ(found, expected) << "length " << length << ", tile " << tile;
       EXPECT_FALSE(bins.oneClass());
     }
   }
@@ -98,7 +98,7 @@ TEST(PointBins, HoldsEachPointInTheBlocksThatItReaches) {
 TEST(PointBins, KeepsPointsWhereTheyAre) {
   const LabelledPoints points = randomPoints(300);
   const GridGeometry geometry(kResolution);
-  const Bins made(0.05, true, points, true);  // most points reach no centre
+  const Bins made(0.05, true, points, kBlock);  // most points reach no centre
   const PointBins& bins = made.bins();
   std::size_t found = 0;
   for (std::size_t b = 0; b < bins.blocks().size(); ++b) {
@@ -127,10 +127,9 @@ TEST(PointBins, KeepsPointsWhereTheyAre) {
 TEST(PointBins, KnowsPointsOfOneClass) {
   LabelledPoints points = randomPoints(2000);
   std::fill(points.labels.begin(), points.labels.end(), ClassId{3});
-  EXPECT_TRUE(Bins(0.3, false, points, true).bins().oneClass());
+  EXPECT_TRUE(Bins(0.3, false, points, kBlock).bins().oneClass());
   points.labels.back() = 4;
-  EXPECT_FALSE(Bins(0.3, false, points, true).bins().oneClass());
-  EXPECT_FALSE(Bins(0.3, false, points, false).bins().oneClass());
+  EXPECT_FALSE(Bins(0.3, false, points, kBlock).bins().oneClass());
 }
 
 }  // namespace

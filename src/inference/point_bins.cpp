@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "bki_mapping/inference/axis_blocks.h"
-#include "bki_mapping/inference/chunks.h"
 
 namespace bki_mapping {
 namespace {
@@ -211,28 +210,6 @@ void PointBins::start(std::size_t groups, const Workers& workers) {
     scratch.block.resize(points);
     scratch.begin.reserve(blocks);
   }
-}
-
-void PointBins::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, bool home_always,
-                          Workers& workers) {
-  home_always_ = home_always;
-  const TileGrid grid(geometry_, origin, kBlockEdge);
-  const Chunks chunks(points.points.size());
-  start(chunks.count(), workers);
-  workers.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
-    const std::size_t begin = chunks.begin(c), size = chunks.end(c) - begin;
-    MergedPoints& chunk = scratch_[worker].points_of_chunk;
-    chunk.resize(size);
-    for (std::size_t i = 0; i < size; ++i) {
-      const Eigen::Vector3f& p = points.points[begin + i];
-      chunk.x[i] = p.x();
-      chunk.y[i] = p.y();
-      chunk.z[i] = p.z();
-      chunk.labels[i] = points.labels[begin + i];
-    }
-    binGroup(grid, chunk, scratch_[worker], groups_[c]);
-  });
-  collectRuns();
 }
 
 void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,

@@ -18,11 +18,6 @@ PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& k
       loops_(innerLoopsFor(instruction_set)),
       bins_(geometry, kernel_, loops_) {}
 
-void PointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers) {
-  size_ = points.points.size();
-  bins_.setPoints(origin, points, protect_, workers);
-}
-
 void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers) {
   size_ = points.size();
   bins_.setPoints(origin, points, protect_, workers);

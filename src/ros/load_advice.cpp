@@ -11,16 +11,16 @@ namespace {
 /// Time of a mode in that of mode none: SemanticKITTI 04, two threads, from docs/performance.md.
 double costOf(const FreeSpaceConfig& free_space) {
   if (free_space.mode == "none") return 1.0;
-  if (free_space.mode == "even") return 10.0 / free_space.gap;
-  if (free_space.mode == "line") return free_space.extent == FreeSpaceExtent::kObserved ? 5.8 : 4.1;
-  return 1.3 + 0.7 * free_space.samples_per_beam;
+  if (free_space.mode == "even") return 7.9 / free_space.gap;
+  if (free_space.mode == "line") return free_space.extent == FreeSpaceExtent::kObserved ? 8.5 : 5.6;
+  return 1.65 + 0.39 * free_space.samples_per_beam;
 }
 
 /// Time of a scan with resolution, kernel and down-sampling twice as coarse, and with half the range, in that
-/// of now: measured on SemanticKITTI 04 and 00, 0.42 to 0.48 for lines, 0.51 to 0.66 for the others; 0.71 to
-/// 0.87.
+/// of now: measured on SemanticKITTI 04 and 00, 0.39 to 0.45 for lines, 0.55 to 0.72 for the others; 0.64 to
+/// 1.
 double costOfCoarser(const std::string& mode) {
-  return mode == "line" ? 0.45 : 0.6;
+  return mode == "line" ? 0.42 : 0.62;
 }
 constexpr double kCostOfHalfTheRange = 0.8;
 

@@ -20,12 +20,9 @@ class PointBins {
   /// @throws std::invalid_argument if the kernel is longer than 72 voxels.
   PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops);
 
-  /// Replaces the points. @param origin of the points in the map frame [m].
+  /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
   /// @param home_always whether a point is sorted into the block that holds it even if it reaches none of its
   /// centres.
-  void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, bool home_always,
-                 Workers& workers);
-  /// The same, of points that a down-sampler has merged: cheaper, since neighbours stand together.
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
                  Workers& workers);
 
@@ -42,7 +39,6 @@ class PointBins {
  private:
   /// Working memory of one thread.
   struct Scratch {
-    MergedPoints points_of_chunk;  ///< where they do not come axis by axis
     TilePlaces places;
     const ClassId* labels = nullptr;     ///< of the batch
     std::array<std::uint32_t, 27> near;  ///< numbers of the blocks around `home`, or none
@@ -53,7 +49,7 @@ class PointBins {
     std::vector<std::uint32_t> block;  ///< number of the block of each
     std::size_t size = 0;              ///< of these two; they are longer
   };
-  /// The points of consecutive numbers, by block.
+  /// The points of a group of the down-sampler's, by block.
   struct Group {
     std::vector<GridIndex> blocks;
     std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks

@@ -18,9 +18,7 @@ class PointEvidence : public Evidence {
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
                 const std::string& instruction_set = "");
 
-  /// Replaces the points. @param origin of the points in the map frame [m].
-  void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, Workers& workers);
-  /// The same, of points that a down-sampler has merged.
+  /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers);
   std::size_t size() const { return size_; }  ///< number of points
 
