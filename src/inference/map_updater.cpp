@@ -55,7 +55,10 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
   stats.collect_ms = watch.lap();
 
   scratch_.resize(workers.count());
-  for (EvidenceScratch& scratch : scratch_) scratch.limits = limits_;
+  for (EvidenceScratch& scratch : scratch_) {
+    scratch.limits = limits_;
+    for (const EvidenceScratch& other : scratch_) scratch.reserveAs(other);
+  }
   workers.forEach((jobs_.size() + kBlocksAJob - 1) / kBlocksAJob, [&](std::size_t j, std::size_t worker) {
     const std::size_t end = std::min(jobs_.size(), (j + 1) * kBlocksAJob);
     for (std::size_t n = j * kBlocksAJob; n < end; ++n) work(evidence, n, scratch_[worker]);

@@ -31,11 +31,11 @@ constexpr std::array<Away, 27> kAway = [] {
 constexpr std::size_t kHome = 13;
 
 /// Appends point i of the batch to a block. @param away of the block from the point's own [voxels].
-template <typename Scratch>
+template <typename Scratch, typename Group>
 [[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* away,
-                                          std::int32_t voxel, Scratch& scratch) {
-  if (block == scratch.begin.size()) scratch.begin.push_back(0);
-  ++scratch.begin[block];
+                                          std::int32_t voxel, Scratch& scratch, Group& group) {
+  if (block + 1 == group.begin.size()) group.begin.push_back(0);
+  ++group.begin[block + 1];
   LocalPoint& point = scratch.points[scratch.size];
   point.x = scratch.places.inside[0][i] - away[0];
   point.y = scratch.places.inside[1][i] - away[1];
@@ -57,7 +57,7 @@ PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, co
 }
 
 /// For kernels that reach the blocks next to a point's own and no others.
-void PointBins::binNear(std::size_t count, Scratch& scratch) const {
+void PointBins::binNear(std::size_t count, Scratch& scratch, Group& group) const {
   for (std::size_t i = 0; i < count; ++i) {
     const GridIndex home = scratch.places.tileOf(i);
     if (scratch.home != home) {
@@ -69,15 +69,16 @@ void PointBins::binNear(std::size_t count, Scratch& scratch) const {
       const Away& away = kAway[code];
       std::uint32_t& near = scratch.near[code];
       if (near == kNone)
-        near = scratch.blocks.insert(
-            {home.x + away.blocks[0], home.y + away.blocks[1], home.z + away.blocks[2]});
-      append(near, i, away.voxels, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
+        near =
+            group.blocks.insert({home.x + away.blocks[0], home.y + away.blocks[1], home.z + away.blocks[2]});
+      append(near, i, away.voxels, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch,
+             group);
     }
   }
 }
 
 /// For any kernel.
-void PointBins::binFar(std::size_t i, Scratch& scratch) const {
+void PointBins::binFar(std::size_t i, Scratch& scratch, Group& group) const {
   const GridIndex home = scratch.places.tileOf(i);
   const double reach = kernel_.reach;
   const AxisBlocks xs(home.x, scratch.places.inside[0][i], reach),
@@ -97,19 +98,19 @@ void PointBins::binFar(std::size_t i, Scratch& scratch) const {
         const float away[3] = {static_cast<float>(kBlockEdge * (block.x - home.x)),
                                static_cast<float>(kBlockEdge * (block.y - home.y)),
                                static_cast<float>(kBlockEdge * (block.z - home.z))};
-        append(scratch.blocks.insert(block), i, away,
-               block == home ? scratch.places.cell[i] : LocalPoint::kOutside, scratch);
+        append(group.blocks.insert(block), i, away,
+               block == home ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
         at_home |= block == home;
       }
     }
   }
   // A kernel shorter than half a voxel's diagonal may reach no centre, but the point is in its voxel still.
   if (home_always_ && !at_home) {
-    append(scratch.blocks.insert(home), i, kAway[kHome].voxels, scratch.places.cell[i], scratch);
+    append(group.blocks.insert(home), i, kAway[kHome].voxels, scratch.places.cell[i], scratch, group);
   }
 }
 
-void PointBins::binBatch(std::size_t count, Scratch& scratch) const {
+void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) const {
   const std::size_t room = scratch.size + 27 * count;
   if (scratch.points.size() < room) {
     scratch.points.resize(2 * room);
@@ -117,37 +118,33 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch) const {
   }
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
-      append(scratch.blocks.insert(scratch.places.tileOf(i)), i, kAway[kHome].voxels, scratch.places.cell[i],
-             scratch);
+      append(group.blocks.insert(scratch.places.tileOf(i)), i, kAway[kHome].voxels, scratch.places.cell[i],
+             scratch, group);
     }
   } else if (kernel_.reach >= kHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
     loops_.reach_blocks(count, kernel_.reach, scratch.places);
-    binNear(count, scratch);
+    binNear(count, scratch, group);
   } else {
-    for (std::size_t i = 0; i < count; ++i) binFar(i, scratch);
+    for (std::size_t i = 0; i < count; ++i) binFar(i, scratch, group);
   }
 }
 
-void PointBins::sortGroup(Scratch& scratch, Group& group) const {
-  group.blocks = scratch.blocks.members();
-  group.begin.resize(group.blocks.size() + 1);
-  std::uint32_t begin = 0;
-  for (std::size_t b = 0; b < group.blocks.size(); ++b) {
-    group.begin[b] = begin;
-    begin += scratch.begin[b];
-    scratch.begin[b] = group.begin[b];
-  }
-  group.begin.back() = begin;
+/// A counting sort; begin[b + 1] holds the number of block b's points.
+void PointBins::sortGroup(const Scratch& scratch, Group& group) const {
+  for (std::size_t b = 1; b < group.begin.size(); ++b) group.begin[b] += group.begin[b - 1];
   group.points.resize(scratch.size);
+  // begin[b] runs up to the next block's begin, and is then put back.
   for (std::size_t i = 0; i < scratch.size; ++i) {
-    group.points[scratch.begin[scratch.block[i]]++] = scratch.points[i];
+    group.points[group.begin[scratch.block[i]]++] = scratch.points[i];
   }
+  std::copy_backward(group.begin.begin(), group.begin.end() - 1, group.begin.end());
+  group.begin.front() = 0;
 }
 
 void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch,
                          Group& group) const {
-  scratch.blocks.clear();
-  scratch.begin.clear();
+  group.blocks.clear();
+  group.begin.assign(1, 0);
   scratch.size = 0;
   scratch.near.fill(kNone);
   const std::size_t size = points.size();
@@ -156,7 +153,7 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
     const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
     loops_.place_points(grid, span, count, scratch.places);
     scratch.labels = points.labels.data() + begin;
-    binBatch(count, scratch);
+    binBatch(count, scratch, group);
   }
   sortGroup(scratch, group);
   group.first_class = size > 0 ? points.labels[0] : ClassId{0};
@@ -173,7 +170,7 @@ void PointBins::collectRuns() {
   block_of_run_.clear();
   run_begin_.assign(1, 0);
   for (std::size_t g = 0; g < used_; ++g) {
-    for (const GridIndex& index : groups_[g].blocks) {
+    for (const GridIndex& index : groups_[g].blocks.members()) {
       const std::uint32_t block = blocks_.insert(index);
       block_of_run_.push_back(block);
       if (block + 1 == run_begin_.size()) run_begin_.push_back(0);
@@ -200,15 +197,11 @@ void PointBins::start(std::size_t groups, const Workers& workers) {
   if (groups_.size() < groups) groups_.resize(groups);
   scratch_.resize(workers.count());
   // Who gets which group is chance: all have room for what one has met.
-  std::size_t points = 0, blocks = 0;
-  for (const Scratch& scratch : scratch_) {
-    points = std::max(points, scratch.points.size());
-    blocks = std::max(blocks, scratch.begin.capacity());
-  }
+  std::size_t points = 0;
+  for (const Scratch& scratch : scratch_) points = std::max(points, scratch.points.size());
   for (Scratch& scratch : scratch_) {
     scratch.points.resize(points);
     scratch.block.resize(points);
-    scratch.begin.reserve(blocks);
   }
 }
 

@@ -32,6 +32,12 @@ struct EvidenceScratch {
   /// Voxels of the block at hand that evidence for `free` leaves alone.
   std::bitset<kBlockVoxels> held;
 
+  /// Provides for as much as `other` does: who gets which block is chance.
+  void reserveAs(const EvidenceScratch& other) {
+    points.reserve(other.points.capacity());
+    ranges.reserve(other.ranges.capacity());
+    beams.reserve(other.beams.capacity());
+  }
   void leaveHeldAlone() {
     if (held.none()) return;
     for (std::size_t v = 0; v < sums.size(); ++v) sums[v] = held[v] ? 0.0f : sums[v];

@@ -43,15 +43,13 @@ class PointBins {
     const ClassId* labels = nullptr;     ///< of the batch
     std::array<std::uint32_t, 27> near;  ///< numbers of the blocks around `home`, or none
     GridIndex home;
-    IndexNumbering blocks;             ///< of the group
-    std::vector<std::uint32_t> begin;  ///< of each block's points
     std::vector<LocalPoint> points;    ///< of the group, as they come
     std::vector<std::uint32_t> block;  ///< number of the block of each
     std::size_t size = 0;              ///< of these two; they are longer
   };
   /// The points of a group of the down-sampler's, by block.
   struct Group {
-    std::vector<GridIndex> blocks;
+    IndexNumbering blocks;
     std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
     std::vector<LocalPoint> points;
     ClassId first_class;  ///< of the first point
@@ -60,10 +58,10 @@ class PointBins {
 
   void start(std::size_t groups, const Workers& workers);
   void binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch, Group& group) const;
-  void binBatch(std::size_t count, Scratch& scratch) const;
-  void binNear(std::size_t count, Scratch& scratch) const;
-  void binFar(std::size_t i, Scratch& scratch) const;
-  void sortGroup(Scratch& scratch, Group& group) const;
+  void binBatch(std::size_t count, Scratch& scratch, Group& group) const;
+  void binNear(std::size_t count, Scratch& scratch, Group& group) const;
+  void binFar(std::size_t i, Scratch& scratch, Group& group) const;
+  void sortGroup(const Scratch& scratch, Group& group) const;
   void collectRuns();
 
   GridGeometry geometry_;
