@@ -71,6 +71,19 @@ TEST(ClassTable, SemanticKittiLearningMap) {
   EXPECT_FALSE(table.find(9)->dynamic);
 }
 
+TEST(ClassTable, RawNumbersMayBeLarge) {
+  SemanticClass small, large;
+  small.name = "small";
+  small.raw = {0, 4095, 7};
+  large.id = 1;
+  large.name = "large";
+  large.raw = {4096, 70000, 4294967295u};
+  const ClassTable table("numbers", {small, large});
+  for (const std::uint32_t raw : small.raw) EXPECT_EQ(table.classOfRaw(raw), 0) << raw;
+  for (const std::uint32_t raw : large.raw) EXPECT_EQ(table.classOfRaw(raw), 1) << raw;
+  for (const std::uint32_t raw : {1u, 4094u, 4097u, 69999u}) EXPECT_FALSE(table.classOfRaw(raw)) << raw;
+}
+
 TEST(ClassTable, OccupancyTakesEveryLabel) {
   const ClassTable table = loadClassTable("occupancy");
   for (const std::uint32_t raw : {0u, 40u, 252u, 70000u}) EXPECT_EQ(table.classOfRaw(raw), 0);

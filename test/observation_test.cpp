@@ -102,6 +102,17 @@ TEST(Observation, PointsFarFromTheMapAreCounted) {
   EXPECT_EQ(mapper.map().size(), before);
 }
 
+TEST(Observation, ACentroidAtTheSensorIsAHitWithoutABeam) {
+  MapperConfig config;
+  config.downsample_resolution = 0.1;
+  Scan scan = scanOf({{0.01f, 0, 0}, {-0.01f, 0, 0}, {3, 0, 0}}, {10, 10, 10});
+  scan.origin = {0.05, 0.05, 0.05};  // in the middle of a cell
+  const Observation seen = observe(scan, config);
+  EXPECT_EQ(seen.hits.points.size(), 2u);
+  ASSERT_EQ(seen.beams.ends.size(), 1u);
+  EXPECT_FLOAT_EQ(seen.beams.ends[0].x(), 3.0f);
+}
+
 TEST(Mapper, SurvivesBeamsWhereCellsHaveNoIndex) {
   for (const char* mode : {"none", "even", "uniform", "linear"}) {
     MapperConfig config;

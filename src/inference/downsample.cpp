@@ -20,7 +20,7 @@ int tileEdge(double cell, double tile) {
 }
 
 /// Runs of points are fetched so many runs before they are merged.
-constexpr std::size_t kAhead = 3;
+constexpr std::ptrdiff_t kAhead = 3;
 
 /// Tiles that are neighbours have different numbers.
 std::size_t shortCode(const GridIndex& tile) {
@@ -130,41 +130,24 @@ void Downsampler::close(std::size_t chunk_number, std::size_t worker) {
 
 void Downsampler::collectRuns() {
   tiles_.clear();
-  tile_of_run_.clear();
-  run_begin_.assign(1, 0);
-  for (std::size_t c = 0; c < used_; ++c) {
-    for (const GridIndex& member : chunks_[c].tiles.members()) {
-      const std::uint32_t tile = tiles_.insert(member);
-      tile_of_run_.push_back(tile);
-      if (tile + 1 == run_begin_.size()) run_begin_.push_back(0);
-      ++run_begin_[tile + 1];
-    }
-  }
-  for (std::size_t t = 1; t < run_begin_.size(); ++t) run_begin_[t] += run_begin_[t - 1];
-  runs_.resize(tile_of_run_.size());
-  std::size_t run = 0;
-  // run_begin_[t] runs up to the next tile's begin, and is then put back.
   for (std::uint32_t c = 0; c < used_; ++c) {
+    const std::vector<GridIndex>& tiles = chunks_[c].tiles.members();
     const std::vector<std::uint32_t>& begin = chunks_[c].begin;
-    for (std::size_t t = 0; t + 1 < begin.size(); ++t) {
-      runs_[run_begin_[tile_of_run_[run++]]++] = {c, begin[t], begin[t + 1]};
-    }
+    for (std::size_t t = 0; t < tiles.size(); ++t) tiles_.add(tiles[t], {c, begin[t], begin[t + 1]});
   }
-  std::copy_backward(run_begin_.begin(), run_begin_.end() - 1, run_begin_.end());
-  run_begin_.front() = 0;
+  tiles_.sort();
 }
 
 void Downsampler::splitIntoGroups(std::size_t points) {
   const std::size_t share = points / kGroups + 1;
   if (groups_.size() < kGroups) groups_.resize(kGroups);
   used_groups_ = 0;
-  const auto tiles = static_cast<std::uint32_t>(tiles_.size());
+  const auto tiles = static_cast<std::uint32_t>(tiles_.indices().size());
   for (std::uint32_t tile = 0; tile < tiles;) {
     Group& group = groups_[used_groups_++];
     group.first_tile = tile;
     for (std::size_t size = 0; tile < tiles && (size < share || used_groups_ == kGroups); ++tile) {
-      for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r)
-        size += runs_[r].end - runs_[r].begin;
+      for (const Run* run = tiles_.begin(tile); run != tiles_.end(tile); ++run) size += run->size();
     }
     group.end_tile = tile;
   }
@@ -183,15 +166,12 @@ void Downsampler::merge(std::uint32_t g, CellMerger& merger) {
   for (std::uint32_t tile = group.first_tile; tile < group.end_tile; ++tile) {
     const auto before = static_cast<std::uint32_t>(group.merged.size());
     std::size_t points = 0;
-    for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r) {
-      points += runs_[r].end - runs_[r].begin;
-    }
+    for (const Run* run = tiles_.begin(tile); run != tiles_.end(tile); ++run) points += run->size();
     merger.startTile(points);
-    for (std::uint32_t r = run_begin_[tile]; r < run_begin_[tile + 1]; ++r) {
-      const Run& run = runs_[r];
-      Chunk& chunk = chunks_[run.chunk];
-      if (r + kAhead < runs_.size()) prefetch(runs_[r + kAhead]);
-      for (std::uint32_t i = run.begin; i < run.end; ++i) {
+    for (const Run* run = tiles_.begin(tile); run != tiles_.end(tile); ++run) {
+      Chunk& chunk = chunks_[run->chunk];
+      if (tiles_.end() - run > kAhead) prefetch(run[kAhead]);
+      for (std::uint32_t i = run->begin; i < run->end; ++i) {
         const std::uint32_t cell = merges_ ? merger.add(chunk.points[i]) : merger.addAlone(chunk.points[i]);
         if (ordered_ && cell != CellMerger::kKnown) {
           chunk.cell_of[chunk.place[i]] = g << kCellBits | (before + cell);

@@ -167,29 +167,14 @@ void PointBins::collectRuns() {
     one_class_ &= !groups_[g].has_other_class && groups_[g].first_class == groups_[0].first_class;
   }
   blocks_.clear();
-  block_of_run_.clear();
-  run_begin_.assign(1, 0);
-  for (std::size_t g = 0; g < used_; ++g) {
-    for (const GridIndex& index : groups_[g].blocks.members()) {
-      const std::uint32_t block = blocks_.insert(index);
-      block_of_run_.push_back(block);
-      if (block + 1 == run_begin_.size()) run_begin_.push_back(0);
-      ++run_begin_[block + 1];
-    }
-  }
-  for (std::size_t b = 1; b < run_begin_.size(); ++b) run_begin_[b] += run_begin_[b - 1];
-  runs_.resize(block_of_run_.size());
-  std::size_t run = 0;
-  // run_begin_[b] runs up to the next block's begin, and is then put back.
   for (std::size_t g = 0; g < used_; ++g) {
     const Group& group = groups_[g];
-    for (std::size_t b = 0; b < group.blocks.size(); ++b) {
-      runs_[run_begin_[block_of_run_[run++]]++] = {group.points.data() + group.begin[b],
-                                                   group.begin[b + 1] - group.begin[b]};
+    const std::vector<GridIndex>& indices = group.blocks.members();
+    for (std::size_t b = 0; b < indices.size(); ++b) {
+      blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b]});
     }
   }
-  std::copy_backward(run_begin_.begin(), run_begin_.end() - 1, run_begin_.end());
-  run_begin_.front() = 0;
+  blocks_.sort();
 }
 
 void PointBins::start(std::size_t groups, const Workers& workers) {

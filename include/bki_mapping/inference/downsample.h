@@ -9,6 +9,7 @@
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/inner_loops.h"
 #include "bki_mapping/inference/parallel_for.h"
+#include "bki_mapping/inference/runs_by_index.h"
 #include "bki_mapping/inference/tile_grid.h"
 
 namespace bki_mapping {
@@ -98,6 +99,7 @@ class Downsampler {
   /// Points of one tile in one chunk.
   struct Run {
     std::uint32_t chunk, begin, end;
+    std::uint32_t size() const { return end - begin; }
   };
   /// Consecutive tiles.
   struct Group {
@@ -121,10 +123,7 @@ class Downsampler {
   std::vector<Chunk> chunks_;
   std::vector<Input> inputs_;        ///< one a worker
   std::vector<CellMerger> mergers_;  ///< one a worker
-  IndexNumbering tiles_;
-  std::vector<std::uint32_t> run_begin_;  ///< of each tile; one more than tiles
-  std::vector<std::uint32_t> tile_of_run_;
-  std::vector<Run> runs_;  ///< by tile, then chunk
+  RunsByIndex<Run> tiles_;
   std::vector<Group> groups_;
 };
 

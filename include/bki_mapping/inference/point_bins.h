@@ -10,6 +10,7 @@
 #include "bki_mapping/inference/kernel.h"
 #include "bki_mapping/inference/local_point.h"
 #include "bki_mapping/inference/parallel_for.h"
+#include "bki_mapping/inference/runs_by_index.h"
 
 namespace bki_mapping {
 
@@ -27,12 +28,12 @@ class PointBins {
                  Workers& workers);
 
   /// Exactly the blocks that points reach, or, with `home_always`, are in.
-  const IndexNumbering& blocks() const { return blocks_; }
+  const IndexNumbering& blocks() const { return blocks_.indices(); }
 
   /// The points of a block by its number in blocks(), run by run, in an order that does not depend on the
   /// number of workers.
-  const PointRun* begin(std::size_t block) const { return runs_.data() + run_begin_[block]; }
-  const PointRun* end(std::size_t block) const { return runs_.data() + run_begin_[block + 1]; }
+  const PointRun* begin(std::size_t block) const { return blocks_.begin(block); }
+  const PointRun* end(std::size_t block) const { return blocks_.end(block); }
   /// Whether all points are of one class.
   bool oneClass() const { return one_class_; }
 
@@ -71,10 +72,7 @@ class PointBins {
   std::size_t used_ = 0;
   std::vector<Scratch> scratch_;  ///< one a worker
   std::vector<Group> groups_;
-  IndexNumbering blocks_;
-  std::vector<std::uint32_t> block_of_run_;
-  std::vector<std::uint32_t> run_begin_;  ///< of each block; one more than blocks
-  std::vector<PointRun> runs_;            ///< by block
+  RunsByIndex<PointRun> blocks_;
 };
 
 }  // namespace bki_mapping
