@@ -14,6 +14,7 @@ add_library(bki_mapping_core SHARED
   src/inference/downsample.cpp
   src/inference/inner_loops.cpp
   src/inference/inner_loops_generic.cpp
+  src/inference/kernel_table.cpp
   src/inference/map_updater.cpp
   src/inference/occlusion.cpp
   src/inference/parallel_for.cpp

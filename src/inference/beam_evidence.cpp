@@ -17,6 +17,17 @@ float weightAt(BeamWeight weight, float rho) {
   }
 }
 
+/// @return whether anything is left. (Written so that compilers use vector instructions.)
+bool scaleAndLimit(float scale, float limit, float* sums) {
+  unsigned some = 0;
+  for (int v = 0; v < kBlockVoxels; ++v) {
+    const float sum = sums[v] * scale, limited = sum < limit ? sum : limit;
+    sums[v] = limited > 0.0f ? limited : 0.0f;  // the kernel's tail may be a little below 0
+    some |= limited > 0.0f ? 1u : 0u;
+  }
+  return some != 0;
+}
+
 }  // namespace
 
 const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {
@@ -44,12 +55,7 @@ void BeamEvidence::addTo(std::size_t, const BlockIndex& index, Block& block, Evi
                           field_->blockAt(index), weight_, sums);
   }
   scratch.leaveHeldAlone();
-  float most = 0.0f;
-  for (int v = 0; v < kBlockVoxels; ++v) {
-    sums[v] = std::min(sums[v] * field_->kernel().scale, scratch.limits.free);
-    most = std::max(most, sums[v]);
-  }
-  if (most > 0.0f) block.add(kFreeClass, sums);
+  if (scaleAndLimit(field_->kernel().scale, scratch.limits.free, sums)) block.add(kFreeClass, sums);
 }
 
 }  // namespace bki_mapping

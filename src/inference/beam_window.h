@@ -13,15 +13,8 @@ namespace {
 
 /// Octants of 4 x 4 x 4 voxels and tiles of 2 x 2 x 2 voxels: a side, and in all.
 constexpr int kOctantEdge = 2, kOctants = 8;
-constexpr int kTileEdge = 4, kTiles = 64;
+constexpr int kTileEdge = 4, kTiles = 64, kOctantTiles = 8;
 static_assert(kBlockEdge == 8);
-
-/// The number of an octant's n-th tile in the block.
-[[gnu::always_inline]] inline int tileInOctant(int octant, int n) {
-  const int i = 2 * (octant & 1) + (n & 1), j = 2 * (octant >> 1 & 1) + (n >> 1 & 1),
-            k = 2 * (octant >> 2) + (n >> 2);
-  return i + kTileEdge * (j + kTileEdge * k);
-}
 
 /// A ball of voxels, and which beams reach it.
 struct Place {
@@ -30,23 +23,16 @@ struct Place {
   float nearest;  ///< its distance from the sensor [m]; negative where it holds the sensor
 };
 
-/// All octants and tiles of a block.
+/// All octants and tiles of a block, and how they are numbered: octant by octant.
 struct Places {
   std::int32_t cx[kOctants + kTiles], cy[kOctants + kTiles], cz[kOctants + kTiles];
   float chord2[kOctants + kTiles], nearest[kOctants + kTiles];
   float r[kOctants + kTiles];  ///< distances of their centres from the sensor [m]
 
   Place octant(int n) const { return {cx[n], cy[n], cz[n], chord2[n], nearest[n]}; }
-  Place tile(int n) const { return octant(kOctants + n); }
-};
-
-/// A tile. Lengths are in units of the kernel's length.
-struct Tile {
-  std::int32_t cx, cy, cz;  ///< unit direction of its centre from the sensor [kDirectionStep]
-  float r;                  ///< distance of its centre from the sensor
-  float half;               ///< half a voxel
-  float length;             ///< of the kernel [m]
-  int first_voxel;          ///< place in the block
+  /// Of an octant.
+  Place tile(int octant_number, int n) const { return octant(firstTile(octant_number) + n); }
+  static int firstTile(int octant) { return kOctants + kOctantTiles * octant; }
 };
 
 /// The centre of one of edge^3 cubes into which a block is cut, relative to the sensor [m].
@@ -70,11 +56,24 @@ template <int kEdge>
   return (block.length + kToVoxel * static_cast<float>(block.resolution)) * 1.0001f;
 }
 
+/// The place in its block of an octant's n-th tile, and of the tile's first voxel.
+[[gnu::always_inline]] inline int tileInBlock(int octant, int n) {
+  const int i = 2 * (octant & 1) + (n & 1), j = 2 * (octant >> 1 & 1) + (n >> 1 & 1),
+            k = 2 * (octant >> 2) + (n >> 2);
+  return i + kTileEdge * (j + kTileEdge * k);
+}
+[[gnu::always_inline]] inline int firstVoxel(int octant, int n) {
+  const int i = 4 * (octant & 1) + 2 * (n & 1), j = 4 * (octant >> 1 & 1) + 2 * (n >> 1 & 1),
+            k = 4 * (octant >> 2) + 2 * (n >> 2);
+  return i + kBlockEdge * (j + kBlockEdge * k);
+}
+
 template <int kEdge>
 [[gnu::always_inline]] inline void findPlacesOf(const BeamBlock& block, int first, Places& places) {
   const float radius = radiusOf<kEdge>(block);
   for (int n = 0; n < kEdge * kEdge * kEdge; ++n) {
-    const Centre c = centreOf<kEdge>(block, n);
+    const Centre c =
+        centreOf<kEdge>(block, kEdge == kTileEdge ? tileInBlock(n / kOctantTiles, n % kOctantTiles) : n);
     const double r2 = c.x * c.x + c.y * c.y + c.z * c.z;
     const double r = std::sqrt(r2 > 1e-12 ? r2 : 1e-12), steps = 1.0 / (r * kDirectionStep);
     const auto rf = static_cast<float>(r);
@@ -93,22 +92,6 @@ template <int kEdge>
 void findPlaces(const BeamBlock& block, Places& places) {
   findPlacesOf<kOctantEdge>(block, 0, places);
   findPlacesOf<kTileEdge>(block, kOctants, places);
-}
-
-[[gnu::always_inline]] inline Tile tileOf(const BeamBlock& block, const Places& places, int n) {
-  const float inverse_length = 1.0f / block.length;
-  const Place place = places.tile(n);
-  Tile tile;
-  tile.cx = place.cx;
-  tile.cy = place.cy;
-  tile.cz = place.cz;
-  tile.r = places.r[kOctants + n] * inverse_length;
-  tile.half = 0.5f * static_cast<float>(block.resolution) * inverse_length;
-  tile.length = block.length;
-  tile.first_voxel =
-      2 *
-      (n % kTileEdge + kBlockEdge * (n / kTileEdge % kTileEdge + kBlockEdge * (n / (kTileEdge * kTileEdge))));
-  return tile;
 }
 
 /// The cells of the beams that come within reach of each of kCount balls.

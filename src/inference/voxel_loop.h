@@ -3,25 +3,15 @@
 /// it, and none has to be picked.
 #pragma once
 
+#include "beam_tile.h"
 #include "beam_window.h"
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_cells.h"
-#include "bki_mapping/inference/kernel.h"
+#include "lane_kernel.h"
 #include "lanes.h"
 
 namespace bki_mapping {
 namespace {
-
-/// Weights along beams, 0 unless 0 < rho < 1.
-template <BeamWeight kWeight>
-[[gnu::always_inline]] inline FloatLanes weightAt(FloatLanes rho) {
-  if constexpr (kWeight == BeamWeight::kBilinear) {
-    return greater(lesser(rho, 1.0f - rho), FloatLanes{});
-  } else {
-    const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
-    return ((rho > 0.0f) & (rho < 1.0f)) ? weight : FloatLanes{};
-  }
-}
 
 /// With so many beams in its window an octant is better added voxel by voxel, measured at 0.3 m; with less
 /// the rows of the table that a voxel covers hold too few each.
@@ -63,23 +53,23 @@ template <BeamWeight kWeight>
 void addOctantByVoxels(const BeamArrays& beams, const BeamBlock& block, int octant, float* sums) {
   OctantVoxels voxels;
   findVoxels(block, octant, voxels);
-  const float inverse_length = 1.0f / block.length;
+  const LaneKernel kernel;
+  const float root = 2.0f * LaneKernel::kScale / (block.length * block.length);
   for (int n = 0; n < kOctantVoxels; ++n) {
     const std::int32_t cx = voxels.cx[n], cy = voxels.cy[n], cz = voxels.cz[n];
     const float r = voxels.r[n];
-    const float scale = kDirectionStep * kDirectionStep * 0.5f;           // to 1 - cos
-    const float scale2 = 2.0f * r * r * inverse_length * inverse_length;  // [kernel lengths]
+    const float scale = kDirectionStep * kDirectionStep * 0.5f;  // to 1 - cos
+    const float scale2 = r * r * root;
     FloatLanes sum = {};
     forEachRange(beams.begin, voxels.windows, n, [&](BeamRange range) {
       for (std::uint32_t b = range.first; b < range.last; b += kLanes) {
         const FloatLanes dx = toFloat(cx - load(beams.ux + b)), dy = toFloat(cy - load(beams.uy + b)),
                          dz = toFloat(cz - load(beams.uz + b));
         const FloatLanes half_chord2 = scale * (dx * dx + dy * dy + dz * dz);
-        const FloatLanes distance = squareRoot(scale2 * half_chord2 * (1.0f - 0.5f * half_chord2));
-        const FloatLanes kernel = sparseKernel(distance, greater(1.0f - distance, FloatLanes{}));
+        const FloatLanes t = scale2 * half_chord2 * (1.0f - 0.5f * half_chord2) + LaneKernel::kShift;
         const FloatLanes rho = r * (1.0f - half_chord2) * load(beams.inverse_length + b);
         const IntLanes counts = countUp() < static_cast<std::int32_t>(range.last - b);
-        sum += counts ? weightAt<kWeight>(rho) * kernel : FloatLanes{};
+        sum += counts ? Weight<kWeight>::at(rho - Weight<kWeight>::kMiddle) * kernel(t) : FloatLanes{};
       }
     });
     sums[voxelInOctant(octant, n)] += sumOf<kLanes>(reinterpret_cast<const float*>(&sum));
