@@ -141,6 +141,18 @@ struct Table {
 }
 #endif
 
+/// The first `count` of kLanes numbers, and 0 for the others. @param count may be more.
+[[gnu::always_inline]] inline FloatLanes loadFirst(std::int32_t count, const float* from) {
+#if defined(__AVX512F__)
+  const __mmask16 counts =
+      _mm512_cmplt_epi32_mask(reinterpret_cast<__m512i>(countUp()), _mm512_set1_epi32(count));
+  return _mm512_maskz_loadu_ps(counts, from);
+#else
+  const IntLanes counts = countUp() < count;
+  return counts ? load(from) : FloatLanes{};
+#endif
+}
+
 typedef float FourLanes __attribute__((vector_size(16)));
 
 /// Four sums, of kCount numbers each, one behind the other.

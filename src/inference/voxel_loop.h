@@ -54,22 +54,25 @@ void addOctantByVoxels(const BeamArrays& beams, const BeamBlock& block, int octa
   OctantVoxels voxels;
   findVoxels(block, octant, voxels);
   const LaneKernel kernel;
-  const float root = 2.0f * LaneKernel::kScale / (block.length * block.length);
+  const float inverse_length2 = 1.0f / (block.length * block.length);
   for (int n = 0; n < kOctantVoxels; ++n) {
     const std::int32_t cx = voxels.cx[n], cy = voxels.cy[n], cz = voxels.cz[n];
     const float r = voxels.r[n];
-    const float scale = kDirectionStep * kDirectionStep * 0.5f;  // to 1 - cos
-    const float scale2 = r * r * root;
+    // 1 - cos is `half` times the squared chord of directions, and d^2 = r^2 (1 - cos) (2 - (1 - cos)).
+    constexpr float kHalf = kDirectionStep * kDirectionStep * 0.5f;
+    const float scale = LaneKernel::kScale * r * r * inverse_length2 * kHalf;
     FloatLanes sum = {};
     forEachRange(beams.begin, voxels.windows, n, [&](BeamRange range) {
       for (std::uint32_t b = range.first; b < range.last; b += kLanes) {
         const FloatLanes dx = toFloat(cx - load(beams.ux + b)), dy = toFloat(cy - load(beams.uy + b)),
                          dz = toFloat(cz - load(beams.uz + b));
-        const FloatLanes half_chord2 = scale * (dx * dx + dy * dy + dz * dz);
-        const FloatLanes t = scale2 * half_chord2 * (1.0f - 0.5f * half_chord2) + LaneKernel::kShift;
-        const FloatLanes rho = r * (1.0f - half_chord2) * load(beams.inverse_length + b);
-        const IntLanes counts = countUp() < static_cast<std::int32_t>(range.last - b);
-        sum += counts ? Weight<kWeight>::at(rho - Weight<kWeight>::kMiddle) * kernel(t) : FloatLanes{};
+        const FloatLanes chord2 = dx * dx + dy * dy + dz * dz;
+        const FloatLanes t = chord2 * (2.0f * scale - scale * kHalf * chord2) + LaneKernel::kShift;
+        // Without an inverse length beams have no weight.
+        const FloatLanes inverse_length =
+            loadFirst(static_cast<std::int32_t>(range.last - b), beams.inverse_length + b);
+        const FloatLanes rho = (r - r * kHalf * chord2) * inverse_length - Weight<kWeight>::kMiddle;
+        sum += Weight<kWeight>::at(rho) * kernel(t);
       }
     });
     sums[voxelInOctant(octant, n)] += sumOf<kLanes>(reinterpret_cast<const float*>(&sum));
