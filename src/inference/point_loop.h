@@ -2,6 +2,7 @@
 /// own.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #if defined(__AVX2__)
 #include <immintrin.h>
@@ -10,6 +11,8 @@
 #include "bki_mapping/core/block.h"
 #include "bki_mapping/inference/kernel.h"
 #include "bki_mapping/inference/local_point.h"
+#include "lane_kernel.h"
+#include "lanes.h"
 
 namespace bki_mapping {
 namespace {
@@ -26,7 +29,74 @@ struct HaloLayers {
 // Adding points to the eight voxel centres around each, for a kernel that reaches no farther than one voxel:
 // no other can be nearer than that. They may lie outside the block, hence the halo. A point that reaches the
 // block has -1 <= x < 8, and the same for y and z; rounding may have made it 8.
-#if defined(__AVX2__)
+#if defined(__AVX512F__)
+
+/// Adds eight values to the halo's voxels from `first` on: two rows of two, in each of two layers.
+[[gnu::always_inline]] inline void addCorners(__m128 low, __m128 high, float* first) {
+  for (const __m128& layer : {low, high}) {
+    __m64* const row = reinterpret_cast<__m64*>(first);
+    __m64* const next_row = reinterpret_cast<__m64*>(first + kHaloEdge);
+    const __m128 sum = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + layer;
+    _mm_storel_pi(row, sum);
+    _mm_storeh_pi(next_row, sum);
+    first += kHaloEdge * kHaloEdge;
+  }
+}
+
+/// Two points at a time.
+HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
+  static_assert(sizeof(LocalPoint) == 16);
+  const LaneKernel kernel;
+  const float scale = LaneKernel::kScale * inverse_reach2;
+  const __m256i most = _mm256_set1_epi32(kHaloEdge - 2);
+  const __m256i steps = _mm256_setr_epi16(1, 0, kHaloEdge, 0, kHaloEdge * kHaloEdge, 0, 0, 0,  //
+                                          1, 0, kHaloEdge, 0, kHaloEdge * kHaloEdge, 0, 0, 0);
+  const auto eachOf = [](int n) {
+    return _mm512_setr_epi32(n, n, n, n, n, n, n, n, n + 4, n + 4, n + 4, n + 4, n + 4, n + 4, n + 4, n + 4);
+  };
+  const __m512i xs = eachOf(0), ys = eachOf(1), zs = eachOf(2);
+  const FloatLanes right = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1},
+                   behind = {0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1},
+                   above = {0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1};
+  __m256i lowest = most, highest = _mm256_setzero_si256();
+  const auto addTwo = [&](const LocalPoint* points, bool both) {
+    // x, y and z side by side; what stands behind them comes to nothing.
+    const __m256 c = _mm256_loadu_ps(&points->x) + 1.0f;
+    const __m256i index = _mm256_min_epi32(_mm256_cvttps_epi32(c), most);
+    const __m512 inside = _mm512_castps256_ps512(c - _mm256_cvtepi32_ps(index));
+    lowest = _mm256_min_epi32(lowest, index);
+    highest = _mm256_max_epi32(highest, index);
+    __m256i first = _mm256_madd_epi16(index, steps);
+    first = _mm256_add_epi32(first, _mm256_shuffle_epi32(first, _MM_SHUFFLE(1, 0, 3, 2)));
+    first = _mm256_add_epi32(first, _mm256_shuffle_epi32(first, _MM_SHUFFLE(2, 3, 0, 1)));
+
+    const FloatLanes dx = _mm512_permutexvar_ps(xs, inside) - right,
+                     dy = _mm512_permutexvar_ps(ys, inside) - behind,
+                     dz = _mm512_permutexvar_ps(zs, inside) - above;
+    const __m512 values = kernel((dx * dx + dy * dy + dz * dz) * scale + LaneKernel::kShift);
+    addCorners(_mm512_castps512_ps128(values), _mm512_extractf32x4_ps(values, 1),
+               halo + _mm256_extract_epi32(first, 0));
+    if (both) {
+      addCorners(_mm512_extractf32x4_ps(values, 2), _mm512_extractf32x4_ps(values, 3),
+                 halo + _mm256_extract_epi32(first, 4));
+    }
+  };
+  std::size_t p = 0;
+  for (; p + 2 <= run.count; p += 2) addTwo(run.points + p, true);
+  if (p < run.count) {
+    const LocalPoint last[2] = {run.points[p], run.points[p]};
+    addTwo(last, false);
+  }
+  const auto least = [](__m256i both) {
+    return std::min(_mm256_extract_epi32(both, 2), _mm256_extract_epi32(both, 6));
+  };
+  const auto greatest = [](__m256i both) {
+    return std::max(_mm256_extract_epi32(both, 2), _mm256_extract_epi32(both, 6));
+  };
+  return {least(lowest), greatest(highest) + 1};
+}
+
+#elif defined(__AVX2__)
 
 typedef float Eight __attribute__((vector_size(8 * sizeof(float))));
 
