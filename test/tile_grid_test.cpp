@@ -51,7 +51,11 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
           const TileGrid grid(geometry, origin, edge);
           TilePlaces places;
           innerLoopsFor(set).place_points(grid, points.span(), kBatch - 3, places);
+          TilePlaces cells;
+          innerLoopsFor(set).place_cells(grid, points.span(), kBatch - 3, cells);
           for (std::size_t i = 0; i < kBatch - 3; ++i) {
+            ASSERT_EQ(cells.tileOf(i), places.tileOf(i)) << set << ", edge " << edge << ", point " << i;
+            ASSERT_EQ(cells.cell[i], places.cell[i]) << set << ", edge " << edge << ", point " << i;
             const Eigen::Vector3d p = origin + points.at(i);
             const VoxelIndex v = geometry.voxelAt(p);
             const GridIndex tile{floorDivide(v.x, edge), floorDivide(v.y, edge), floorDivide(v.z, edge)};
@@ -72,14 +76,16 @@ TEST(TileGrid, PlacesPointsOutOfThisWorldSomewhere) {
   Points points;
   for (const float far : {1e9f, -1e9f, 1e12f, -3e38f, 3e38f}) points.add(far, -far, 1.0f);
   for (const std::string& set : instructionSets()) {
+    const InnerLoops& loops = innerLoopsFor(set);
     for (const int edge : {8, 24, 32}) {
-      TilePlaces places;
-      innerLoopsFor(set).place_points(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(),
-                                      points.x.size(), places);
-      for (std::size_t i = 0; i < points.x.size(); ++i) {
-        EXPECT_GE(places.cell[i], 0) << set << ", point " << i;
-        EXPECT_LT(places.cell[i], edge * edge * edge) << set << ", point " << i;
-        EXPECT_GT(std::abs(static_cast<double>(places.tile[0][i])) * edge, 9e8) << set << ", point " << i;
+      for (const auto place : {loops.place_points, loops.place_cells}) {
+        TilePlaces places;
+        place(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(), points.x.size(), places);
+        for (std::size_t i = 0; i < points.x.size(); ++i) {
+          EXPECT_GE(places.cell[i], 0) << set << ", point " << i;
+          EXPECT_LT(places.cell[i], edge * edge * edge) << set << ", point " << i;
+          EXPECT_GT(std::abs(static_cast<double>(places.tile[0][i])) * edge, 9e8) << set << ", point " << i;
+        }
       }
     }
   }

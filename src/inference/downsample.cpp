@@ -80,7 +80,7 @@ std::uint32_t Downsampler::Input::findNumber(const GridIndex& tile, KnownTile& k
 
 void Downsampler::Input::place() {
   const std::size_t count = count_;
-  owner_->loops_->place_points(*owner_->grid_, {{x_, y_, z_}}, count, places_);
+  owner_->loops_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
   if (points_.size() < size_ + count) {
     points_.resize(2 * (size_ + count));
     tile_of_.resize(points_.size());

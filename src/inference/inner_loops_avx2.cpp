@@ -6,8 +6,8 @@
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsAvx2() {
-  static const InnerLoops loops = {"avx2",           sumPointsLoop,   addBeamsLoop,
-                                   addSomeBeamsLoop, placePointsLoop, reachBlocksLoop};
+  static const InnerLoops loops = {"avx2",          sumPointsLoop,  addBeamsLoop,   addSomeBeamsLoop,
+                                   placePointsLoop, placeCellsLoop, reachBlocksLoop};
   return loops;
 }
 

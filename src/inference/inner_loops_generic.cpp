@@ -6,8 +6,8 @@
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsGeneric() {
-  static const InnerLoops loops = {"generic",        sumPointsLoop,   addBeamsLoop,
-                                   addSomeBeamsLoop, placePointsLoop, reachBlocksLoop};
+  static const InnerLoops loops = {"generic",       sumPointsLoop,  addBeamsLoop,   addSomeBeamsLoop,
+                                   placePointsLoop, placeCellsLoop, reachBlocksLoop};
   return loops;
 }
 

@@ -8,7 +8,13 @@ TileGrid::TileGrid(const GridGeometry& cell_grid, const Eigen::Vector3d& sensor,
     : cells(cell_grid),
       edge(tile_edge),
       origin{sensor.x(), sensor.y(), sensor.z()},
-      per_metre(1.0 / cell_grid.resolution()) {}
+      per_metre(1.0 / cell_grid.resolution()) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double quotient = origin[axis] * per_metre;
+    home[axis] = floorToInt(std::clamp(quotient, -kFarthest, kFarthest) / edge);
+    from_home[axis] = static_cast<float>(quotient - static_cast<double>(home[axis]) * edge);
+  }
+}
 
 void TileGrid::placeExactly(const PointSpan& points, std::size_t i, TilePlaces& places) const {
   Eigen::Vector3d point;

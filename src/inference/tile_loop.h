@@ -7,6 +7,12 @@
 namespace bki_mapping {
 namespace {
 
+/// Of numbers that an int holds.
+[[gnu::always_inline]] inline std::int32_t floorOf(float x) {
+  const auto whole = static_cast<std::int32_t>(x);
+  return whole - static_cast<std::int32_t>(static_cast<float>(whole) > x);
+}
+
 /// One axis of placePointsLoop. @param[in,out] unsure set where rounding may have moved a point across a
 /// face.
 template <int kAxis>
@@ -33,17 +39,57 @@ void placeOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t coun
   }
 }
 
-void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
-  alignas(64) std::int32_t unsure[kBatch];
-  placeOnAxis<0>(grid, points, count, places, unsure);
-  placeOnAxis<1>(grid, points, count, places, unsure);
-  placeOnAxis<2>(grid, points, count, places, unsure);
+/// The same of cells and tiles alone, in single precision: wherever that leaves a doubt, the point is unsure.
+template <int kAxis>
+void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
+                     std::int32_t* unsure) {
+  const auto per_metre = static_cast<float>(grid.per_metre);
+  const float first = grid.from_home[kAxis], per_edge = 1.0f / static_cast<float>(grid.edge);
+  const std::int32_t whole_edge = grid.edge, home = grid.home[kAxis];
+  const std::int32_t stride = kAxis == 0 ? 1 : (kAxis == 1 ? whole_edge : whole_edge * whole_edge);
+  for (std::size_t i = 0; i < count; ++i) {
+    float quotient = points.axes[kAxis][i] * per_metre + first;
+    // Rounding errs by less than 3 * 2^-24 of its terms; farther out than this that is more than a half.
+    constexpr float kFar = 0x1.0p22f, kRounding = 4.0f * 0x1.0p-24f;
+    quotient = quotient < kFar ? quotient : kFar;
+    quotient = quotient > -kFar ? quotient : -kFar;
+    const float size = quotient > 0.0f ? quotient : -quotient;
+    const float margin = kRounding * (size + 2.0f * TileGrid::kMostEdge);
+    const std::int32_t floor = floorOf(quotient);
+    const float middle = quotient - (static_cast<float>(floor) + 0.5f);
+    const float aside = middle > 0.0f ? middle : -middle;
+    // Half a cell keeps the quotient by the edge away from whole numbers.
+    const std::int32_t tile = floorOf((static_cast<float>(floor) + 0.5f) * per_edge);
+    places.tile[kAxis][i] = home + tile;
+    places.cell[i] = (kAxis == 0 ? 0 : places.cell[i]) + stride * (floor - tile * whole_edge);
+    unsure[i] = (kAxis == 0 ? 0 : unsure[i]) | static_cast<std::int32_t>(aside >= 0.5f - margin);
+  }
+}
+
+void placeExactlyWhere(const std::int32_t* unsure, const TileGrid& grid, const PointSpan& points,
+                       std::size_t count, TilePlaces& places) {
   std::int32_t any = 0;
   for (std::size_t i = 0; i < count; ++i) any |= unsure[i];
   if (any == 0) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (unsure[i] != 0) grid.placeExactly(points, i, places);
   }
+}
+
+void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+  alignas(64) std::int32_t unsure[kBatch];
+  placeOnAxis<0>(grid, points, count, places, unsure);
+  placeOnAxis<1>(grid, points, count, places, unsure);
+  placeOnAxis<2>(grid, points, count, places, unsure);
+  placeExactlyWhere(unsure, grid, points, count, places);
+}
+
+void placeCellsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+  alignas(64) std::int32_t unsure[kBatch];
+  placeCellOnAxis<0>(grid, points, count, places, unsure);
+  placeCellOnAxis<1>(grid, points, count, places, unsure);
+  placeCellOnAxis<2>(grid, points, count, places, unsure);
+  placeExactlyWhere(unsure, grid, points, count, places);
 }
 
 /// The squared distance from a point to the nearest voxel centre of the block before its own, of its own, and

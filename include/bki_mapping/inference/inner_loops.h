@@ -29,6 +29,8 @@ struct InnerLoops {
   /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
   /// GridGeometry::voxelAt, to the bit.
   void (*place_points)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
+  /// The same, of cells and tiles alone; where a point is inside a tile is left open.
+  void (*place_cells)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
   /// Finds the blocks that placed points reach, tiles being blocks. @param reach [voxels], at most 8.
   void (*reach_blocks)(std::size_t count, float reach, TilePlaces& places);
 };

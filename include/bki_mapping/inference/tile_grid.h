@@ -46,7 +46,9 @@ struct TileGrid {
   int edge;
   // The same in plain numbers, for the inner loops.
   double origin[3];
-  double per_metre;  ///< cells
+  double per_metre;      ///< cells
+  std::int32_t home[3];  ///< the tile in which the origin is
+  float from_home[3];    ///< of the origin, from that tile's first cell's face [cells]
 };
 
 }  // namespace bki_mapping
