@@ -22,7 +22,8 @@ std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& bru
     for (int v = 0; v < kBlockVoxels; ++v) {
       const reference::Value truth = brute.evidence(GridGeometry::voxelOf(entry.index, v), id);
       const double tolerance = 2e-5 * config.kernel.scale + 2e-5 * truth.sum + truth.slack + room;
-      faults += std::abs((plane ? plane[v] : 0.0f) - truth.sum) > tolerance;
+      const float got = plane ? plane[v] : 0.0f;
+      faults += std::abs(got - truth.sum) > tolerance || got < 0.0f;
     }
   }
   return faults;

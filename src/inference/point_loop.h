@@ -166,6 +166,11 @@ HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
 
 #endif
 
+/// The kernel's tail may be a little below 0.
+[[gnu::always_inline]] inline float notNegative(float sum) {
+  return sum > 0.0f ? sum : 0.0f;
+}
+
 Block::Layers sumOfNearestEight(const PointRun* runs, std::size_t count, float inverse_reach2, float scale,
                                 float* sums) {
   alignas(64) float halo[kHaloVoxels];
@@ -181,7 +186,7 @@ Block::Layers sumOfNearestEight(const PointRun* runs, std::size_t count, float i
   for (int k = 0; k < kBlockEdge; ++k) {
     in += kHaloEdge + 1;
     for (int j = 0; j < kBlockEdge; ++j) {
-      for (int i = 0; i < kBlockEdge; ++i) out[i] = scale * in[i];
+      for (int i = 0; i < kBlockEdge; ++i) out[i] = notNegative(scale * in[i]);
       in += kHaloEdge;
       out += kBlockEdge;
     }
@@ -192,23 +197,30 @@ Block::Layers sumOfNearestEight(const PointRun* runs, std::size_t count, float i
   return {first > 0 ? first : 0, last < kBlockEdge - 1 ? last + 1 : kBlockEdge};
 }
 
-/// For a kernel of any reach: the rows of eight voxels that a point may reach.
+/// For a kernel of any reach: the voxels of a layer side by side, as many rows at a time as lanes hold.
 void addPointsToRows(const PointRun& run, float reach, float inverse_reach2, float* sums) {
+  constexpr int kRows = kLanes > kBlockEdge ? kLanes / kBlockEdge : 1, kStep = kRows * kBlockEdge;
   const auto first = [reach](float c) { return c > reach ? static_cast<int>(c - reach) : 0; };
   const auto last = [reach](float c) {
     return c + reach < kBlockEdge - 1 ? static_cast<int>(c + reach) : kBlockEdge - 1;
   };
+  const LaneKernel kernel;
+  const float scale = LaneKernel::kScale * inverse_reach2;
+  FloatLanes in_row, row_of;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    in_row[lane] = static_cast<float>(lane % kBlockEdge);
+    row_of[lane] = static_cast<float>(lane / kBlockEdge);
+  }
   for (std::size_t p = 0; p < run.count; ++p) {
     const LocalPoint point = run.points[p];
     for (int k = first(point.z); k <= last(point.z); ++k) {
       const float dz = static_cast<float>(k) - point.z;
-      for (int j = first(point.y); j <= last(point.y); ++j) {
-        const float dy = static_cast<float>(j) - point.y;
-        const float yz2 = dy * dy + dz * dz;
-        float* row = sums + kBlockEdge * (j + kBlockEdge * k);
-        for (int i = 0; i < kBlockEdge; ++i) {
-          const float dx = static_cast<float>(i) - point.x;
-          row[i] += sparseKernel((dx * dx + yz2) * inverse_reach2);
+      for (int j = first(point.y) / kRows * kRows; j <= last(point.y); j += kRows) {
+        const FloatLanes dy = row_of + (static_cast<float>(j) - point.y), yz2 = dy * dy + dz * dz;
+        float* const rows = sums + kBlockEdge * (j + kBlockEdge * k);
+        for (int i = 0; i < kStep; i += kLanes) {
+          const FloatLanes dx = in_row + (static_cast<float>(i) - point.x);
+          store(rows + i, load(rows + i) + kernel((dx * dx + yz2) * scale + LaneKernel::kShift));
         }
       }
     }
@@ -220,7 +232,7 @@ Block::Layers sumPointsLoop(const PointRun* runs, std::size_t count, float reach
   if (reach <= 1.0f) return sumOfNearestEight(runs, count, inverse_reach2, scale, sums);
   for (int v = 0; v < kBlockVoxels; ++v) sums[v] = 0.0f;
   for (std::size_t r = 0; r < count; ++r) addPointsToRows(runs[r], reach, inverse_reach2, sums);
-  for (int v = 0; v < kBlockVoxels; ++v) sums[v] *= scale;
+  for (int v = 0; v < kBlockVoxels; ++v) sums[v] = notNegative(scale * sums[v]);
   return {};
 }
 
