@@ -30,13 +30,15 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
   inverse_length_.assign(padded, 0.0f);
   workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-      beams_.ends[b] = beams.ends[order_[b]];
-      const Eigen::Vector3d end = beams_.ends[b].cast<double>();
+      // Not read back from where it goes: that would wait for memory.
+      const Eigen::Vector3f beam = beams.ends[order_[b]];
+      const Eigen::Vector3d end = beam.cast<double>();
       const double inverse = 1.0 / end.norm(), steps = inverse / static_cast<double>(kDirectionStep);
       ux_[b] = static_cast<std::int32_t>(end.x() * steps);
       uy_[b] = static_cast<std::int32_t>(end.y() * steps);
       uz_[b] = static_cast<std::int32_t>(end.z() * steps);
       inverse_length_[b] = static_cast<float>(inverse);
+      beams_.ends[b] = beam;
     }
   });
   const auto last = inverse_length_.begin() + static_cast<std::ptrdiff_t>(count);
