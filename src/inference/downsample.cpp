@@ -200,7 +200,10 @@ void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
     if (code == kNone) continue;
     const MergedPoints& merged = groups_[code >> kCellBits].merged;
     const std::size_t cell = code & ((1u << kCellBits) - 1);
-    output.points[place] = {merged.x[cell], merged.y[cell], merged.z[cell]};
+    Eigen::Vector3f& point = output.points[place];
+    point.x() = merged.x[cell];
+    point.y() = merged.y[cell];
+    point.z() = merged.z[cell];
     output.labels[place++] = merged.labels[cell];
   }
 }

@@ -13,33 +13,8 @@ namespace {
   return whole - static_cast<std::int32_t>(static_cast<float>(whole) > x);
 }
 
-/// One axis of placePointsLoop. @param[in,out] unsure set where rounding may have moved a point across a
-/// face.
-template <int kAxis>
-void placeOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
-                 std::int32_t* unsure) {
-  const double origin = grid.origin[kAxis], per_metre = grid.per_metre;
-  const double edge = grid.edge, per_edge = 1.0 / edge;
-  const std::int32_t whole_edge = grid.edge;
-  const std::int32_t stride = kAxis == 0 ? 1 : (kAxis == 1 ? whole_edge : whole_edge * whole_edge);
-  for (std::size_t i = 0; i < count; ++i) {
-    double quotient = (origin + static_cast<double>(points.axes[kAxis][i])) * per_metre;
-    quotient = quotient < TileGrid::kFarthest ? quotient : TileGrid::kFarthest;
-    quotient = quotient > -TileGrid::kFarthest ? quotient : -TileGrid::kFarthest;
-    const std::int32_t floor = floorToInt(quotient);
-    // Half a cell keeps the quotient by the edge away from whole numbers.
-    const std::int32_t tile = floorToInt((floor + 0.5) * per_edge);
-    const double above = quotient - floor;
-    const std::int32_t near_face = static_cast<std::int32_t>(above <= kFaceMargin) |
-                                   static_cast<std::int32_t>(above >= 1.0 - kFaceMargin);
-    places.tile[kAxis][i] = tile;
-    places.inside[kAxis][i] = static_cast<float>(quotient - (tile * edge + 0.5));
-    places.cell[i] = (kAxis == 0 ? 0 : places.cell[i]) + stride * (floor - tile * whole_edge);
-    unsure[i] = (kAxis == 0 ? 0 : unsure[i]) | near_face;
-  }
-}
-
-/// The same of cells and tiles alone, in single precision: wherever that leaves a doubt, the point is unsure.
+/// Cells and tiles on one axis, in single precision. @param[in,out] unsure set where rounding may have moved a
+/// point across a face.
 template <int kAxis>
 void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
                      std::int32_t* unsure) {
@@ -66,6 +41,13 @@ void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t 
   }
 }
 
+void placeCellsOnAxes(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
+                      std::int32_t* unsure) {
+  placeCellOnAxis<0>(grid, points, count, places, unsure);
+  placeCellOnAxis<1>(grid, points, count, places, unsure);
+  placeCellOnAxis<2>(grid, points, count, places, unsure);
+}
+
 void placeExactlyWhere(const std::int32_t* unsure, const TileGrid& grid, const PointSpan& points,
                        std::size_t count, TilePlaces& places) {
   std::int32_t any = 0;
@@ -76,19 +58,22 @@ void placeExactlyWhere(const std::int32_t* unsure, const TileGrid& grid, const P
   }
 }
 
-void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+void placeCellsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
   alignas(64) std::int32_t unsure[kBatch];
-  placeOnAxis<0>(grid, points, count, places, unsure);
-  placeOnAxis<1>(grid, points, count, places, unsure);
-  placeOnAxis<2>(grid, points, count, places, unsure);
+  placeCellsOnAxes(grid, points, count, places, unsure);
   placeExactlyWhere(unsure, grid, points, count, places);
 }
 
-void placeCellsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
   alignas(64) std::int32_t unsure[kBatch];
-  placeCellOnAxis<0>(grid, points, count, places, unsure);
-  placeCellOnAxis<1>(grid, points, count, places, unsure);
-  placeCellOnAxis<2>(grid, points, count, places, unsure);
+  placeCellsOnAxes(grid, points, count, places, unsure);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double origin = grid.origin[axis], per_metre = grid.per_metre, edge = grid.edge;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double quotient = (origin + static_cast<double>(points.axes[axis][i])) * per_metre;
+      places.inside[axis][i] = static_cast<float>(quotient - (places.tile[axis][i] * edge + 0.5));
+    }
+  }
   placeExactlyWhere(unsure, grid, points, count, places);
 }
 
