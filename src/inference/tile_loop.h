@@ -13,8 +13,8 @@ namespace {
   return whole - static_cast<std::int32_t>(static_cast<float>(whole) > x);
 }
 
-/// Cells and tiles on one axis, in single precision. @param[in,out] unsure set where rounding may have moved a
-/// point across a face.
+/// Cells and tiles on one axis, in single precision. @param[in,out] unsure set where rounding may have moved
+/// a point across a face.
 template <int kAxis>
 void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places,
                      std::int32_t* unsure) {
