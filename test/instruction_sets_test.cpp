@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "bki_mapping/inference/beam_evidence.h"
 #include "bki_mapping/inference/map_updater.h"
@@ -55,6 +56,28 @@ TEST(InstructionSets, LinesEqualBruteForceOnEach) {
           const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
           EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u) << set << ", " << scene.name;
         }
+      }
+    }
+  }
+}
+
+TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
+  Workers workers(1);
+  MapperConfig config;
+  const GridGeometry geometry(config.resolution);
+  BeamField field(geometry, config.kernel, BeamIndexType::kTable);
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> anywhere(-9.0f, 9.0f);
+  for (const std::string& set : instructionSets()) {
+    BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kObserved, set);
+    for (int n = 0; n < 200; ++n) {
+      field.setBeams({{0.1, 0.2, 0.05}, {{anywhere(random), anywhere(random), anywhere(random)}}}, workers);
+      evidence.setField(field);
+      SemanticMap map(geometry, config.prior, 4);
+      MapUpdater().update(map, {&evidence}, workers);
+      for (const auto& entry : map.entries()) {
+        const float* plane = entry.block->evidence(kFreeClass);
+        ASSERT_GE(*std::min_element(plane, plane + kBlockVoxels), 0.0f) << set << ", beam " << n;
       }
     }
   }

@@ -1,6 +1,7 @@
 // Placing many points at a time gives what placing one gives, on every instruction set.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "bki_mapping/inference/inner_loops.h"
@@ -20,18 +21,26 @@ struct Points {
   Eigen::Vector3d at(std::size_t i) const { return Eigen::Vector3f(x[i], y[i], z[i]).cast<double>(); }
 };
 
-/// Points anywhere, on faces between cells, and a hair beside these; a full batch.
-Points nastyPoints(double cell) {
+/// Points anywhere, on faces between cells of the map, and a hair beside these; a full batch.
+Points nastyPoints(double cell, const Eigen::Vector3d& origin) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> anywhere(-80.0f, 80.0f);
-  std::uniform_int_distribution<int> face(-300, 300);
+  std::uniform_int_distribution<int> face(-300, 300), hairs(-12, 12);
   Points points;
   while (points.x.size() < kBatch) {
+    const auto beside = [&](int axis) {
+      // A face, near the sensor.
+      const double at = std::round(origin[axis] / cell) + face(random);
+      float place = static_cast<float>(at * cell - origin[axis]);
+      const int count = hairs(random);
+      for (int n = 0; n < std::abs(count); ++n) place = std::nextafter(place, count > 0 ? 1e9f : -1e9f);
+      return place;
+    };
     const auto on = [&] { return static_cast<float>(face(random) * cell); };
     points.add(anywhere(random), anywhere(random), anywhere(random));
     points.add(on(), on(), anywhere(random));
-    points.add(std::nextafter(on(), 1e9f), anywhere(random), std::nextafter(on(), -1e9f));
-    points.add(on(), on(), on());
+    points.add(beside(0), beside(1), beside(2));
+    points.add(beside(0), anywhere(random), beside(2));
   }
   return points;
 }
@@ -46,7 +55,7 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
       for (const int edge : {1, 7, 8, 24, 32}) {
         for (const Eigen::Vector3d& origin : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(-3.7, 1234.56, 2.1),
                                               Eigen::Vector3d(0.3, -0.3, 1.2)}) {
-          const Points points = nastyPoints(cell);
+          const Points points = nastyPoints(cell, origin);
           const GridGeometry geometry(cell);
           const TileGrid grid(geometry, origin, edge);
           TilePlaces places;

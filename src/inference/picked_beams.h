@@ -19,7 +19,7 @@ struct PickedBeams {
   alignas(64) float inverse_length[kMost + kLanes];
   int count = 0;
 
-  /// Makes the n-th beam one that has no weight; pad() the lanes behind the last.
+  /// Fills the lanes behind the last beam with beams that have no weight.
   void pad() {
     for (int n = count; n < count + kLanes; ++n) setNone(n);
   }
@@ -29,6 +29,7 @@ struct PickedBeams {
     __builtin_memset(inverse_length + count, 0, kMultiple * sizeof(float));
     count = (count + kMultiple - 1) / kMultiple * kMultiple;
   }
+  /// Makes the n-th a beam that has no weight.
   void setNone(int n) {
     ux[n] = uy[n] = uz[n] = 0;
     inverse_length[n] = 0.0f;

@@ -58,7 +58,7 @@ void addOctantByVoxels(const BeamArrays& beams, const BeamBlock& block, int octa
   for (int n = 0; n < kOctantVoxels; ++n) {
     const std::int32_t cx = voxels.cx[n], cy = voxels.cy[n], cz = voxels.cz[n];
     const float r = voxels.r[n];
-    // 1 - cos is `half` times the squared chord of directions, and d^2 = r^2 (1 - cos) (2 - (1 - cos)).
+    // 1 - cos is kHalf times the squared chord of directions, and d^2 = r^2 (1 - cos) (2 - (1 - cos)).
     constexpr float kHalf = kDirectionStep * kDirectionStep * 0.5f;
     const float scale = LaneKernel::kScale * r * r * inverse_length2 * kHalf;
     FloatLanes sum = {};
