@@ -9,29 +9,14 @@
 #include <cmath>
 
 #include "beam_window.h"
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_cells.h"
 #include "lane_kernel.h"
+#include "lane_weight.h"
 #include "lanes.h"
 #include "picked_beams.h"
 
 namespace bki_mapping {
 namespace {
-
-/// Weights along beams, 0 unless 0 < rho < 1. @param rho less kMiddle, so that it needs no second difference.
-template <BeamWeight kWeight>
-struct Weight {
-  static constexpr float kMiddle = kWeight == BeamWeight::kBilinear ? 0.5f : 0.0f;
-
-  [[gnu::always_inline]] static FloatLanes at(FloatLanes rho) {
-    if constexpr (kWeight == BeamWeight::kBilinear) {
-      return greater(0.5f - magnitude(rho), FloatLanes{});
-    } else {
-      const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
-      return ((rho > 0.0f) & (rho < 1.0f)) ? weight : FloatLanes{};
-    }
-  }
-};
 
 /// A tile's lanes are four voxels of its upper layer times some beams; those of its lower layer are at their
 /// opposites.

@@ -109,9 +109,6 @@ struct Table {
 }
 
 #if defined(__AVX512F__)
-[[gnu::always_inline]] inline FloatLanes squareRoot(FloatLanes x) {
-  return _mm512_sqrt_ps(x);
-}
 [[gnu::always_inline]] inline FloatLanes lesser(FloatLanes a, FloatLanes b) {
   return _mm512_min_ps(a, b);
 }
@@ -122,9 +119,6 @@ struct Table {
 [[gnu::always_inline]] inline FloatLanes squareRoot(FloatLanes x) {
   return _mm256_sqrt_ps(x);
 }
-[[gnu::always_inline]] inline FloatLanes lesser(FloatLanes a, FloatLanes b) {
-  return _mm256_min_ps(a, b);
-}
 [[gnu::always_inline]] inline FloatLanes greater(FloatLanes a, FloatLanes b) {
   return _mm256_max_ps(a, b);
 }
@@ -132,9 +126,6 @@ struct Table {
 [[gnu::always_inline]] inline FloatLanes squareRoot(FloatLanes x) {
   for (int lane = 0; lane < kLanes; ++lane) x[lane] = std::sqrt(x[lane]);
   return x;
-}
-[[gnu::always_inline]] inline FloatLanes lesser(FloatLanes a, FloatLanes b) {
-  return a < b ? a : b;
 }
 [[gnu::always_inline]] inline FloatLanes greater(FloatLanes a, FloatLanes b) {
   return a > b ? a : b;

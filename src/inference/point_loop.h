@@ -29,7 +29,7 @@ struct HaloLayers {
 // Adding points to the eight voxel centres around each, for a kernel that reaches no farther than one voxel:
 // no other can be nearer than that. They may lie outside the block, hence the halo. A point that reaches the
 // block has -1 <= x < 8, and the same for y and z; rounding may have made it 8.
-#if defined(__AVX512F__)
+#if defined(__AVX2__)
 
 /// Adds eight values to the halo's voxels from `first` on: two rows of two, in each of two layers.
 [[gnu::always_inline]] inline void addCorners(__m128 low, __m128 high, float* first) {
@@ -42,6 +42,10 @@ struct HaloLayers {
     first += kHaloEdge * kHaloEdge;
   }
 }
+
+#endif
+
+#if defined(__AVX512F__)
 
 /// Two points at a time.
 HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
@@ -122,16 +126,8 @@ HaloLayers addToHalo(const PointRun& run, float inverse_reach2, float* halo) {
     const Eight r = _mm256_sqrt_ps((dx * dx + dy * dy + dz * dz) * inverse_reach2);
     const Eight values = sparseKernel(r, Eight(_mm256_max_ps(1.0f - r, Eight{})));
 
-    float* out = halo + _mm_cvtsi128_si32(first);
-    const __m128 low = _mm256_castps256_ps128(values), high = _mm256_extractf128_ps(values, 1);
-    for (const __m128& layer : {low, high}) {
-      __m64* const row = reinterpret_cast<__m64*>(out);
-      __m64* const next_row = reinterpret_cast<__m64*>(out + kHaloEdge);
-      const __m128 sum = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + layer;
-      _mm_storel_pi(row, sum);
-      _mm_storeh_pi(next_row, sum);
-      out += kHaloEdge * kHaloEdge;
-    }
+    addCorners(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1),
+               halo + _mm_cvtsi128_si32(first));
   }
   return {_mm_extract_epi32(lowest, 2), _mm_extract_epi32(highest, 2) + 1};
 }

@@ -3,11 +3,10 @@
 /// it, and none has to be picked.
 #pragma once
 
-#include "beam_tile.h"
 #include "beam_window.h"
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_cells.h"
 #include "lane_kernel.h"
+#include "lane_weight.h"
 #include "lanes.h"
 
 namespace bki_mapping {
