@@ -9,9 +9,11 @@ add_library(bki_mapping_core SHARED
   src/inference/beam_field.cpp
   src/inference/beam_rtree.cpp
   src/inference/beam_table.cpp
+  src/inference/beam_tracks.cpp
   src/inference/block_walk.cpp
   src/inference/cell_merger.cpp
   src/inference/downsample.cpp
+  src/inference/group_sums.cpp
   src/inference/inner_loops.cpp
   src/inference/inner_loops_generic.cpp
   src/inference/kernel_table.cpp
@@ -50,7 +52,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set_source_files_properties(src/inference/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
     "${inner_loop_options};-mavx2;-mfma")
   set_source_files_properties(src/inference/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
-    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl;-Wno-maybe-uninitialized")
+    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl;-mbmi2;-Wno-maybe-uninitialized")
   # The last: GCC 12 warns of its own intrinsics (its bug 105593).
   target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_X86)
 endif()

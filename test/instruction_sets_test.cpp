@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <random>
 
 #include "bki_mapping/inference/beam_evidence.h"
@@ -61,6 +62,105 @@ TEST(InstructionSets, LinesEqualBruteForceOnEach) {
   }
 }
 
+/// Kernels of all lengths: below, at and above a voxel, and the longest.
+TEST(InstructionSets, LinesOfAnyKernelEqualBruteForceOnEach) {
+  struct Size {
+    double resolution, length;
+    int beams;
+  };
+  Workers workers(2);
+  for (const Size& size : {Size{0.3, 0.1, 60}, Size{0.3, 0.4, 60}, Size{0.3, 0.43, 60}, Size{0.1, 0.3, 40},
+                           Size{0.2, 1.5, 20}, Size{0.04, 2.88, 1}}) {
+    int scenes = 0;
+    for (const reference::Scene& scene : reference::nastyScenes(size.beams)) {
+      MapperConfig config;
+      config.resolution = size.resolution;
+      config.kernel.length = size.length;
+      config.downsample_resolution = 0.0;
+      config.free_space.weight = BeamWeight::kLinear;
+      if (size.beams == 1 && (scene.scan.points.empty() || scene.scan.points[0].norm() > 3.0f))
+        continue;  // takes long
+      const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
+      const GridGeometry geometry(config.resolution);
+      BeamField field(geometry, config.kernel, BeamIndexType::kTable);
+      field.setBeams({scene.scan.origin, scene.scan.points}, workers);
+      ++scenes;
+      for (const std::string& set : instructionSets()) {
+        BeamEvidence evidence(BeamWeight::kLinear, FreeSpaceExtent::kObserved, set);
+        evidence.setField(field);
+        SemanticMap map(geometry, config.prior, 4);
+        MapUpdater().update(map, {&evidence}, workers);
+        EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u)
+            << set << ", " << scene.name << ", " << size.length << " m in voxels of " << size.resolution
+            << " m";
+      }
+    }
+    EXPECT_GT(scenes, 0);
+  }
+}
+
+/// So far from the sensor single precision does not tell voxels apart.
+TEST(InstructionSets, LinesFarFromTheSensorEqualBruteForceOnEach) {
+  Workers workers(2);
+  for (const Eigen::Vector3f& far :
+       {Eigen::Vector3f(6e6f, 4e6f, -1e6f), Eigen::Vector3f(-2e6f, 8e6f, 7e6f)}) {
+    const reference::Scene scene =
+        reference::makeScene("far", {0.3, -0.2, 0.1}, 50, 4, [&](std::mt19937& random) {
+          std::uniform_int_distribution<int> halves(-4, 4);
+          const Eigen::Vector3d aside(halves(random), halves(random), halves(random));
+          return Eigen::Vector3d(far.cast<double>() + 0.5 * aside);
+        });
+    MapperConfig config;
+    config.downsample_resolution = 0.0;
+    config.free_space.weight = BeamWeight::kUniform;
+    const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
+    const GridGeometry geometry(config.resolution);
+    BeamField field(geometry, config.kernel, BeamIndexType::kTable);
+    field.setBeams({scene.scan.origin, scene.scan.points}, workers);
+    const BlockIndex middle =
+        GridGeometry::blockOf(geometry.voxelAt(scene.scan.origin + 0.5 * far.cast<double>()));
+    for (const std::string& set : instructionSets()) {
+      BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kMapped, set);
+      evidence.setField(field);
+      SemanticMap map(geometry, config.prior, 4);
+      for (int n = 0; n < 27; ++n) {
+        map.getOrAllocate({{middle.x + n % 3 - 1, middle.y + n / 3 % 3 - 1, middle.z + n / 9 - 1}});
+      }
+      MapUpdater().update(map, {&evidence}, workers);
+      ASSERT_GT(map.size(), 0u) << set;  // those without evidence are not kept
+      EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u) << set;
+    }
+  }
+}
+
+TEST(InstructionSets, BeamsWithoutLengthReachNothing) {
+  Workers workers(1);
+  const MapperConfig config;
+  const GridGeometry geometry(config.resolution);
+  const Eigen::Vector3d origin(0.1, 0.2, 0.05);
+  const Eigen::Vector3f beam(1.0f, 0.5f, 0.2f);
+  for (const std::string& set : instructionSets()) {
+    const auto mapOf = [&](const std::vector<Eigen::Vector3f>& ends) {
+      BeamField field(geometry, config.kernel, BeamIndexType::kTable);
+      field.setBeams({origin, ends}, workers);
+      BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kObserved, set);
+      evidence.setField(field);
+      auto map = std::make_unique<SemanticMap>(geometry, config.prior, 4);
+      MapUpdater().update(*map, {&evidence}, workers);
+      return map;
+    };
+    const auto with = mapOf({Eigen::Vector3f::Zero(), beam}), without = mapOf({beam});
+    ASSERT_GT(without->size(), 0u);
+    ASSERT_EQ(with->size(), without->size()) << set;
+    for (const auto& entry : without->entries()) {
+      const Block* same = with->find(entry.index);
+      ASSERT_NE(same, nullptr) << set;
+      const float *sums = entry.block->evidence(kFreeClass), *others = same->evidence(kFreeClass);
+      EXPECT_TRUE(std::equal(sums, sums + kBlockVoxels, others)) << set;
+    }
+  }
+}
+
 TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
   Workers workers(1);
   MapperConfig config;
@@ -83,7 +183,7 @@ TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
   }
 }
 
-/// So many beams that octants are added voxel by voxel, and more than the loop picks at a time.
+/// So many beams that rounding of sums matters.
 void expectLinesOfManyBeams(const reference::Scene& scene, BeamWeight weight, BeamIndexType index) {
   Workers workers(2);
   MapperConfig config;

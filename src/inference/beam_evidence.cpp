@@ -33,6 +33,9 @@ bool scaleAndLimit(float scale, float limit, float* sums) {
 const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {
   const double reach = field_->reachMetres();
   touched_.clear();
+  if (field_->kernel().type == KernelType::kSparse) {
+    tracks_.set(field_->beams(), field_->geometry().resolution(), reach, workers);
+  }
   if (extent_ == FreeSpaceExtent::kMapped) {
     insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {
@@ -41,18 +44,26 @@ const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map
   return touched_.members();
 }
 
+double BeamEvidence::effort(const BlockGroup& group) const {
+  // As many beams as the group is large, seen from the sensor.
+  return 1.0 / std::max(field_->boxOf(group).centre().squaredNorm(), BeamBox::kHalf * BeamBox::kHalf);
+}
+
+void BeamEvidence::enter(const BlockGroup& group, EvidenceScratch& scratch) const {
+  if (field_->kernel().type == KernelType::kCounting) return;
+  field_->findRangesNear(group, scratch);
+  loops_.trace_beams(tracks_.arrays(), scratch.ranges.data(), scratch.ranges.size(), field_->boxOf(group),
+                     weight_, scratch.group);
+}
+
 void BeamEvidence::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
   float* sums = scratch.sums.data();
-  scratch.sums.fill(0.0f);
   if (field_->kernel().type == KernelType::kCounting) {
+    scratch.sums.fill(0.0f);
     field_->forEachVoxelNear(index, 0.0, scratch,
                              [&](int offset, float rho, float) { sums[offset] += weightAt(weight_, rho); });
-  } else if (field_->hasTable()) {
-    loops_.add_beams(field_->arrays(), field_->blockAt(index), weight_, sums);
   } else {
-    field_->findRangesNear(index, scratch);
-    loops_.add_some_beams(field_->arrays(), scratch.ranges.data(), scratch.ranges.size(),
-                          field_->blockAt(index), weight_, sums);
+    scratch.group.sumsOf({placeInGroup(index.x), placeInGroup(index.y), placeInGroup(index.z)}, sums);
   }
   scratch.leaveHeldAlone();
   if (scaleAndLimit(field_->kernel().scale, scratch.limits.free, sums)) block.add(kFreeClass, sums);

@@ -15,7 +15,7 @@ BeamField::BeamField(const GridGeometry& geometry, const KernelConfig& kernel, B
 }
 
 void BeamField::setBeams(const Beams& beams, Workers& workers) {
-  const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
+  const std::size_t count = beams.ends.size();
   const Chunks chunks(count);
   cells_.resize(count);
   workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
@@ -26,23 +26,19 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
   table_.build(cells_, order_);
   beams_.origin = beams.origin;
   beams_.ends.resize(count);
-  for (auto* u : {&ux_, &uy_, &uz_}) u->assign(padded, 0);
-  inverse_length_.assign(padded, 0.0f);
+  inverse_length_.resize(count);
   workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
       // Not read back from where it goes: that would wait for memory.
       const Eigen::Vector3f beam = beams.ends[order_[b]];
-      const Eigen::Vector3d end = beam.cast<double>();
-      const double inverse = 1.0 / end.norm(), steps = inverse / static_cast<double>(kDirectionStep);
-      ux_[b] = static_cast<std::int32_t>(end.x() * steps);
-      uy_[b] = static_cast<std::int32_t>(end.y() * steps);
-      uz_[b] = static_cast<std::int32_t>(end.z() * steps);
-      inverse_length_[b] = static_cast<float>(inverse);
+      inverse_length_[b] = static_cast<float>(1.0 / beam.cast<double>().norm());
       beams_.ends[b] = beam;
     }
   });
-  const auto last = inverse_length_.begin() + static_cast<std::ptrdiff_t>(count);
-  longest_ = count == 0 ? 0.0 : 1.0 / static_cast<double>(*std::min_element(inverse_length_.begin(), last));
+  longest_ =
+      count == 0
+          ? 0.0
+          : 1.0 / static_cast<double>(*std::min_element(inverse_length_.begin(), inverse_length_.end()));
   if (index_type_ == BeamIndexType::kRtree) {
     std::vector<Eigen::Vector3f> directions;
     directions.reserve(count);
@@ -51,19 +47,40 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
   }
 }
 
-BeamArrays BeamField::arrays() const {
-  return {ux_.data(), uy_.data(), uz_.data(), inverse_length_.data(), table_.begin().data()};
+BeamBox BeamField::boxOf(const BlockGroup& group) const {
+  const BlockIndex first{
+      {group.index.x * kGroupEdge, group.index.y * kGroupEdge, group.index.z * kGroupEdge}};
+  const Eigen::Vector3d corner =
+      (geometry_.voxelCentre(GridGeometry::voxelOf(first, 0)) - beams_.origin) / geometry_.resolution();
+  return {{corner.x(), corner.y(), corner.z()}, static_cast<double>(reach_), group.blocks};
 }
 
-BeamBlock BeamField::blockAt(const BlockIndex& index) const {
-  const Eigen::Vector3d first = geometry_.voxelCentre(GridGeometry::voxelOf(index, 0)) - beams_.origin;
-  return {{first.x(), first.y(), first.z()}, geometry_.resolution(), static_cast<float>(reachMetres())};
+void BeamField::findRangesNear(const BlockGroup& group, EvidenceScratch& scratch) const {
+  // A ball about the blocks that matter.
+  Eigen::Array3d low = Eigen::Array3d::Constant(kGroupEdge), high = Eigen::Array3d::Zero();
+  for (std::uint64_t left = group.blocks; left != 0; left &= left - 1) {
+    const int n = __builtin_ctzll(left);
+    const Eigen::Array3d place(n % kGroupEdge, n / kGroupEdge % kGroupEdge, n / (kGroupEdge * kGroupEdge));
+    low = low.min(place);
+    high = high.max(place + 1.0);
+  }
+  const BeamBox box = boxOf(group);
+  const Eigen::Array3d first = Eigen::Array3d(box.first[0], box.first[1], box.first[2]) - 0.5;
+  const Eigen::Vector3d centre = first + 0.5 * kBlockEdge * (low + high);
+  const double half_diagonal = 0.5 * kBlockEdge * (high - low).matrix().norm();
+  findRangesNear(centre * geometry_.resolution(), (half_diagonal + box.reach) * geometry_.resolution(),
+                 scratch);
 }
 
 void BeamField::findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const {
   const Eigen::Vector3d centre = geometry_.blockCentre(index) - beams_.origin;
-  const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
-  if (hasTable()) return table_.query(centre.cast<float>(), radius, scratch.ranges);
+  findRangesNear(centre, (kLatticeRadius + static_cast<double>(reach_)) * geometry_.resolution(), scratch);
+}
+
+void BeamField::findRangesNear(const Eigen::Vector3d& centre, double radius_metres,
+                               EvidenceScratch& scratch) const {
+  const auto radius = static_cast<float>(radius_metres);
+  if (!rtree_) return table_.query(centre.cast<float>(), radius, scratch.ranges);
   auto& ranges = scratch.ranges;
   rtree_->query(centre.cast<float>(), radius, ranges);
   std::sort(ranges.begin(), ranges.end(),

@@ -1,12 +1,12 @@
-#include "beam_loop.h"
 #include "bki_mapping/inference/inner_loops.h"
 #include "point_loop.h"
 #include "tile_loop.h"
+#include "trace_loop.h"
 
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsAvx512() {
-  static const InnerLoops loops = {"avx512",        sumPointsLoop,  addBeamsLoop,   addSomeBeamsLoop,
+  static const InnerLoops loops = {"avx512",        sumPointsLoop,  traceBeamsLoop,
                                    placePointsLoop, placeCellsLoop, reachBlocksLoop};
   return loops;
 }

@@ -1,12 +1,12 @@
-#include "beam_loop.h"
 #include "bki_mapping/inference/inner_loops.h"
 #include "point_loop.h"
 #include "tile_loop.h"
+#include "trace_loop.h"
 
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsGeneric() {
-  static const InnerLoops loops = {"generic",       sumPointsLoop,  addBeamsLoop,   addSomeBeamsLoop,
+  static const InnerLoops loops = {"generic",       sumPointsLoop,  traceBeamsLoop,
                                    placePointsLoop, placeCellsLoop, reachBlocksLoop};
   return loops;
 }

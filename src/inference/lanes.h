@@ -4,7 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
-#if defined(__AVX2__)
+#if defined(__SSE__)
 #include <immintrin.h>
 #endif
 
@@ -35,45 +35,15 @@ typedef std::int32_t IntLanes __attribute__((vector_size(kLanes * sizeof(std::in
 [[gnu::always_inline]] inline void store(float* to, FloatLanes lanes) {
   __builtin_memcpy(to, &lanes, sizeof(lanes));
 }
+[[gnu::always_inline]] inline void store(std::int32_t* to, IntLanes lanes) {
+  __builtin_memcpy(to, &lanes, sizeof(lanes));
+}
 [[gnu::always_inline]] inline FloatLanes toFloat(IntLanes lanes) {
   return __builtin_convertvector(lanes, FloatLanes);
 }
-/// kCount numbers, repeated in all lanes. @param from aligned to kCount numbers.
-template <int kCount>
-[[gnu::always_inline]] inline FloatLanes repeat(const float* from) {
-#if defined(__AVX512F__)
-  static_assert(kCount == 4);
-  return _mm512_broadcast_f32x4(_mm_load_ps(from));
-#elif defined(__AVX2__)
-  static_assert(kCount == 2);
-  double both;
-  __builtin_memcpy(&both, from, sizeof(both));
-  return _mm256_castpd_ps(_mm256_set1_pd(both));
-#else
-  static_assert(kCount == 1);
-  return FloatLanes{} + *from;
-#endif
-}
-/// kLanes / kCount small whole numbers, each in kCount lanes side by side.
-template <int kCount>
-[[gnu::always_inline]] inline IntLanes repeatBytes(const unsigned char* from) {
-#if defined(__AVX2__)
-  static_assert(kLanes / kCount == 4);
-  std::int32_t four;
-  __builtin_memcpy(&four, from, sizeof(four));
-  const __m128i numbers = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(four));
-#if defined(__AVX512F__)
-  return reinterpret_cast<IntLanes>(_mm512_permutexvar_epi32(
-      _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_castsi128_si512(numbers)));
-#else
-  return reinterpret_cast<IntLanes>(_mm256_permutevar8x32_epi32(_mm256_castsi128_si256(numbers),
-                                                                _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3)));
-#endif
-#else
-  IntLanes lanes;
-  for (int lane = 0; lane < kLanes; ++lane) lanes[lane] = from[lane / kCount];
-  return lanes;
-#endif
+/// Towards 0.
+[[gnu::always_inline]] inline IntLanes toInt(FloatLanes lanes) {
+  return __builtin_convertvector(lanes, IntLanes);
 }
 /// Eight numbers, to be looked up several at a time.
 template <typename Number>
@@ -119,6 +89,9 @@ struct Table {
 [[gnu::always_inline]] inline FloatLanes squareRoot(FloatLanes x) {
   return _mm256_sqrt_ps(x);
 }
+[[gnu::always_inline]] inline FloatLanes lesser(FloatLanes a, FloatLanes b) {
+  return _mm256_min_ps(a, b);
+}
 [[gnu::always_inline]] inline FloatLanes greater(FloatLanes a, FloatLanes b) {
   return _mm256_max_ps(a, b);
 }
@@ -127,54 +100,80 @@ struct Table {
   for (int lane = 0; lane < kLanes; ++lane) x[lane] = std::sqrt(x[lane]);
   return x;
 }
+[[gnu::always_inline]] inline FloatLanes lesser(FloatLanes a, FloatLanes b) {
+  return a < b ? a : b;
+}
 [[gnu::always_inline]] inline FloatLanes greater(FloatLanes a, FloatLanes b) {
   return a > b ? a : b;
 }
 #endif
 
-/// The first `count` of kLanes numbers, and 0 for the others. @param count may be more.
-[[gnu::always_inline]] inline FloatLanes loadFirst(std::int32_t count, const float* from) {
+/// Whether any lane is set, all lanes being 0 or -1.
+[[gnu::always_inline]] inline bool anyOf(IntLanes lanes) {
 #if defined(__AVX512F__)
-  const __mmask16 counts =
-      _mm512_cmplt_epi32_mask(reinterpret_cast<__m512i>(countUp()), _mm512_set1_epi32(count));
-  return _mm512_maskz_loadu_ps(counts, from);
-#else
-  const IntLanes counts = countUp() < count;
-  return counts ? load(from) : FloatLanes{};
-#endif
-}
-
-typedef float FourLanes __attribute__((vector_size(16)));
-
-/// Four sums, of kCount numbers each, one behind the other.
-template <int kCount>
-[[gnu::always_inline]] inline FourLanes sumsOf(const float* numbers) {
-  static_assert(4 * kCount == kLanes);
-#if defined(__AVX512F__)
-  const auto four = [numbers](int n) { return _mm_load_ps(numbers + 4 * n); };
-  return _mm_hadd_ps(_mm_hadd_ps(four(0), four(1)), _mm_hadd_ps(four(2), four(3)));
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(lanes)) != 0;
 #elif defined(__AVX2__)
-  return _mm_hadd_ps(_mm_load_ps(numbers), _mm_load_ps(numbers + 4));
+  return _mm256_movemask_ps(reinterpret_cast<__m256>(lanes)) != 0;
 #else
-  FourLanes sums;
-  __builtin_memcpy(&sums, numbers, sizeof(sums));
-  return sums;
+  std::int32_t any = 0;
+  for (int lane = 0; lane < kLanes; ++lane) any |= lanes[lane];
+  return any != 0;
 #endif
 }
 
-/// The sum of some numbers, in a tree.
+/// kCount numbers side by side.
 template <int kCount>
-[[gnu::always_inline]] inline float sumOf(const float* numbers) {
-  if constexpr (kCount == 1) {
-    return numbers[0];
+struct Part {
+  typedef float Lanes __attribute__((vector_size(kCount * sizeof(float))));
+};
+
+/// The n-th kCount lanes.
+template <int kCount>
+[[gnu::always_inline]] inline typename Part<kCount>::Lanes part(FloatLanes lanes, [[maybe_unused]] int n) {
+  if constexpr (kCount == kLanes) {
+    return lanes;
   } else {
-    typedef float Half __attribute__((vector_size(kCount / 2 * sizeof(float))));
-    Half low, high;
-    __builtin_memcpy(&low, numbers, sizeof(low));
-    __builtin_memcpy(&high, numbers + kCount / 2, sizeof(high));
-    low += high;
-    return sumOf<kCount / 2>(reinterpret_cast<const float*>(&low));
+#if defined(__AVX512F__)
+    if constexpr (kCount == 8) {
+      return n == 0 ? _mm512_castps512_ps256(lanes) : _mm512_extractf32x8_ps(lanes, 1);
+    } else {
+      switch (n) {
+        case 0:
+          return _mm512_castps512_ps128(lanes);
+        case 1:
+          return _mm512_extractf32x4_ps(lanes, 1);
+        case 2:
+          return _mm512_extractf32x4_ps(lanes, 2);
+        default:
+          return _mm512_extractf32x4_ps(lanes, 3);
+      }
+    }
+#elif defined(__AVX2__)
+    return n == 0 ? _mm256_castps256_ps128(lanes) : _mm256_extractf128_ps(lanes, 1);
+#endif
   }
+}
+
+/// Adds four numbers to two rows of two. @param stride from row to row.
+[[gnu::always_inline]] inline void addToSquare(float* to, int stride, Part<4>::Lanes numbers) {
+#if defined(__SSE__)
+  __m64 *const row = reinterpret_cast<__m64*>(to), *const next_row = reinterpret_cast<__m64*>(to + stride);
+  const __m128 sums =
+      _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + static_cast<__m128>(numbers);
+  _mm_storel_pi(row, sums);
+  _mm_storeh_pi(next_row, sums);
+#else
+  for (int n = 0; n < 4; ++n) to[n / 2 * stride + n % 2] += numbers[n];
+#endif
+}
+
+/// Adds numbers side by side to others.
+template <typename Lanes>
+[[gnu::always_inline]] inline void addTo(float* to, Lanes numbers) {
+  Lanes sums;
+  __builtin_memcpy(&sums, to, sizeof(sums));
+  sums += numbers;
+  __builtin_memcpy(to, &sums, sizeof(sums));
 }
 
 }  // namespace

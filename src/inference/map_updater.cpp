@@ -5,13 +5,6 @@
 #include "bki_mapping/core/stopwatch.h"
 
 namespace bki_mapping {
-namespace {
-
-/// Blocks that a thread takes at a time.
-constexpr std::size_t kBlocksAJob = 4;
-
-}  // namespace
-
 void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers) {
   numbering_.clear();
   jobs_.clear();
@@ -46,11 +39,40 @@ void MapUpdater::work(const std::vector<Evidence*>& evidence, std::size_t number
   job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(before);
 }
 
+void MapUpdater::groupJobs(const std::vector<Evidence*>& evidence) {
+  group_jobs_.clear();
+  for (std::size_t n = 0; n < jobs_.size(); ++n) {
+    group_jobs_.add(groupOf(jobs_[n].index), static_cast<std::uint32_t>(n));
+  }
+  group_jobs_.sort();
+  groups_.clear();
+  for (std::size_t n = 0; n < group_jobs_.indices().size(); ++n) {
+    Group each = {{group_jobs_.indices().members()[n]}, n, 0.0};
+    for (const std::uint32_t* job = group_jobs_.begin(n); job != group_jobs_.end(n); ++job) {
+      each.group.blocks |= std::uint64_t{1} << numberInGroup(jobs_[*job].index);
+    }
+    for (const Evidence* piece : evidence) each.effort += piece->effort(each.group);
+    groups_.push_back(each);
+  }
+  std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
+    return a.effort != b.effort ? a.effort > b.effort : a.number < b.number;
+  });
+}
+
+void MapUpdater::work(const std::vector<Evidence*>& evidence, const Group& group, EvidenceScratch& scratch) {
+  for (const Evidence* piece : evidence) piece->enter(group.group, scratch);
+  for (const std::uint32_t* job = group_jobs_.begin(group.number); job != group_jobs_.end(group.number);
+       ++job) {
+    work(evidence, *job, scratch);
+  }
+}
+
 MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>& evidence,
                                   Workers& workers) {
   MapUpdateStats stats;
   Stopwatch watch;
   collectJobs(map, evidence, workers);
+  groupJobs(evidence);
   stats.blocks = jobs_.size();
   stats.collect_ms = watch.lap();
 
@@ -59,10 +81,8 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
     scratch.limits = limits_;
     for (const EvidenceScratch& other : scratch_) scratch.reserveAs(other);
   }
-  workers.forEach((jobs_.size() + kBlocksAJob - 1) / kBlocksAJob, [&](std::size_t j, std::size_t worker) {
-    const std::size_t end = std::min(jobs_.size(), (j + 1) * kBlocksAJob);
-    for (std::size_t n = j * kBlocksAJob; n < end; ++n) work(evidence, n, scratch_[worker]);
-  });
+  workers.forEach(groups_.size(),
+                  [&](std::size_t g, std::size_t worker) { work(evidence, groups_[g], scratch_[worker]); });
   for (const Job& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);

@@ -34,11 +34,7 @@ struct HaloLayers {
 /// Adds eight values to the halo's voxels from `first` on: two rows of two, in each of two layers.
 [[gnu::always_inline]] inline void addCorners(__m128 low, __m128 high, float* first) {
   for (const __m128& layer : {low, high}) {
-    __m64* const row = reinterpret_cast<__m64*>(first);
-    __m64* const next_row = reinterpret_cast<__m64*>(first + kHaloEdge);
-    const __m128 sum = _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + layer;
-    _mm_storel_pi(row, sum);
-    _mm_storeh_pi(next_row, sum);
+    addToSquare(first, kHaloEdge, layer);
     first += kHaloEdge * kHaloEdge;
   }
 }

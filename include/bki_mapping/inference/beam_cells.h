@@ -30,17 +30,7 @@ constexpr int kBeamColumns = 1024;
   return row < 0.0f ? 0 : (row < kBeamRows - 1 ? static_cast<int>(row) : kBeamRows - 1);
 }
 
-/// Unit directions are kept as whole numbers of this step, so that the difference of two nearby directions is
-/// exact: 2^-29, or 0.15 um at 80 m.
-constexpr float kDirectionStep = 0x1.0p-29f;
-
-/// The beams of a scan in the order of their cells, as arrays that inner loops read. Reading up to
-/// kBeamPadding beams past the last is allowed.
-struct BeamArrays {
-  const std::int32_t *ux, *uy, *uz;  ///< unit directions [kDirectionStep]
-  const float* inverse_length;       ///< [1 / m]
-  const std::uint32_t* begin;        ///< of each cell's beams, row by row; one more than cells
-};
+/// Loops may read so many beams past the last.
 constexpr std::uint32_t kBeamPadding = 16;
 
 /// Beams first to before last.

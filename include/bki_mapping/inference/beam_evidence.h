@@ -21,6 +21,8 @@ class BeamEvidence : public Evidence {
   void setField(const BeamField& field) { field_ = &field; }
 
   const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  double effort(const BlockGroup& group) const override;
+  void enter(const BlockGroup& group, EvidenceScratch& scratch) const override;
   void addTo(std::size_t number, const BlockIndex& index, Block& block,
              EvidenceScratch& scratch) const override;
 
@@ -29,6 +31,7 @@ class BeamEvidence : public Evidence {
   BeamWeight weight_;
   FreeSpaceExtent extent_;
   const InnerLoops& loops_;
+  BeamTracks tracks_;
   BlockWalk walk_;
   IndexNumbering touched_;
 };

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "bki_mapping/core/semantic_map.h"
-#include "bki_mapping/inference/beam_block.h"
 #include "bki_mapping/inference/beam_index.h"
 #include "bki_mapping/inference/beam_raster.h"
 #include "bki_mapping/inference/beams.h"
@@ -29,10 +28,7 @@ class BeamField {
   const Eigen::Vector3d& origin() const { return beams_.origin; }
   /// In the order of the index.
   const Beams& beams() const { return beams_; }
-  BeamArrays arrays() const;
-  BeamBlock blockAt(const BlockIndex& index) const;
-  /// Whether beams are retrieved from the table; else findRangesNear has to name them.
-  bool hasTable() const { return rtree_ == nullptr; }
+  BeamBox boxOf(const BlockGroup& group) const;
 
   /// Radius about a beam outside which no voxel centre is reached [m].
   double reachMetres() const { return reach_ * geometry_.resolution(); }
@@ -41,6 +37,9 @@ class BeamField {
   /// Names beams, among them all whose half-lines reach the block, as numbers in scratch.ranges: sorted, and
   /// none twice.
   void findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const;
+
+  /// The same of a group.
+  void findRangesNear(const BlockGroup& group, EvidenceScratch& scratch) const;
 
   /// Calls visit(offset, rho, length) for every voxel of the block that the line of a beam reaches, with rho
   /// the projection of the voxel's centre on the beam / beam length [m]. Beams that end more than `follow`
@@ -51,6 +50,8 @@ class BeamField {
                         Visit&& visit) const;
 
  private:
+  /// @param centre of a ball, relative to the sensor [m]. @param radius [m].
+  void findRangesNear(const Eigen::Vector3d& centre, double radius, EvidenceScratch& scratch) const;
   /// Finds the beams that may reach the block: their numbers in scratch.beams.
   void findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const;
   LocalBeam localBeam(std::size_t beam, const BlockIndex& index) const;
@@ -63,8 +64,7 @@ class BeamField {
   float reach_;  ///< [voxels]
   double longest_ = 0.0;
   Beams beams_;
-  std::vector<std::int32_t> ux_, uy_, uz_;  ///< unit directions [kDirectionStep]
-  std::vector<float> inverse_length_;       ///< [1 / m]
+  std::vector<float> inverse_length_;  ///< [1 / m]
   BeamTable table_;
   std::unique_ptr<BeamIndex> rtree_;
   std::vector<std::uint32_t> cells_, order_;

@@ -9,6 +9,7 @@
 
 #include "bki_mapping/core/semantic_map.h"
 #include "bki_mapping/inference/beam_index.h"
+#include "bki_mapping/inference/group_sums.h"
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/local_point.h"
 #include "bki_mapping/inference/parallel_for.h"
@@ -29,6 +30,7 @@ struct EvidenceScratch {
   std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
+  GroupSums group;  ///< of the group at hand
   /// Voxels of the block at hand that evidence for `free` leaves alone.
   std::bitset<kBlockVoxels> held;
 
@@ -37,6 +39,7 @@ struct EvidenceScratch {
     points.reserve(other.points.capacity());
     ranges.reserve(other.ranges.capacity());
     beams.reserve(other.beams.capacity());
+    group.reserveAs(other.group);
   }
   void leaveHeldAlone() {
     if (held.none()) return;
@@ -71,6 +74,13 @@ class Evidence {
   /// The blocks to which addTo may add, each once; too many are allowed. They stay until the next call.
   /// @param map has already the blocks of the evidence that stands before this one in the update.
   virtual const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) = 0;
+
+  /// A number that grows with the time that a group will take: what takes long is begun first.
+  virtual double effort(const BlockGroup& /*group*/) const { return 0.0; }
+
+  /// Called before addTo of the blocks of a group, by the thread that calls these.
+  /// @param group with the blocks that the update touches.
+  virtual void enter(const BlockGroup& /*group*/, EvidenceScratch& /*scratch*/) const {}
 
   /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
   /// @param number of the block in what collectBlocks gave.

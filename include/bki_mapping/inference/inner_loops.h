@@ -7,25 +7,25 @@
 
 #include "bki_mapping/core/block.h"
 #include "bki_mapping/core/config.h"
-#include "bki_mapping/inference/beam_block.h"
 #include "bki_mapping/inference/beam_cells.h"
+#include "bki_mapping/inference/group_sums.h"
 #include "bki_mapping/inference/local_point.h"
 #include "bki_mapping/inference/tile_grid.h"
 
 namespace bki_mapping {
 
-/// The loops for one instruction set. All sums are of the 512 voxels of a block, and of the sparse kernel.
+/// The loops for one instruction set. All sums are of the sparse kernel.
 struct InnerLoops {
   const char* instruction_set;
-  /// Sets the sums to those of k(|x - c|) over points that reach the block. @param reach length of the kernel
-  /// [voxels]. @param scale of the kernel. @return the layers outside of which all sums are 0.
+  /// Sets the sums of the 512 voxels of a block to those of k(|x - c|) over points that reach the block.
+  /// @param reach length of the kernel [voxels]. @param scale of the kernel. @return the layers outside of
+  /// which all sums are 0.
   Block::Layers (*sum_points)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
-  /// Adds w(rho) k(d) of each beam, the kernel being of unit scale: d the distance to the beam's line, w the
-  /// weight along it, 0 unless 0 < rho < 1.
-  void (*add_beams)(const BeamArrays& beams, const BeamBlock& block, BeamWeight weight, float* sums);
-  /// The same, of the given beams alone.
-  void (*add_some_beams)(const BeamArrays& beams, const BeamRange* ranges, std::size_t count,
-                         const BeamBlock& block, BeamWeight weight, float* sums);
+  /// Sets the sums of the blocks of a box that matter to those of w(rho) k(d) over the beams of some ranges,
+  /// the kernel being of unit scale: d the distance to the beam's line, w the weight along it, 0 unless 0 <
+  /// rho < 1.
+  void (*trace_beams)(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
+                      const BeamBox& box, BeamWeight weight, GroupSums& sums);
   /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
   /// GridGeometry::voxelAt, to the bit.
   void (*place_points)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);

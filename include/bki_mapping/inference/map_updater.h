@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bki_mapping/inference/evidence.h"
+#include "bki_mapping/inference/runs_by_index.h"
 
 namespace bki_mapping {
 
@@ -38,12 +39,22 @@ class MapUpdater {
     std::ptrdiff_t bytes;  ///< by which the block grew
   };
 
+  struct Group {
+    BlockGroup group;
+    std::size_t number;  ///< in group_jobs_
+    double effort;
+  };
+
   void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
+  void groupJobs(const std::vector<Evidence*>& evidence);
+  void work(const std::vector<Evidence*>& evidence, const Group& group, EvidenceScratch& scratch);
   void work(const std::vector<Evidence*>& evidence, std::size_t number, EvidenceScratch& scratch);
 
   EvidenceLimits limits_;
   IndexNumbering numbering_;
   std::vector<Job> jobs_;
+  RunsByIndex<std::uint32_t> group_jobs_;  ///< jobs by group
+  std::vector<Group> groups_;              ///< what takes long first
   /// Of each piece of evidence, by job: the block's number there, or kNone; none behind its end.
   std::vector<std::vector<std::uint32_t>> number_of_;
   std::vector<EvidenceScratch> scratch_;  ///< one a worker

@@ -20,7 +20,9 @@ class RunsByIndex {
     begin_.assign(1, 0);
   }
   void add(const GridIndex& index, const Run& run) {
-    const std::uint32_t number = indices_.insert(index);
+    // What comes one behind the other often lies together.
+    const bool again = !number_.empty() && indices_.members()[number_.back()] == index;
+    const std::uint32_t number = again ? number_.back() : indices_.insert(index);
     if (number + 1 == begin_.size()) begin_.push_back(0);
     ++begin_[number + 1];
     number_.push_back(number);

@@ -1,0 +1,143 @@
+/// @file Which beams pass through a box; included by the inner loops alone.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "bki_mapping/inference/beam_cells.h"
+#include "bki_mapping/inference/group_sums.h"
+#include "lanes.h"
+
+namespace bki_mapping {
+namespace {
+
+/// The blocks of a box as sets of bits: those of a layer across a main axis, lanes first.
+struct BoxBlocks {
+  static constexpr int kAll = 0xffff, kEachRow = 0x1111, kEachLane = 0xf;
+
+  Table<std::int32_t> layer[kGroupEdge];  ///< by main axis: those that matter
+  /// Those with number n - 1 and more, and those with up to n - 1, n being 0 to 5.
+  Table<std::int32_t> lane_from, lane_to, row_from, row_to;
+
+  explicit BoxBlocks(std::uint64_t blocks) {
+    static_assert(kGroupEdge == 4);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int k = 0; k < kGroupEdge; ++k) {
+        layer[k].values[axis] = static_cast<std::int32_t>(layerOf(blocks, axis, k));
+      }
+    }
+    for (int n = 0; n <= 5; ++n) {
+      const int below = std::max(n - 1, 0), above = std::max(4 - n, 0);  // how many are left out
+      lane_from.values[n] = kEachRow * (kEachLane & (kEachLane << below));
+      row_from.values[n] = kAll & (kAll << 4 * below);
+      lane_to.values[n] = kEachRow * (kEachLane >> above);
+      row_to.values[n] = kAll >> 4 * above;
+    }
+  }
+};
+
+/// Beams side by side, and the slices in which they may reach the box. Lengths are in voxels, from the box's
+/// centre.
+class BoxSearch {
+ public:
+  explicit BoxSearch(const BeamBox& box) : blocks_(box.blocks), reach_(static_cast<float>(box.reach)) {
+    const Eigen::Vector3f centre = box.centre().cast<float>();
+    for (int axis = 0; axis < 3; ++axis) {
+      main_.values[axis] = centre[axis];
+      lane_.values[axis] = centre[kLaneAxis[axis]];
+      row_.values[axis] = centre[kRowAxis[axis]];
+    }
+    slack_ = 0.01f + 1e-6f * centre.cwiseAbs().maxCoeff();  // for rounding
+  }
+
+  /// Finds the passes of up to kLanes beams. @param[out] to the passes; as many are written to.
+  /// @return behind the last pass found.
+  BeamPass* find(const BeamTrackArrays& beams, BeamRange range, BeamPass* to) const {
+    const std::uint32_t b = range.first;
+    const IntLanes axis = load(beams.axis + b);
+    const FloatLanes end = load(beams.end + b), centre = main_[axis];
+    FloatLanes low = greater(lesser(FloatLanes{}, end) - reach_ - centre, FloatLanes{} - kHalf),
+               high = lesser(greater(FloatLanes{}, end) + reach_ - centre, FloatLanes{} + kHalf);
+    const Side lane = side(load(beams.slope_lane + b), lane_[axis], centre),
+               row = side(load(beams.slope_row + b), row_[axis], centre);
+    for (const Side* each : {&lane, &row}) {
+      low = greater(low, (-kHalf - each->reach - each->turned) * each->inverse_slope);
+      high = lesser(high, (kHalf + each->reach - each->turned) * each->inverse_slope);
+    }
+    low += kHalf + 1.0f - slack_;  // up to the next whole number
+    high += kHalf + slack_;
+    IntLanes alive =
+        (low < high + 1.0f) & (end != 0.0f) & (countUp() < static_cast<std::int32_t>(range.last - b));
+    IntLanes first = toInt(alive ? low : FloatLanes{}), last = toInt(alive ? high : FloatLanes{});
+    alive &= first <= last;
+    if (!anyOf(alive)) return to;
+    IntLanes found = {}, from = {}, until = {};
+    for (int k = 0; k < kGroupEdge; ++k) {
+      const IntLanes here =
+          (first < kBlockEdge * (k + 1)) & (last >= kBlockEdge * k) & alive &
+          ((blocksOf(lane, k, blocks_.lane_from, blocks_.lane_to) &
+            blocksOf(row, k, blocks_.row_from, blocks_.row_to) & blocks_.layer[k][axis]) != 0);
+      from = (here & ~found) ? IntLanes{} + kBlockEdge * k : from;
+      until = here ? IntLanes{} + (kBlockEdge * (k + 1) - 1) : until;
+      found |= here;
+    }
+    first = first > from ? first : from;
+    last = last < until ? last : until;
+    for (int n = 0; n < kLanes; ++n) {
+      *to = {b + static_cast<std::uint32_t>(n), first[n], last[n]};
+      to -= found[n];
+    }
+    return to;
+  }
+
+ private:
+  static constexpr auto kHalf = static_cast<float>(BeamBox::kHalf);
+
+  /// How beams run along the lanes, or the rows.
+  struct Side {
+    FloatLanes slope;
+    FloatLanes at;             ///< place in the slice through the box's centre
+    FloatLanes reach;          ///< of the kernel, at least
+    FloatLanes inverse_slope;  ///< without its sign
+    FloatLanes turned;         ///< `at`, with the axis turned so that the slope is positive
+  };
+  Side side(FloatLanes slope, FloatLanes centre, FloatLanes main) const {
+    const FloatLanes at = main * slope - centre, size = greater(magnitude(slope), FloatLanes{} + 1e-9f);
+    return {slope, at, reach_ * (1.0f + 0.5f * slope * slope) + slack_, 1.0f / size, slope < 0.0f ? -at : at};
+  }
+  /// The blocks that beams reach in layer k.
+  static IntLanes blocksOf(const Side& side, int k, const Table<std::int32_t>& from,
+                           const Table<std::int32_t>& to) {
+    constexpr float kToBlocks = 1.0f / kBlockEdge, kHalfLayer = 0.5f * (kBlockEdge - 1);
+    const float middle = static_cast<float>(kBlockEdge * k) + kHalfLayer - kHalf;
+    const FloatLanes at = (side.at + middle * side.slope + (kHalf + kBlockEdge)) * kToBlocks;
+    const FloatLanes room = (side.reach + kHalfLayer * magnitude(side.slope)) * kToBlocks;
+    const auto number = [](FloatLanes x) {
+      return toInt(lesser(greater(x, FloatLanes{}), FloatLanes{} + (kGroupEdge + 1)));
+    };
+    return from[number(at - room)] & to[number(at + room)];
+  }
+
+  BoxBlocks blocks_;
+  Table<float> main_, lane_, row_;  ///< the box's centre by main axis
+  float reach_, slack_;
+};
+
+/// Finds the passes of beams through a box, in the order of the beams.
+inline void findPasses(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
+                       const BeamBox& box, GroupSums& sums) {
+  const BoxSearch search(box);
+  std::size_t most = kLanes;
+  for (std::size_t r = 0; r < count; ++r) most += ranges[r].last - ranges[r].first;
+  if (sums.passes.size() < most) sums.passes.resize(most);
+  BeamPass* to = sums.passes.data();
+  for (std::size_t r = 0; r < count; ++r) {
+    for (BeamRange left = ranges[r]; left.first < left.last; left.first += kLanes) {
+      to = search.find(beams, left, to);
+    }
+  }
+  sums.pass_count = static_cast<std::size_t>(to - sums.passes.data());
+}
+
+}  // namespace
+}  // namespace bki_mapping
