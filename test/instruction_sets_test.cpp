@@ -105,8 +105,8 @@ TEST(InstructionSets, LinesFarFromTheSensorEqualBruteForceOnEach) {
   for (const Eigen::Vector3f& far :
        {Eigen::Vector3f(6e6f, 4e6f, -1e6f), Eigen::Vector3f(-2e6f, 8e6f, 7e6f)}) {
     const reference::Scene scene =
-        reference::makeScene("far", {0.3, -0.2, 0.1}, 50, 4, [&](std::mt19937& random) {
-          std::uniform_int_distribution<int> halves(-4, 4);
+        reference::makeScene("far", {0.3, -0.2, 0.1}, 200, 4, [&](std::mt19937& random) {
+          std::uniform_int_distribution<int> halves(-16, 16);
           const Eigen::Vector3d aside(halves(random), halves(random), halves(random));
           return Eigen::Vector3d(far.cast<double>() + 0.5 * aside);
         });

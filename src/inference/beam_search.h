@@ -66,8 +66,7 @@ class BoxSearch {
     }
     low += kHalf + 1.0f - slack_;  // up to the next whole number
     high += kHalf + slack_;
-    IntLanes alive =
-        (low < high + 1.0f) & (end != 0.0f) & (countUp() < static_cast<std::int32_t>(range.last - b));
+    IntLanes alive = (low < high + 1.0f) & (countUp() < static_cast<std::int32_t>(range.last - b));
     IntLanes first = toInt(alive ? low : FloatLanes{}), last = toInt(alive ? high : FloatLanes{});
     alive &= first <= last;
     if (!anyOf(alive)) return to;

@@ -62,14 +62,14 @@ void BeamTracks::set(const Beams& beams, double resolution, double length, Worke
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
       const Eigen::Vector3f& beam = beams.ends[b];
       const int axis = mainAxis(beam);
-      // A beam without length has no direction, and reaches nothing: its end stays 0.
+      // A beam without length has no direction, and reaches nothing: all is 0, rho everywhere.
       const BeamTrack track =
           std::abs(beam[axis]) < kShortest ? BeamTrack{} : trackOf(beam, axis, resolution, reach);
       tracks_[b] = track;
       axis_[b] = axis;
       slope_lane_[b] = static_cast<float>(track.slope_lane);
       slope_row_[b] = static_cast<float>(track.slope_row);
-      end_[b] = std::abs(beam[axis]) < kShortest ? 0.0f : beam[axis] * per_metre;
+      end_[b] = beam[axis] * per_metre;
     }
   });
 }

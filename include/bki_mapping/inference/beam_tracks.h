@@ -36,7 +36,7 @@ struct alignas(64) BeamTrack {
 struct BeamTrackArrays {
   const std::int32_t* axis;             ///< main axes
   const float *slope_lane, *slope_row;  ///< as in the tracks
-  const float* end;  ///< of the beam along its main axis, from the sensor [voxels]; 0 if it has no length
+  const float* end;                     ///< of the beam along its main axis, from the sensor [voxels]
   const BeamTrack* tracks;
 };
 
