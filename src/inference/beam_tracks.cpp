@@ -34,16 +34,17 @@ BeamTrack trackOf(const Eigen::Vector3f& beam, int axis, double resolution, floa
   track.step_row = steps(track.slope_row);
 
   const auto s = static_cast<float>(track.slope_lane), t = static_cast<float>(track.slope_row);
+  const float lane_slant = std::sqrt(1.0f + s * s), row_slant = std::sqrt(1.0f + t * t);
   const float u = 1.0f / std::sqrt(1.0f + s * s + t * t);  // of the unit direction, along the main axis
-  const float e = u * std::sqrt(1.0f + t * t), inverse_reach = 1.0f / reach;
-  track.e_lane = e * inverse_reach;
-  track.e_row = -s * t * u * u / e * inverse_reach;
-  track.g_row = u / e * inverse_reach;
+  const float inverse_slant = 1.0f / row_slant, inverse_reach = 1.0f / reach;
+  track.e_lane = u * row_slant * inverse_reach;
+  track.e_row = -s * t * u * inverse_slant * inverse_reach;
+  track.g_row = inverse_slant * inverse_reach;
   const float rho = static_cast<float>(track.rho_slice) * u * u;
   track.rho_lane = s * rho;
   track.rho_row = t * rho;
-  track.half_lane = reach * std::sqrt(1.0f + s * s);
-  track.half_row = reach * std::sqrt(1.0f + t * t);
+  track.half_lane = reach * lane_slant;
+  track.half_row = reach * row_slant;
   track.axis = axis;
   return track;
 }
