@@ -89,7 +89,7 @@ void lines(benchmark::State& state, BeamIndexType index, const std::string& inst
   BeamField field(f.geometry, f.config.kernel, index);
   field.setBeams(f.seen.beams, f.workers);
   BeamEvidence evidence(BeamWeight::kBilinear, FreeSpaceExtent::kObserved, instruction_set);
-  evidence.setField(field);
+  evidence.setField(field, f.workers);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
   for (auto _ : state) updater.update(map, {&evidence}, f.workers);

@@ -50,7 +50,7 @@ TEST(InstructionSets, LinesEqualBruteForceOnEach) {
           BeamField field(geometry, config.kernel, index);
           field.setBeams({scene.scan.origin, scene.scan.points}, workers);
           BeamEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
-          evidence.setField(field);
+          evidence.setField(field, workers);
           SemanticMap map(geometry, config.prior, 4);
           MapUpdater().update(map, {&evidence}, workers);
           ASSERT_GT(map.size(), 0u);
@@ -87,7 +87,7 @@ TEST(InstructionSets, LinesOfAnyKernelEqualBruteForceOnEach) {
       ++scenes;
       for (const std::string& set : instructionSets()) {
         BeamEvidence evidence(BeamWeight::kLinear, FreeSpaceExtent::kObserved, set);
-        evidence.setField(field);
+        evidence.setField(field, workers);
         SemanticMap map(geometry, config.prior, 4);
         MapUpdater().update(map, {&evidence}, workers);
         EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u)
@@ -121,7 +121,7 @@ TEST(InstructionSets, LinesFarFromTheSensorEqualBruteForceOnEach) {
         GridGeometry::blockOf(geometry.voxelAt(scene.scan.origin + 0.5 * far.cast<double>()));
     for (const std::string& set : instructionSets()) {
       BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kMapped, set);
-      evidence.setField(field);
+      evidence.setField(field, workers);
       SemanticMap map(geometry, config.prior, 4);
       for (int n = 0; n < 27; ++n) {
         map.getOrAllocate({{middle.x + n % 3 - 1, middle.y + n / 3 % 3 - 1, middle.z + n / 9 - 1}});
@@ -144,7 +144,7 @@ TEST(InstructionSets, BeamsWithoutLengthReachNothing) {
       BeamField field(geometry, config.kernel, BeamIndexType::kTable);
       field.setBeams({origin, ends}, workers);
       BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kObserved, set);
-      evidence.setField(field);
+      evidence.setField(field, workers);
       auto map = std::make_unique<SemanticMap>(geometry, config.prior, 4);
       MapUpdater().update(*map, {&evidence}, workers);
       return map;
@@ -172,7 +172,7 @@ TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
     BeamEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kObserved, set);
     for (int n = 0; n < 200; ++n) {
       field.setBeams({{0.1, 0.2, 0.05}, {{anywhere(random), anywhere(random), anywhere(random)}}}, workers);
-      evidence.setField(field);
+      evidence.setField(field, workers);
       SemanticMap map(geometry, config.prior, 4);
       MapUpdater().update(map, {&evidence}, workers);
       for (const auto& entry : map.entries()) {
@@ -195,7 +195,7 @@ void expectLinesOfManyBeams(const reference::Scene& scene, BeamWeight weight, Be
   field.setBeams({scene.scan.origin, scene.scan.points}, workers);
   for (const std::string& set : instructionSets()) {
     BeamEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
-    evidence.setField(field);
+    evidence.setField(field, workers);
     SemanticMap map(geometry, config.prior, 4);
     MapUpdater().update(map, {&evidence}, workers);
     ASSERT_GT(map.size(), 0u);

@@ -10,7 +10,7 @@ class BeamLines : public FreeSpaceModel {
   explicit BeamLines(const FreeSpaceConfig& config) : evidence_(config.weight, config.extent) {}
 
   FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, Workers& workers) override {
-    evidence_.setField(beams.field(workers));
+    evidence_.setField(beams.field(workers), workers);
     return {&evidence_, beams.beams().ends.size()};
   }
 

@@ -30,12 +30,15 @@ bool scaleAndLimit(float scale, float limit, float* sums) {
 
 }  // namespace
 
+void BeamEvidence::setField(const BeamField& field, Workers& workers) {
+  field_ = &field;
+  if (field.kernel().type == KernelType::kCounting) return;
+  tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), workers);
+}
+
 const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {
   const double reach = field_->reachMetres();
   touched_.clear();
-  if (field_->kernel().type == KernelType::kSparse) {
-    tracks_.set(field_->beams(), field_->geometry().resolution(), reach, workers);
-  }
   if (extent_ == FreeSpaceExtent::kMapped) {
     insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {

@@ -80,6 +80,7 @@ class BoxSearch {
       until = here ? IntLanes{} + (kBlockEdge * (k + 1) - 1) : until;
       found |= here;
     }
+    if (!anyOf(found)) return to;
     first = first > from ? first : from;
     last = last < until ? last : until;
     for (int n = 0; n < kLanes; ++n) {

@@ -5,6 +5,7 @@
 #include "bki_mapping/core/stopwatch.h"
 
 namespace bki_mapping {
+
 void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers) {
   numbering_.clear();
   jobs_.clear();

@@ -49,8 +49,8 @@ struct BoxAxis {
 template <BeamWeight kWeight, typename Add>
 [[gnu::always_inline]] inline void forEachPass(const BeamTrackArrays& beams, const BeamBox& box,
                                                GroupSums& sums, Add&& add) {
-  constexpr double kDistant =
-      1e5;  // from here on the search, in single precision, names slices beside the box
+  // So far off the search, in single precision, names slices beside the box.
+  constexpr double kDistant = 1e5;
   const bool distant = box.centre().cwiseAbs().maxCoeff() > kDistant;
   BoxAxis axes[3] = {{box, 0}, {box, 1}, {box, 2}};
   for (std::size_t n = 0; n < sums.pass_count; ++n) {

@@ -18,7 +18,7 @@ class BeamEvidence : public Evidence {
       : weight_(weight), extent_(extent), loops_(innerLoopsFor(instruction_set)) {}
 
   /// Replaces the beams. @param field must stay where it is until the scan is done.
-  void setField(const BeamField& field) { field_ = &field; }
+  void setField(const BeamField& field, Workers& workers);
 
   const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
   double effort(const BlockGroup& group) const override;

@@ -20,6 +20,12 @@ class GroupSums {
   static constexpr int kFirst = kPad * kRow + kPad;                     ///< the group's first voxel
   static_assert(kPad + kGroupVoxels + kPad <= kRow);
 
+  GroupSums() = default;
+  GroupSums(const GroupSums&) = delete;  // it points into its own memory, which a move takes along
+  GroupSums& operator=(const GroupSums&) = delete;
+  GroupSums(GroupSums&&) = default;
+  GroupSums& operator=(GroupSums&&) = default;
+
   /// Forgets all sums. @param blocks that matter; of the others no sums are kept.
   void start(std::uint64_t blocks);
   /// Makes room for the sums of one main axis, which are 0 then. @return voxel (-kPad, -kPad) of the first
