@@ -69,8 +69,8 @@ TEST(InstructionSets, LinesOfAnyKernelEqualBruteForceOnEach) {
     int beams;
   };
   Workers workers(2);
-  for (const Size& size : {Size{0.3, 0.1, 60}, Size{0.3, 0.4, 60}, Size{0.3, 0.43, 60}, Size{0.1, 0.3, 40},
-                           Size{0.2, 1.5, 20}, Size{0.04, 2.88, 1}}) {
+  for (const Size& size : {Size{0.3, 0.1, 60}, Size{0.3, 0.4, 60}, Size{0.3, 0.43, 60}, Size{0.3, 0.57, 60},
+                           Size{0.1, 0.3, 40}, Size{0.2, 1.5, 20}, Size{0.04, 2.88, 1}}) {
     int scenes = 0;
     for (const reference::Scene& scene : reference::nastyScenes(size.beams)) {
       MapperConfig config;

@@ -5,6 +5,7 @@
 /// slice, the voxel is off the beam's line by d^2 = |p|^2 - (w p)^2, and its rho greater by (w p) / length.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "beam_search.h"
@@ -65,19 +66,36 @@ template <BeamWeight kWeight, typename Add>
 }
 
 template <BeamWeight kWeight>
-void addThinBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums) {
+void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums) {
   const LaneKernel kernel;
   const ThinShape<2, 2> narrow;
   const ThinShape<2, 4> wide;
   const ThinShape<4, 4> full;
+  const ThickShape thick;
+  std::uint32_t layers[3][kGroupEdge];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
+  }
   forEachPass<kWeight>(
       beams, box, sums,
       [&](const BeamPass& pass, const BeamTrack& track, const TracedBeam& beam, const BoxAxis& axis) {
-        const ThinPlace place(axis.place(axis.laneOf(track, pass.first) + GroupSums::kPad),
-                              axis.place(axis.rowOf(track, pass.first) + GroupSums::kPad), track);
+        // A slice is reached as far as its slant makes it.
+        constexpr auto kNarrow = static_cast<float>(1.0 / kReachThatCounts), kThin = 2.0f * kNarrow;
+        const double lane = axis.laneOf(track, pass.first), row = axis.rowOf(track, pass.first);
+        if (std::max(track.half_lane, track.half_row) > kThin) {
+          const auto half = [](float voxels) {
+            return BoxAxis::place(static_cast<double>(voxels) * kReachThatCounts);
+          };
+          const ThickPlace place = {BoxAxis::place(lane), BoxAxis::place(row), half(track.half_lane),
+                                    half(track.half_row)};
+          addThick<kWeight>(beam, place, pass, layers[track.axis], thick, kernel,
+                            axis.sums + GroupSums::kFirst);
+          return;
+        }
+        const ThinPlace place(BoxAxis::place(lane + GroupSums::kPad), BoxAxis::place(row + GroupSums::kPad),
+                              track);
         float* const at = axis.sums + pass.first * GroupSums::kSlice;
         const int slices = pass.last - pass.first + 1;
-        constexpr auto kNarrow = static_cast<float>(1.0 / kReachThatCounts);
         if (track.half_row > kNarrow) {
           addThin<kWeight>(beam, place, slices, full, kernel, at);
         } else if (track.half_lane > kNarrow) {
@@ -89,39 +107,11 @@ void addThinBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& s
 }
 
 template <BeamWeight kWeight>
-void addThickBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums) {
-  const LaneKernel kernel;
-  const ThickShape shape;
-  std::uint32_t layers[3][kGroupEdge];
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
-  }
-  forEachPass<kWeight>(
-      beams, box, sums,
-      [&](const BeamPass& pass, const BeamTrack& track, const TracedBeam& beam, const BoxAxis& axis) {
-        const auto half = [&](float voxels) {
-          return axis.place(static_cast<double>(voxels) * kReachThatCounts);
-        };
-        const ThickPlace place = {axis.place(axis.laneOf(track, pass.first)),
-                                  axis.place(axis.rowOf(track, pass.first)), half(track.half_lane),
-                                  half(track.half_row)};
-        addThick<kWeight>(beam, place, pass, layers[track.axis], shape, kernel,
-                          axis.sums + GroupSums::kFirst);
-      });
-}
-
-template <BeamWeight kWeight>
 void traceWeightedBeams(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
                         const BeamBox& box, GroupSums& sums) {
   sums.start(box.blocks);
   findPasses(beams, ranges, count, box, sums);
-  // A slice is reached as far as its slant makes it: 2 voxels is what a thin beam is added to.
-  constexpr double kThin = 2.0, kSteepest = 1.41421356;
-  if (box.reach * kSteepest <= kThin) {
-    addThinBeams<kWeight>(beams, box, sums);
-  } else {
-    addThickBeams<kWeight>(beams, box, sums);
-  }
+  addBeams<kWeight>(beams, box, sums);
 }
 
 void traceBeamsLoop(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
