@@ -1,6 +1,7 @@
 #include "bki_mapping/inference/beam_tracks.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "bki_mapping/inference/beam_cells.h"
 #include "bki_mapping/inference/chunks.h"
@@ -56,6 +57,9 @@ void BeamTracks::set(const Beams& beams, double resolution, double length, Worke
   axis_.resize(padded, 0);
   for (auto* each : {&slope_lane_, &slope_row_, &end_}) each->resize(padded, 0.0f);
   tracks_.resize(count);
+  if (length > kMostTrackReach * resolution) {
+    throw std::invalid_argument("a kernel of more than 72 voxels is too long for lines");
+  }
   const auto per_metre = static_cast<float>(1.0 / resolution),
              reach = static_cast<float>(length / resolution);
   const Chunks chunks(count);

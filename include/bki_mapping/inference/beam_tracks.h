@@ -14,9 +14,10 @@ namespace bki_mapping {
 /// one behind the other along the row axis, and a row's voxels, its lanes, along the lane axis.
 constexpr int kLaneAxis[3] = {1, 0, 0}, kRowAxis[3] = {2, 2, 1};
 
-/// Places in a slice are kept as whole numbers, too: so many are a voxel. With a kernel of up to 72 voxels,
-/// which is the longest, what is computed with them stays below 256 voxels.
+/// Places in a slice are kept as whole numbers, too: so many are a voxel. With a kernel of up to
+/// kMostTrackReach voxels what is computed with them stays below 256 voxels.
 constexpr int kTrackBits = 23;
+constexpr double kMostTrackReach = 72.0 * (1.0 + 1e-9);  ///< with room for rounding
 constexpr std::int32_t kTrackVoxel = 1 << kTrackBits;
 
 /// One beam. Lengths are in voxels where nothing else is said.
@@ -44,6 +45,7 @@ struct BeamTrackArrays {
 class BeamTracks {
  public:
   /// Replaces the beams. @param length of the kernel [m].
+  /// @throws std::invalid_argument if that is more than 72 voxels.
   void set(const Beams& beams, double resolution, double length, Workers& workers);
 
   BeamTrackArrays arrays() const {
