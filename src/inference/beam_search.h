@@ -11,13 +11,13 @@
 namespace bki_mapping {
 namespace {
 
-/// The blocks of a box as sets of bits: those of a layer across a main axis, lanes first.
+/// The blocks of a box as sets of bits: those of a layer across a main axis, side first.
 struct BoxBlocks {
-  static constexpr int kAll = 0xffff, kEachRow = 0x1111, kEachLane = 0xf;
+  static constexpr int kAll = 0xffff, kEachHeight = 0x1111, kEachSide = 0xf;
 
   Table<std::int32_t> layer[kGroupEdge];  ///< by main axis: those that matter
   /// Those with number n - 1 and more, and those with up to n - 1, n being 0 to 5.
-  Table<std::int32_t> lane_from, lane_to, row_from, row_to;
+  Table<std::int32_t> side_from, side_to, height_from, height_to;
 
   explicit BoxBlocks(std::uint64_t blocks) {
     static_assert(kGroupEdge == 4);
@@ -28,10 +28,10 @@ struct BoxBlocks {
     }
     for (int n = 0; n <= 5; ++n) {
       const int below = std::max(n - 1, 0), above = std::max(4 - n, 0);  // how many are left out
-      lane_from.values[n] = kEachRow * (kEachLane & (kEachLane << below));
-      row_from.values[n] = kAll & (kAll << 4 * below);
-      lane_to.values[n] = kEachRow * (kEachLane >> above);
-      row_to.values[n] = kAll >> 4 * above;
+      side_from.values[n] = kEachHeight * (kEachSide & (kEachSide << below));
+      height_from.values[n] = kAll & (kAll << 4 * below);
+      side_to.values[n] = kEachHeight * (kEachSide >> above);
+      height_to.values[n] = kAll >> 4 * above;
     }
   }
 };
@@ -44,8 +44,8 @@ class BoxSearch {
     const Eigen::Vector3f centre = box.centre().cast<float>();
     for (int axis = 0; axis < 3; ++axis) {
       main_.values[axis] = centre[axis];
-      lane_.values[axis] = centre[kLaneAxis[axis]];
-      row_.values[axis] = centre[kRowAxis[axis]];
+      side_.values[axis] = centre[kSideAxis[axis]];
+      height_.values[axis] = centre[kHeightAxis[axis]];
     }
     slack_ = 0.01f + 1e-6f * centre.cwiseAbs().maxCoeff();  // for rounding
   }
@@ -58,9 +58,9 @@ class BoxSearch {
     const FloatLanes end = load(beams.end + b), centre = main_[axis];
     FloatLanes low = greater(lesser(FloatLanes{}, end) - reach_ - centre, FloatLanes{} - kHalf),
                high = lesser(greater(FloatLanes{}, end) + reach_ - centre, FloatLanes{} + kHalf);
-    const Side lane = side(load(beams.slope_lane + b), lane_[axis], centre),
-               row = side(load(beams.slope_row + b), row_[axis], centre);
-    for (const Side* each : {&lane, &row}) {
+    const Across side = across(load(beams.slope_side + b), side_[axis], centre),
+                 height = across(load(beams.slope_height + b), height_[axis], centre);
+    for (const Across* each : {&side, &height}) {
       low = greater(low, (-kHalf - each->reach - each->turned) * each->inverse_slope);
       high = lesser(high, (kHalf + each->reach - each->turned) * each->inverse_slope);
     }
@@ -74,8 +74,8 @@ class BoxSearch {
     for (int k = 0; k < kGroupEdge; ++k) {
       const IntLanes here =
           (first < kBlockEdge * (k + 1)) & (last >= kBlockEdge * k) & alive &
-          ((blocksOf(lane, k, blocks_.lane_from, blocks_.lane_to) &
-            blocksOf(row, k, blocks_.row_from, blocks_.row_to) & blocks_.layer[k][axis]) != 0);
+          ((blocksOf(side, k, blocks_.side_from, blocks_.side_to) &
+            blocksOf(height, k, blocks_.height_from, blocks_.height_to) & blocks_.layer[k][axis]) != 0);
       from = (here & ~found) ? IntLanes{} + kBlockEdge * k : from;
       until = here ? IntLanes{} + (kBlockEdge * (k + 1) - 1) : until;
       found |= here;
@@ -83,6 +83,7 @@ class BoxSearch {
     if (!anyOf(found)) return to;
     first = first > from ? first : from;
     last = last < until ? last : until;
+    turnSkew(load(beams.skew + b), side, first, last);
     for (int n = 0; n < kLanes; ++n) {
       *to = {b + static_cast<std::uint32_t>(n), first[n], last[n]};
       to -= found[n];
@@ -93,25 +94,38 @@ class BoxSearch {
  private:
   static constexpr auto kHalf = static_cast<float>(BeamBox::kHalf);
 
-  /// How beams run along the lanes, or the rows.
-  struct Side {
+  /// How beams run along the side axis, or the height axis.
+  struct Across {
     FloatLanes slope;
     FloatLanes at;             ///< place in the slice through the box's centre
     FloatLanes reach;          ///< of the kernel, at least
     FloatLanes inverse_slope;  ///< without its sign
     FloatLanes turned;         ///< `at`, with the axis turned so that the slope is positive
   };
-  Side side(FloatLanes slope, FloatLanes centre, FloatLanes main) const {
+  Across across(FloatLanes slope, FloatLanes centre, FloatLanes main) const {
     const FloatLanes at = main * slope - centre, size = greater(magnitude(slope), FloatLanes{} + 1e-9f);
     return {slope, at, reach_ * (1.0f + 0.5f * slope * slope) + slack_, 1.0f / size, slope < 0.0f ? -at : at};
   }
+  /// Turns straight slices into skew ones that hold the same voxels which beams reach, where they are skew.
+  void turnSkew(FloatLanes skew, const Across& side, IntLanes& first, IntLanes& last) const {
+    // A column is up to half a voxel along the main axis from the beam's place in its skew slice.
+    constexpr float kBehind = 64.0f;  // so that there are none below 0
+    const FloatLanes by_voxel = 2.0f + magnitude(side.slope),
+                     slice =
+                         skew * (side.at + kHalf) + (2.0f * kHalf + kBehind);  // of the beam at the centre
+    const FloatLanes low = (toFloat(first) - (kHalf + 0.5f)) * by_voxel + slice,
+                     high = (toFloat(last) - (kHalf - 0.5f)) * by_voxel + slice;
+    const IntLanes straight = skew == 0.0f;
+    first = straight ? first : toInt(low + 1.0f - slack_) - static_cast<std::int32_t>(kBehind);
+    last = straight ? last : toInt(high + slack_) - static_cast<std::int32_t>(kBehind);
+  }
   /// The blocks that beams reach in layer k.
-  static IntLanes blocksOf(const Side& side, int k, const Table<std::int32_t>& from,
+  static IntLanes blocksOf(const Across& across, int k, const Table<std::int32_t>& from,
                            const Table<std::int32_t>& to) {
     constexpr float kToBlocks = 1.0f / kBlockEdge, kHalfLayer = 0.5f * (kBlockEdge - 1);
     const float middle = static_cast<float>(kBlockEdge * k) + kHalfLayer - kHalf;
-    const FloatLanes at = (side.at + middle * side.slope + (kHalf + kBlockEdge)) * kToBlocks;
-    const FloatLanes room = (side.reach + kHalfLayer * magnitude(side.slope)) * kToBlocks;
+    const FloatLanes at = (across.at + middle * across.slope + (kHalf + kBlockEdge)) * kToBlocks;
+    const FloatLanes room = (across.reach + kHalfLayer * magnitude(across.slope)) * kToBlocks;
     const auto number = [](FloatLanes x) {
       return toInt(lesser(greater(x, FloatLanes{}), FloatLanes{} + (kGroupEdge + 1)));
     };
@@ -119,7 +133,7 @@ class BoxSearch {
   }
 
   BoxBlocks blocks_;
-  Table<float> main_, lane_, row_;  ///< the box's centre by main axis
+  Table<float> main_, side_, height_;  ///< the box's centre by main axis
   float reach_, slack_;
 };
 

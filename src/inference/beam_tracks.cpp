@@ -17,36 +17,54 @@ int mainAxis(const Eigen::Vector3f& beam) {
   return size.z() > size[of_two] ? 2 : of_two;
 }
 
-/// With w the beam's unit direction within the slice, a place at p from the beam is off its line by d^2 =
-/// |p|^2 - (w p)^2; the factors of that form by Cholesky, lane first, are e and g. Slopes are multiplied by
-/// the size of a box, and therefore in double precision. @param reach of the kernel [voxels].
-BeamTrack trackOf(const Eigen::Vector3f& beam, int axis, double resolution, float reach) {
-  const double lane = static_cast<double>(beam[kLaneAxis[axis]]),
-               row = static_cast<double>(beam[kRowAxis[axis]]);
-  const double inverse = 1.0 / static_cast<double>(beam[axis]);
+/// How a beam runs by step along its main axis.
+struct Course {
+  double side, height;  ///< slopes
+  double rho;           ///< change of rho
+};
+
+/// In skew slices, where one column of each and two voxels of that hold the kernel; else in straight ones.
+/// @param reach of the kernel [voxels].
+///
+/// Let v lead from a slice's column to the next, n stand across slices (v = (0, 1), n = (1, 0) in straight
+/// ones, v = (1, -2 skew), n = (2, skew) in skew ones, along the main and side axes), h along columns, u be
+/// the unit direction. A place at p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
+/// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Slopes are
+/// multiplied by the size of a box, and therefore in double precision.
+BeamTrack trackOf(const Course& course, int axis, float reach) {
+  const auto s = static_cast<float>(course.side), t = static_cast<float>(course.height);
+  const float counts = reach * static_cast<float>(kReachThatCounts);
+  const float slant = std::sqrt(1.0f + s * s), skew_slices = 2.0f + std::abs(s);
+  const float squared = skew_slices * skew_slices;
+  const bool is_skew =
+      counts * slant <= 0.5f * skew_slices && counts * counts * (squared + 5.0f * t * t) <= squared;
+
+  const double slices = is_skew ? 2.0 + std::abs(course.side) : 1.0;  // by step along the main axis
+  const double by_slice = 1.0 / slices;
   BeamTrack track;
-  track.slope_lane = lane * inverse;
-  track.slope_row = row * inverse;
-  track.rho_slice = resolution * inverse;
+  track.slicing = BeamSlicing{axis, !is_skew ? 0 : course.side < 0.0 ? -1 : 1}.number();
+  track.slope_side = (is_skew ? 1.0 : course.side) * by_slice;
+  track.slope_height = course.height * by_slice;
+  track.rho_slice = course.rho * by_slice;
   const auto steps = [](double slope) {
     return static_cast<std::int32_t>(slope * kTrackVoxel + std::copysign(0.5, slope));  // rounded
   };
-  track.step_lane = steps(track.slope_lane);
-  track.step_row = steps(track.slope_row);
+  track.step_side = steps(track.slope_side);
+  track.step_height = steps(track.slope_height);
 
-  const auto s = static_cast<float>(track.slope_lane), t = static_cast<float>(track.slope_row);
-  const float lane_slant = std::sqrt(1.0f + s * s), row_slant = std::sqrt(1.0f + t * t);
-  const float u = 1.0f / std::sqrt(1.0f + s * s + t * t);  // of the unit direction, along the main axis
-  const float inverse_slant = 1.0f / row_slant, inverse_reach = 1.0f / reach;
-  track.e_lane = u * row_slant * inverse_reach;
-  track.e_row = -s * t * u * inverse_slant * inverse_reach;
-  track.g_row = inverse_slant * inverse_reach;
-  const float rho = static_cast<float>(track.rho_slice) * u * u;
-  track.rho_lane = s * rho;
-  track.rho_row = t * rho;
-  track.half_lane = reach * lane_slant;
-  track.half_row = reach * row_slant;
-  track.axis = axis;
+  const float u = 1.0f / std::sqrt(1.0f + s * s + t * t);         // along the main axis
+  const float v_along = is_skew ? 1.0f - 2.0f * std::abs(s) : s;  // u v is u v_along
+  const float across = u * (is_skew ? skew_slices : 1.0f);        // u n
+  const float e = std::sqrt((is_skew ? 5.0f : 1.0f) - u * u * v_along * v_along);
+  const float by_reach = 1.0f / reach, by_e = by_reach / e, by_across = counts / across;
+  track.e_side = e * by_reach;
+  track.e_height = -u * u * v_along * t * by_e;
+  track.g_height = across * by_e;
+  const float rho = static_cast<float>(course.rho) * u * u;
+  track.rho_side = v_along * rho;
+  track.rho_height = t * rho;
+  track.half_side = u * slant * by_across;
+  track.half_height = e * by_across;
   return track;
 }
 
@@ -55,7 +73,7 @@ BeamTrack trackOf(const Eigen::Vector3f& beam, int axis, double resolution, floa
 void BeamTracks::set(const Beams& beams, double resolution, double length, Workers& workers) {
   const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
   axis_.resize(padded, 0);
-  for (auto* each : {&slope_lane_, &slope_row_, &end_}) each->resize(padded, 0.0f);
+  for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
   tracks_.resize(count);
   if (length > kMostTrackReach * resolution) {
     throw std::invalid_argument("a kernel of more than 72 voxels is too long for lines");
@@ -68,12 +86,19 @@ void BeamTracks::set(const Beams& beams, double resolution, double length, Worke
       const Eigen::Vector3f& beam = beams.ends[b];
       const int axis = mainAxis(beam);
       // A beam without length has no direction, and reaches nothing: all is 0, rho everywhere.
-      const BeamTrack track =
-          std::abs(beam[axis]) < kShortest ? BeamTrack{} : trackOf(beam, axis, resolution, reach);
+      Course course = {};
+      BeamTrack track = {};
+      if (std::abs(beam[axis]) >= kShortest) {
+        const double inverse = 1.0 / static_cast<double>(beam[axis]);
+        course = {static_cast<double>(beam[kSideAxis[axis]]) * inverse,
+                  static_cast<double>(beam[kHeightAxis[axis]]) * inverse, resolution * inverse};
+        track = trackOf(course, axis, reach);
+      }
       tracks_[b] = track;
       axis_[b] = axis;
-      slope_lane_[b] = static_cast<float>(track.slope_lane);
-      slope_row_[b] = static_cast<float>(track.slope_row);
+      slope_side_[b] = static_cast<float>(course.side);
+      slope_height_[b] = static_cast<float>(course.height);
+      skew_[b] = static_cast<float>(BeamSlicing::of(track.slicing).skew);
       end_[b] = beam[axis] * per_metre;
     }
   });

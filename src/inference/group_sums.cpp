@@ -8,75 +8,79 @@ namespace {
 
 constexpr std::size_t kCacheLine = 16;  ///< [floats]
 
-/// Calls visit(row, offset) for the rows of a block: where a row's first voxel is in the array of a main
-/// axis, and in the block's sums. @param place of the block in its group.
+/// Where a block's first voxel is in the array of a row axis. @param place in the group [blocks].
+int cornerOf(int row_axis, const std::array<int, 3>& place) {
+  int corner = GroupSums::kFirst;
+  for (int axis = 0; axis < 3; ++axis) {
+    corner += kBlockEdge * place[static_cast<std::size_t>(axis)] * GroupSums::stride(row_axis, axis);
+  }
+  return corner;
+}
+
+/// Calls visit(row, offset) for the rows of a block: where the first voxel of a row is, from the block's
+/// first on, and in the block's sums.
 template <typename Visit>
-void forEachRow(int axis, const std::array<int, 3>& place, Visit&& visit) {
-  constexpr int kStride[3] = {1, kBlockEdge, kBlockEdge * kBlockEdge};
-  const auto first = [&](int of) { return kBlockEdge * place[static_cast<std::size_t>(of)]; };
-  const int corner = GroupSums::kFirst + first(axis) * GroupSums::kSlice +
-                     first(kRowAxis[axis]) * GroupSums::kRow + first(kLaneAxis[axis]);
-  for (int slice = 0; slice < kBlockEdge; ++slice) {
-    for (int row = 0; row < kBlockEdge; ++row) {
-      visit(corner + slice * GroupSums::kSlice + row * GroupSums::kRow,
-            slice * kStride[axis] + row * kStride[kRowAxis[axis]]);
+void forEachRow(int row_axis, Visit&& visit) {
+  constexpr int kOffset[3] = {1, kBlockEdge, kBlockEdge * kBlockEdge};
+  const int a = row_axis == 0 ? 1 : 0, b = row_axis == 2 ? 1 : 2;  // the other axes
+  for (int n = 0; n < kBlockEdge; ++n) {
+    for (int m = 0; m < kBlockEdge; ++m) {
+      visit(n * GroupSums::stride(row_axis, b) + m * GroupSums::stride(row_axis, a),
+            n * kOffset[b] + m * kOffset[a]);
     }
   }
 }
 
-template <int kLaneStride>
-void addBlock(int axis, const std::array<int, 3>& place, const float* numbers, float* sums) {
-  forEachRow(axis, place, [&](int row, int offset) {
-    for (int n = 0; n < kBlockEdge; ++n) sums[offset + n * kLaneStride] += numbers[row + n];
+/// Adds rows to a block's sums, in which a row's voxels are kStride apart.
+template <int kStride>
+void addRows(int row_axis, const float* numbers, float* sums) {
+  forEachRow(row_axis, [&](int row, int offset) {
+    for (int n = 0; n < kBlockEdge; ++n) sums[offset + n * kStride] += numbers[row + n];
   });
 }
 
 }  // namespace
 
-void GroupSums::Axis::takeMemory() {
+void GroupSums::Array::takeMemory() {
   if (numbers) return;
-  constexpr std::size_t kSize = kSlices * kSlice;
-  memory.resize(kSize + kCacheLine);
+  memory.resize(kArray + kCacheLine);
   void* at = memory.data();
   std::size_t space = memory.size() * sizeof(float);
-  numbers = static_cast<float*>(std::align(kCacheLine * sizeof(float), kSize * sizeof(float), at, space));
+  numbers = static_cast<float*>(std::align(kCacheLine * sizeof(float), kArray * sizeof(float), at, space));
 }
 
 void GroupSums::start(std::uint64_t blocks) {
   blocks_ = blocks;
-  for (Axis& axis : axes_) axis.is_open = false;
+  for (Array& array : arrays_) array.is_open = false;
 }
 
-float* GroupSums::open(int axis) {
-  Axis& sums = axes_[static_cast<std::size_t>(axis)];
-  sums.takeMemory();
-  sums.is_open = true;
+float* GroupSums::open(int row_axis) {
+  Array& array = arrays_[static_cast<std::size_t>(row_axis)];
+  array.takeMemory();
+  array.is_open = true;
   for (int n = 0; n < kGroupEdge * kGroupEdge * kGroupEdge; ++n) {
     if ((blocks_ >> n & 1) == 0) continue;
-    const std::array<int, 3> place = {n % kGroupEdge, n / kGroupEdge % kGroupEdge,
-                                      n / (kGroupEdge * kGroupEdge)};
-    forEachRow(axis, place, [&](int row, int) { std::fill_n(sums.numbers + row, kBlockEdge, 0.0f); });
+    float* const block = array.numbers + cornerOf(row_axis, {n % kGroupEdge, n / kGroupEdge % kGroupEdge,
+                                                             n / (kGroupEdge * kGroupEdge)});
+    forEachRow(row_axis, [&](int row, int) { std::fill_n(block + row, kBlockEdge, 0.0f); });
   }
-  return sums.numbers;
+  return array.numbers + kFirst;
 }
 
 void GroupSums::sumsOf(const std::array<int, 3>& place, float* sums) const {
   std::fill_n(sums, kBlockVoxels, 0.0f);
-  for (int axis = 0; axis < 3; ++axis) {
-    const Axis& from = axes_[static_cast<std::size_t>(axis)];
-    if (!from.is_open) continue;
-    if (kLaneAxis[axis] == 0) {
-      addBlock<1>(axis, place, from.numbers, sums);
-    } else {
-      addBlock<kBlockEdge>(axis, place, from.numbers, sums);
-    }
-  }
+  const auto numbers = [&](int row_axis) {
+    return arrays_[static_cast<std::size_t>(row_axis)].numbers + cornerOf(row_axis, place);
+  };
+  if (arrays_[0].is_open) addRows<1>(0, numbers(0), sums);
+  if (arrays_[1].is_open) addRows<kBlockEdge>(1, numbers(1), sums);
+  if (arrays_[2].is_open) addRows<kBlockEdge * kBlockEdge>(2, numbers(2), sums);
 }
 
 void GroupSums::reserveAs(const GroupSums& other) {
   if (passes.size() < other.passes.size()) passes.resize(other.passes.size());
-  for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
-    if (other.axes_[axis].numbers) axes_[axis].takeMemory();
+  for (std::size_t axis = 0; axis < arrays_.size(); ++axis) {
+    if (other.arrays_[axis].numbers) arrays_[axis].takeMemory();
   }
 }
 

@@ -154,16 +154,46 @@ template <int kCount>
   }
 }
 
-/// Adds four numbers to two rows of two. @param stride from row to row.
-[[gnu::always_inline]] inline void addToSquare(float* to, int stride, Part<4>::Lanes numbers) {
-#if defined(__SSE__)
-  __m64 *const row = reinterpret_cast<__m64*>(to), *const next_row = reinterpret_cast<__m64*>(to + stride);
-  const __m128 sums =
-      _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), row), next_row) + static_cast<__m128>(numbers);
-  _mm_storel_pi(row, sums);
-  _mm_storeh_pi(next_row, sums);
+/// Stores the lanes of a and b by pairs; where the pair of a lane then is, pairOf says: that
+/// of an odd lane stands behind the one before.
+[[gnu::always_inline]] inline void storePairs(float* to, FloatLanes a, FloatLanes b) {
+#if defined(__AVX512F__)
+  store(to, static_cast<FloatLanes>(_mm512_unpacklo_ps(a, b)));
+  store(to + kLanes, static_cast<FloatLanes>(_mm512_unpackhi_ps(a, b)));
+#elif defined(__AVX2__)
+  store(to, static_cast<FloatLanes>(_mm256_unpacklo_ps(a, b)));
+  store(to + kLanes, static_cast<FloatLanes>(_mm256_unpackhi_ps(a, b)));
+#elif defined(__SSE__)
+  store(to, static_cast<FloatLanes>(_mm_unpacklo_ps(a, b)));
+  store(to + kLanes, static_cast<FloatLanes>(_mm_unpackhi_ps(a, b)));
 #else
-  for (int n = 0; n < 4; ++n) to[n / 2 * stride + n % 2] += numbers[n];
+  for (int lane = 0; lane < kLanes; ++lane) {
+    to[2 * lane] = a[lane];
+    to[2 * lane + 1] = b[lane];
+  }
+#endif
+}
+constexpr int pairOf(int lane) {
+#if defined(__SSE__)
+  return lane / 4 * 4 + lane % 2 * 2 + lane % 4 / 2 * kLanes;  // by quarters of what unpacking gives
+#else
+  return 2 * lane;
+#endif
+}
+
+/// Adds two numbers each to two places that share nothing.
+[[gnu::always_inline]] inline void addPairs(float* a, float* b, Part<4>::Lanes numbers) {
+#if defined(__SSE__)
+  __m64 *const first = reinterpret_cast<__m64*>(a), *const second = reinterpret_cast<__m64*>(b);
+  const __m128 sums =
+      _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), first), second) + static_cast<__m128>(numbers);
+  _mm_storel_pi(first, sums);
+  _mm_storeh_pi(second, sums);
+#else
+  for (int n = 0; n < 2; ++n) {
+    a[n] += numbers[n];
+    b[n] += numbers[2 + n];
+  }
 #endif
 }
 

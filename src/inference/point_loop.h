@@ -34,7 +34,7 @@ struct HaloLayers {
 /// Adds eight values to the halo's voxels from `first` on: two rows of two, in each of two layers.
 [[gnu::always_inline]] inline void addCorners(__m128 low, __m128 high, float* first) {
   for (const __m128& layer : {low, high}) {
-    addToSquare(first, kHaloEdge, layer);
+    addPairs(first, first + kHaloEdge, layer);
     first += kHaloEdge * kHaloEdge;
   }
 }

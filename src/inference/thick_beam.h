@@ -1,10 +1,9 @@
-/// @file Beams of a long kernel, added to all voxels that they reach in a slice; included by trace_loop.h
-/// alone.
+/// @file Beams of a long kernel, added to all voxels that they reach in straight slices; included by
+/// trace_loop.h alone.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
-#include <type_traits>
 
 #include "bki_mapping/inference/group_sums.h"
 #include "lane_kernel.h"
@@ -15,16 +14,17 @@
 namespace bki_mapping {
 namespace {
 
-/// Lanes are voxels side by side, times as many rows as there is room for.
-constexpr int kRowLanes = kLanes < 8 ? kLanes : 8, kRowsAtOnce = kLanes / kRowLanes;
-
+/// Lanes are kSides voxels side by side, times as many rows, one above the other, as there is room for.
+template <int kSides>
 struct ThickShape {
-  FloatLanes lane, row;
+  static constexpr int kRows = kLanes / kSides;
+
+  FloatLanes side, height;
 
   ThickShape() {
     for (int n = 0; n < kLanes; ++n) {
-      lane[n] = static_cast<float>(n % kRowLanes);
-      row[n] = static_cast<float>(n / kRowLanes);
+      side[n] = static_cast<float>(n % kSides);
+      height[n] = static_cast<float>(n / kSides);
     }
   }
 };
@@ -34,147 +34,157 @@ struct Span {
   int first, last;
 
   Span within(const Span& other) const { return {std::max(first, other.first), std::min(last, other.last)}; }
+  bool empty() const { return first > last; }
 };
 
-/// Row and lane of a beam in a slice, from the group's first voxel on, and how far it reaches [1 /
-/// kTrackVoxel].
-struct ThickPlace {
-  std::int32_t lane, row, half_lane, half_row;
+/// How far a beam reaches from its place in a slice [1 / kTrackVoxel].
+struct ThickReach {
+  std::int32_t side, height;
 
-  /// The voxels between two places.
-  Span between(std::int32_t low, std::int32_t high) const {
-    return {(low + (kTrackVoxel - 1)) >> kTrackBits, high >> kTrackBits};
-  }
-  /// The rows that the beam reaches in some slices from this on.
-  Span rows(const TracedBeam& beam, int slices) const {
-    const std::int32_t other = row + (slices - 1) * beam.step_row;
-    return between(std::min(row, other) - half_row, std::max(row, other) + half_row);
-  }
-  Span lanes(const TracedBeam& beam, int slices) const {
-    const std::int32_t other = lane + (slices - 1) * beam.step_lane;
-    return between(std::min(lane, other) - half_lane, std::max(lane, other) + half_lane);
-  }
-  void advance(const TracedBeam& beam, int slices) {
-    lane += slices * beam.step_lane;
-    row += slices * beam.step_row;
+  explicit ThickReach(const BeamTrack& track)
+      : side(TracedBeam::place(static_cast<double>(track.half_side))),
+        height(TracedBeam::place(static_cast<double>(track.half_height))) {}
+
+  /// The voxels that a beam reaches in some slices, along one axis. @param place in the first.
+  static Span span(std::int32_t place, std::int32_t step, int slices, std::int32_t half) {
+    const std::int32_t other = place + (slices - 1) * step;
+    return {(std::min(place, other) - half + (kTrackVoxel - 1)) >> kTrackBits,
+            (std::max(place, other) + half) >> kTrackBits};
   }
 };
 
-/// Those of some rows of voxels that are in blocks that matter, as far as these hold any of the lanes.
+/// Those of some heights that are in blocks that matter, as far as these hold any of the sides.
 /// @param layer as layerOf gives it.
-inline Span rowsThatMatter(std::uint32_t layer, const Span& lanes, const Span& rows) {
+inline Span heightsThatMatter(std::uint32_t layer, const Span& sides, const Span& heights) {
   constexpr Span kAll = {0, kGroupVoxels - 1};
-  constexpr std::uint32_t kEachRow = 0x1111;
-  const Span l = lanes.within(kAll), r = rows.within(kAll);
-  if (l.first > l.last || r.first > r.last) return {0, -1};
+  constexpr std::uint32_t kEachHeight = 0x1111;
   static_assert(kGroupEdge == 4);
-  layer &= kEachRow * (0xfu & (0xfu << l.first / kBlockEdge) & (0xfu >> (3 - l.last / kBlockEdge)));
-  layer &= (0xffffu << 4 * (r.first / kBlockEdge)) & (0xffffu >> 4 * (3 - r.last / kBlockEdge));
+  const Span s = sides.within(kAll), h = heights.within(kAll);
+  if (s.empty() || h.empty()) return {0, -1};
+  layer &= kEachHeight * (0xfu & (0xfu << s.first / kBlockEdge) & (0xfu >> (3 - s.last / kBlockEdge)));
+  layer &= (0xffffu << 4 * (h.first / kBlockEdge)) & (0xffffu >> 4 * (3 - h.last / kBlockEdge));
   if (layer == 0) return {0, -1};
   const int first = __builtin_ctz(layer) / kGroupEdge, last = (31 - __builtin_clz(layer)) / kGroupEdge;
-  return r.within({kBlockEdge * first, kBlockEdge * (last + 1) - 1});
+  return h.within({kBlockEdge * first, kBlockEdge * (last + 1) - 1});
 }
 
-/// Where a beam is added in the slices of a layer, and its values there.
-struct alignas(64) ThickSlices {
-  static constexpr int kSize = kLanes < kBlockEdge ? kBlockEdge : kLanes;
+/// What is to be added for a beam, so many lanes after so many.
+template <BeamWeight kWeight, int kSides>
+class ThickVectors {
+ public:
+  using Shape = ThickShape<kSides>;
 
-  std::int32_t at[kSize];                ///< the first voxel, from the group's first on
-  std::int32_t width[kSize];             ///< from the first lane to the last
-  float e[kSize], g[kSize], rho[kSize];  ///< at that voxel
-
-  /// @param rows that matter. @param count of rows that are added in each slice, from the first of those that
-  /// the beam reaches on.
-  [[gnu::always_inline]] ThickSlices(const ThickPlace& place, const TracedBeam& beam, const Span& rows,
-                                     int count) {
+  /// Takes slices from `first` on. @param heights that matter.
+  [[gnu::always_inline]] void add(const TracedBeam& beam, const ThickReach& reach, int first, int slices,
+                                  const Span& heights, SliceStrides strides) {
     constexpr std::int32_t kUp = kTrackVoxel - 1;
-    const int last_start = kGroupVoxels + GroupSums::kPad - count;
     constexpr float kStep = 1.0f / kTrackVoxel;
-    for (int n = 0; n < kBlockEdge; n += kLanes) {
-      const IntLanes slice = countUp() + n;
-      const IntLanes lane = place.lane + slice * beam.step_lane, row = place.row + slice * beam.step_row;
-      IntLanes first_lane = (lane + (kUp - place.half_lane)) >> kTrackBits,
-               last_lane = (lane + place.half_lane) >> kTrackBits,
-               first_row = (row + (kUp - place.half_row)) >> kTrackBits;
-      first_lane = first_lane > 1 - kRowLanes ? first_lane : IntLanes{} + (1 - kRowLanes);
-      last_lane = last_lane < kGroupVoxels - 1 ? last_lane : IntLanes{} + (kGroupVoxels - 1);
-      first_row = first_row > rows.first ? first_row : IntLanes{} + rows.first;
-      first_row = first_row < last_start ? first_row : IntLanes{} + last_start;
-      const FloatLanes l = toFloat((first_lane << kTrackBits) - lane) * kStep,
-                       r = toFloat((first_row << kTrackBits) - row) * kStep;
-      store(at + n, slice * GroupSums::kSlice + first_row * GroupSums::kRow + first_lane);
-      store(width + n, last_lane - first_lane);
-      store(e + n, l * beam.e_lane + r * beam.e_row);
-      store(g + n, r * beam.g_row);
-      store(rho + n, beam.rho + toFloat(slice) * beam.rho_slice + l * beam.rho_lane + r * beam.rho_row);
-    }
-  }
-};
-
-/// Adds a beam in slices of one layer. @param count times kRowsAtOnce rows are added; kCount if that is not
-/// 0.
-/// @param at the first of the slices.
-template <BeamWeight kWeight, int kCount>
-[[gnu::always_inline]] inline void addThickSlices(const TracedBeam& beam, const ThickSlices& where,
-                                                  int slices, int count, const ThickShape& shape,
-                                                  const LaneKernel& kernel, float* at) {
-  if constexpr (kCount > 0) count = kCount;
-  const FloatLanes e_lanes = shape.lane * beam.e_lane + shape.row * beam.e_row,
-                   g_lanes = shape.row * beam.g_row,
-                   rho_lanes = shape.lane * beam.rho_lane + shape.row * beam.rho_row;
-  for (int n = 0; n < slices; ++n) {
-    for (int first = 0; first <= where.width[n]; first += kRowLanes) {
-      const auto lane = static_cast<float>(first);
-      FloatLanes e = e_lanes + (where.e[n] + lane * beam.e_lane), g = g_lanes + where.g[n],
-                 rho = rho_lanes + (where.rho[n] + lane * beam.rho_lane);
-      float* to = at + where.at[n] + first;
-      for (int m = 0; m < count; ++m) {
-        const FloatLanes values = Weight<kWeight>::at(rho) * kernel(e * e + LaneKernel::kShift + g * g);
-        for (int r = 0; r < kRowsAtOnce; ++r) addTo(to + r * GroupSums::kRow, part<kRowLanes>(values, r));
-        to += kRowsAtOnce * GroupSums::kRow;
-        e += kRowsAtOnce * beam.e_row;
-        g += kRowsAtOnce * beam.g_row;
-        rho += kRowsAtOnce * beam.rho_row;
+    const int most = std::min(heights.last - heights.first, 2 * reach.height >> kTrackBits) + 1;
+    const int times = (most + Shape::kRows - 1) / Shape::kRows;
+    const int last_start = kGroupVoxels + GroupSums::kBeside - times * Shape::kRows;
+    const int runs = std::min((2 * reach.side >> kTrackBits) / kSides, kGroupVoxels / kSides) + 1;
+    int end = count_;
+    for (int n = 0; n < slices; n += kLanes) {
+      const int here = std::min(slices - n, kLanes);
+      const IntLanes slice = countUp() + (first + n - kMiddleSlice);
+      const IntLanes side = beam.side + slice * beam.step_side,
+                     height = beam.height + slice * beam.step_height;
+      IntLanes first_side = (side + (kUp - reach.side)) >> kTrackBits,
+               first_height = (height + (kUp - reach.height)) >> kTrackBits;
+      first_side = first_side > 1 - kSides ? first_side : IntLanes{} + (1 - kSides);
+      first_height = first_height > heights.first ? first_height : IntLanes{} + heights.first;
+      first_height = first_height < last_start ? first_height : IntLanes{} + last_start;
+      const FloatLanes h = toFloat((first_height << kTrackBits) - height) * kStep;
+      const FloatLanes slice_rho = beam.rho + toFloat(slice) * beam.rho_slice + h * beam.rho_height;
+      const IntLanes slice_at = (slice + kMiddleSlice) * strides.slice + first_height * strides.height;
+      for (int run = 0; run < runs; ++run) {
+        const IntLanes from = first_side < kGroupVoxels ? first_side : IntLanes{} + kGroupVoxels;
+        const FloatLanes s = toFloat((from << kTrackBits) - side) * kStep;
+        FloatLanes e = s * beam.e_side + h * beam.e_height, g = h * beam.g_height,
+                   rho = slice_rho + s * beam.rho_side;
+        IntLanes at = slice_at + from;
+        for (int time = 0; time < times; ++time, end += here) {
+          store(at_ + end, at);
+          store(e_ + end, e);
+          store(g_ + end, g);
+          store(rho_ + end, rho);
+          at += Shape::kRows * strides.height;
+          e += Shape::kRows * beam.e_height;
+          g += Shape::kRows * beam.g_height;
+          rho += Shape::kRows * beam.rho_height;
+        }
+        first_side += kSides;
       }
     }
+    count_ = end;
   }
-}
 
-/// Adds a beam in the slices of its pass. @param layers of the box, as layerOf gives them. @param at the
+  /// Adds them all.
+  [[gnu::always_inline]] void addTo(float* sums, const TracedBeam& beam, const Shape& shape,
+                                    const LaneKernel kernel, SliceStrides strides) {
+    const FloatLanes e_lanes = shape.side * beam.e_side + shape.height * beam.e_height,
+                     g_lanes = shape.height * beam.g_height,
+                     rho_lanes = shape.side * beam.rho_side + shape.height * beam.rho_height;
+    const int count = count_;
+    for (int n = 0; n < count; ++n) {
+      const FloatLanes e = e_lanes + e_[n], g = g_lanes + g_[n];
+      const FloatLanes values =
+          Weight<kWeight>::at(rho_lanes + rho_[n]) * kernel(e * e + LaneKernel::kShift + g * g);
+      float* const to = sums + at_[n];
+      for (int row = 0; row < Shape::kRows; ++row) {
+        bki_mapping::addTo(to + row * strides.height, part<kSides>(values, row));
+      }
+    }
+    count_ = 0;
+  }
+
+  /// Whether there may be no room for more.
+  bool full() const { return count_ + kMostAtOnce > kRoom; }
+
+ private:
+  static constexpr int kMostAtOnce =
+      kBlockEdge * (kGroupVoxels / Shape::kRows + 1) * (kGroupVoxels / kSides + 1);
+  static constexpr int kRoom = 512 + kMostAtOnce;
+
+  int count_ = 0;
+  // The first voxel, and e, g and rho there.
+  alignas(64) std::int32_t at_[kRoom + kLanes];
+  alignas(64) float e_[kRoom + kLanes], g_[kRoom + kLanes], rho_[kRoom + kLanes];
+};
+
+/// Adds a beam in the slices of its pass. @param layers of the box, as layerOf gives them. @param sums at the
 /// group's first voxel.
-template <BeamWeight kWeight>
-[[gnu::always_inline]] inline void addThick(TracedBeam beam, ThickPlace place, const BeamPass& pass,
-                                            const std::uint32_t (&layers)[kGroupEdge],
-                                            const ThickShape& shape, const LaneKernel& kernel, float* at) {
+template <BeamWeight kWeight, int kSides>
+[[gnu::always_inline]] inline void addThick(const TracedBeam& beam, const ThickReach& reach,
+                                            const BeamPass& pass, const std::uint32_t (&layers)[kGroupEdge],
+                                            const ThickShape<kSides>& shape, const LaneKernel& kernel,
+                                            ThickVectors<kWeight, kSides>& vectors, float* sums,
+                                            SliceStrides strides) {
   for (int slice = pass.first, slices; slice <= pass.last; slice += slices) {
     const int layer = slice / kBlockEdge;
     slices = std::min(pass.last + 1, (layer + 1) * kBlockEdge) - slice;
-    const Span rows = rowsThatMatter(layers[layer], place.lanes(beam, slices), place.rows(beam, slices));
-    if (rows.first <= rows.last) {
-      const int most = std::min(rows.last - rows.first, 2 * place.half_row >> kTrackBits) + 1;
-      const int count = (most + kRowsAtOnce - 1) / kRowsAtOnce;
-      const ThickSlices where(place, beam, rows, count * kRowsAtOnce);
-      const auto add = [&](auto of) {
-        addThickSlices<kWeight, decltype(of)::value>(beam, where, slices, count, shape, kernel,
-                                                     at + slice * GroupSums::kSlice);
-      };
-      switch (count) {
-        case 1:
-          add(std::integral_constant<int, 1>());
-          break;
-        case 2:
-          add(std::integral_constant<int, 2>());
-          break;
-        case 3:
-          add(std::integral_constant<int, 3>());
-          break;
-        default:
-          add(std::integral_constant<int, 0>());
-      }
-    }
-    place.advance(beam, slices);
-    beam.rho += static_cast<float>(slices) * beam.rho_slice;
+    const int steps = slice - kMiddleSlice;
+    const Span heights = heightsThatMatter(
+        layers[layer],
+        ThickReach::span(beam.side + steps * beam.step_side, beam.step_side, slices, reach.side),
+        ThickReach::span(beam.height + steps * beam.step_height, beam.step_height, slices, reach.height));
+    if (heights.empty()) continue;
+    if (vectors.full()) vectors.addTo(sums, beam, shape, kernel, strides);
+    vectors.add(beam, reach, slice, slices, heights, strides);
   }
+  vectors.addTo(sums, beam, shape, kernel, strides);
+}
+
+/// The same where the kernel is so short that leaving out heights does not pay.
+template <BeamWeight kWeight, int kSides>
+[[gnu::always_inline]] inline void addThickWhole(const TracedBeam& beam, const ThickReach& reach,
+                                                 const BeamPass& pass, const ThickShape<kSides>& shape,
+                                                 const LaneKernel& kernel,
+                                                 ThickVectors<kWeight, kSides>& vectors, float* sums,
+                                                 SliceStrides strides) {
+  constexpr Span kAll = {-GroupSums::kBeside, kGroupVoxels - 1 + GroupSums::kBeside};
+  vectors.add(beam, reach, pass.first, pass.last - pass.first + 1, kAll, strides);
+  vectors.addTo(sums, beam, shape, kernel, strides);
 }
 
 }  // namespace

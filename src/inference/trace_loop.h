@@ -1,8 +1,5 @@
 /// @file The innermost loop of line evidence; each instruction set's file includes it and gets a copy of its
 /// own. Beams are traced through a box slice by slice, and added to the voxels that the kernel reaches there.
-///
-/// With p the offset of a voxel from the beam's place in its slice and w the beam's unit direction within the
-/// slice, the voxel is off the beam's line by d^2 = |p|^2 - (w p)^2, and its rho greater by (w p) / length.
 #pragma once
 
 #include <algorithm>
@@ -17,93 +14,101 @@
 namespace bki_mapping {
 namespace {
 
-/// A box as seen along one main axis.
-struct BoxAxis {
-  double first, lane, row;  ///< centre of its first voxel, relative to the sensor [voxels]
-  float* sums = nullptr;    ///< where its sums begin, once there are any
+/// A box cut into slices of one kind.
+struct BoxSlices {
+  double first, side, height;  ///< the slice, side and height of its first voxel, from the sensor on
+  SliceStrides strides;
+  int row_axis;  ///< of the sums
+  int axis, skew, middle;
 
-  BoxAxis(const BeamBox& box, int axis)
-      : first(box.first[axis]), lane(box.first[kLaneAxis[axis]]), row(box.first[kRowAxis[axis]]) {}
+  BoxSlices(const BeamBox& box, BeamSlicing slicing) : axis(slicing.axis), skew(slicing.skew) {
+    const int side_axis = kSideAxis[axis], height_axis = kHeightAxis[axis];
+    const double main = box.first[axis], beside = box.first[side_axis];
+    first = skew == 0 ? main : 2.0 * main + skew * beside;
+    side = skew == 0 ? beside : main;
+    height = box.first[height_axis];
+    row_axis = skew == 0 ? side_axis : height_axis;
+    middle = skew == 0 ? kMiddleSlice : kMiddleSkewSlice[skew + 1];
+    const auto stride = [&](int of) { return GroupSums::stride(row_axis, of); };
+    strides = {stride(axis), stride(side_axis), stride(height_axis)};
+    if (skew != 0) {
+      strides.slice = skew * stride(side_axis);
+      strides.side = stride(axis) - 2 * skew * stride(side_axis);
+    }
+  }
 
-  /// Where a beam is in a slice, from the box's first voxel on [voxels].
-  double laneOf(const BeamTrack& track, int slice) const { return (first + slice) * track.slope_lane - lane; }
-  double rowOf(const BeamTrack& track, int slice) const { return (first + slice) * track.slope_row - row; }
+  /// Where a beam is in a slice, from the box's first voxel on.
+  double sideOf(const BeamTrack& track, int slice) const { return (first + slice) * track.slope_side - side; }
+  double heightOf(const BeamTrack& track, int slice) const {
+    return (first + slice) * track.slope_height - height;
+  }
   double rhoOf(const BeamTrack& track, int slice) const { return (first + slice) * track.rho_slice; }
 
-  static std::int32_t place(double voxels) { return static_cast<std::int32_t>(voxels * kTrackVoxel); }
-
-  /// Leaves out slices at both ends in which the beam is beside the box. @return whether any are left.
-  bool trim(const BeamTrack& track, BeamPass& pass) const {
-    const auto beside = [&](int slice) {
-      const auto is = [](double at, float half) {
-        return std::abs(at - BeamBox::kHalf) > BeamBox::kHalf + 1.0 + static_cast<double>(half);
-      };
-      return is(laneOf(track, slice), track.half_lane) || is(rowOf(track, slice), track.half_row);
+  /// Leaves out slices at both ends in which the beam is beside the box.
+  void trim(const BeamTrack& track, BeamPass& pass) const {
+    const auto beside = [](double at, double half) {
+      return std::abs(at - BeamBox::kHalf) > BeamBox::kHalf + 1.0 + half;
     };
-    while (pass.first <= pass.last && beside(pass.first)) ++pass.first;
-    while (pass.first <= pass.last && beside(pass.last)) --pass.last;
-    return pass.first <= pass.last;
+    const auto away = [&](int slice) {
+      const double at = sideOf(track, slice);
+      if (beside(heightOf(track, slice), static_cast<double>(track.half_height))) return true;
+      if (skew == 0) return beside(at, static_cast<double>(track.half_side));
+      return beside(at, 0.5) || beside(skew * (slice - 2.0 * at), 2.0);
+    };
+    while (pass.first <= pass.last && away(pass.first)) ++pass.first;
+    while (pass.first <= pass.last && away(pass.last)) --pass.last;
   }
 };
 
-/// Calls add(pass, track, beam, axis) for the passes that have been found.
-template <BeamWeight kWeight, typename Add>
-[[gnu::always_inline]] inline void forEachPass(const BeamTrackArrays& beams, const BeamBox& box,
-                                               GroupSums& sums, Add&& add) {
+/// Adds the beams whose passes have been found.
+template <BeamWeight kWeight>
+void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums) {
   // So far off the search, in single precision, names slices beside the box.
   constexpr double kDistant = 1e5;
   const bool distant = box.centre().cwiseAbs().maxCoeff() > kDistant;
-  BoxAxis axes[3] = {{box, 0}, {box, 1}, {box, 2}};
-  for (std::size_t n = 0; n < sums.pass_count; ++n) {
-    BeamPass pass = sums.passes[n];
-    const BeamTrack& track = beams.tracks[pass.beam];
-    BoxAxis& axis = axes[track.axis];
-    if (distant && !axis.trim(track, pass)) continue;
-    if (!axis.sums) axis.sums = sums.open(track.axis);
-    const double rho = axis.rhoOf(track, pass.first) - static_cast<double>(Weight<kWeight>::kMiddle);
-    add(pass, track, TracedBeam(track, rho), axis);
-  }
-}
-
-template <BeamWeight kWeight>
-void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums) {
-  const LaneKernel kernel;
-  const ThinShape<2, 2> narrow;
-  const ThinShape<2, 4> wide;
-  const ThinShape<4, 4> full;
-  const ThickShape thick;
+  constexpr auto kSlicing = BeamSlicing::of;
+  const BoxSlices all[BeamSlicing::kCount] = {{box, kSlicing(0)}, {box, kSlicing(1)}, {box, kSlicing(2)},
+                                              {box, kSlicing(3)}, {box, kSlicing(4)}, {box, kSlicing(5)},
+                                              {box, kSlicing(6)}, {box, kSlicing(7)}, {box, kSlicing(8)}};
   std::uint32_t layers[3][kGroupEdge];
   for (int axis = 0; axis < 3; ++axis) {
     for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
   }
-  forEachPass<kWeight>(
-      beams, box, sums,
-      [&](const BeamPass& pass, const BeamTrack& track, const TracedBeam& beam, const BoxAxis& axis) {
-        // A slice is reached as far as its slant makes it.
-        constexpr auto kNarrow = static_cast<float>(1.0 / kReachThatCounts), kThin = 2.0f * kNarrow;
-        const double lane = axis.laneOf(track, pass.first), row = axis.rowOf(track, pass.first);
-        if (std::max(track.half_lane, track.half_row) > kThin) {
-          const auto half = [](float voxels) {
-            return BoxAxis::place(static_cast<double>(voxels) * kReachThatCounts);
-          };
-          const ThickPlace place = {BoxAxis::place(lane), BoxAxis::place(row), half(track.half_lane),
-                                    half(track.half_row)};
-          addThick<kWeight>(beam, place, pass, layers[track.axis], thick, kernel,
-                            axis.sums + GroupSums::kFirst);
-          return;
-        }
-        const ThinPlace place(BoxAxis::place(lane + GroupSums::kPad), BoxAxis::place(row + GroupSums::kPad),
-                              track);
-        float* const at = axis.sums + pass.first * GroupSums::kSlice;
-        const int slices = pass.last - pass.first + 1;
-        if (track.half_row > kNarrow) {
-          addThin<kWeight>(beam, place, slices, full, kernel, at);
-        } else if (track.half_lane > kNarrow) {
-          addThin<kWeight>(beam, place, slices, wide, kernel, at);
-        } else {
-          addThin<kWeight>(beam, place, slices, narrow, kernel, at);
-        }
-      });
+  constexpr int kFew = kLanes < 4 ? kLanes : 4, kMany = kLanes < 8 ? kLanes : 8;
+  const LaneKernel kernel;
+  const ThickShape<kFew> few;
+  const ThickShape<kMany> many;
+  ThickVectors<kWeight, kFew> few_vectors;
+  ThickVectors<kWeight, kMany> many_vectors;
+  float* arrays[3] = {};  // by the axis of rows
+  ThinSlices<kWeight> thin(kernel);
+  constexpr std::size_t kAhead = 8;  // passes, whose tracks are sent for
+  for (std::size_t n = 0; n < sums.pass_count; ++n) {
+    BeamPass pass = sums.passes[n];
+    __builtin_prefetch(&beams.tracks[sums.passes[std::min(n + kAhead, sums.pass_count - 1)].beam]);
+    const BeamTrack& track = beams.tracks[pass.beam];
+    const BoxSlices& slices = all[track.slicing];
+    if (distant) {
+      slices.trim(track, pass);
+      if (pass.first > pass.last) continue;
+    }
+    float*& array = arrays[slices.row_axis];
+    if (!array) array = sums.open(slices.row_axis);
+    const int middle = slices.middle;
+    const TracedBeam beam(track, slices.rhoOf(track, middle) - static_cast<double>(Weight<kWeight>::kMiddle),
+                          slices.sideOf(track, middle), slices.heightOf(track, middle));
+    if (slices.skew != 0) {
+      thin.add(beam, pass.first, pass.last - pass.first + 1, middle, array, slices.strides);
+      continue;
+    }
+    const ThickReach reach(track);
+    if (2 * reach.side < kFew * kTrackVoxel) {
+      addThickWhole(beam, reach, pass, few, kernel, few_vectors, array, slices.strides);
+    } else {
+      addThick(beam, reach, pass, layers[slices.axis], many, kernel, many_vectors, array, slices.strides);
+    }
+  }
+  thin.flush();
 }
 
 template <BeamWeight kWeight>

@@ -26,13 +26,13 @@ struct BeamPass {
   std::int32_t first, last;
 };
 
-/// The blocks that matter in a layer of a box across a main axis: bit lane + 4 row.
+/// The blocks that matter in a layer of a box across a main axis: bit side + 4 height.
 inline std::uint32_t layerOf(std::uint64_t blocks, int axis, int layer) {
   constexpr int kStep[3] = {1, kGroupEdge, kGroupEdge * kGroupEdge};
   std::uint32_t bits = 0;
   for (int n = 0; n < kGroupEdge * kGroupEdge; ++n) {
-    const int number = layer * kStep[axis] + n % kGroupEdge * kStep[kLaneAxis[axis]] +
-                       n / kGroupEdge * kStep[kRowAxis[axis]];
+    const int number = layer * kStep[axis] + n % kGroupEdge * kStep[kSideAxis[axis]] +
+                       n / kGroupEdge * kStep[kHeightAxis[axis]];
     bits |= static_cast<std::uint32_t>(blocks >> number & 1) << n;
   }
   return bits;

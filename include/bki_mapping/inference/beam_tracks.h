@@ -5,14 +5,11 @@
 #include <vector>
 
 #include "bki_mapping/core/config.h"
+#include "bki_mapping/inference/beam_slicing.h"
 #include "bki_mapping/inference/beams.h"
 #include "bki_mapping/inference/parallel_for.h"
 
 namespace bki_mapping {
-
-/// A beam runs along one axis most, its main axis; slices of voxels stand across that. In a slice, rows lie
-/// one behind the other along the row axis, and a row's voxels, its lanes, along the lane axis.
-constexpr int kLaneAxis[3] = {1, 0, 0}, kRowAxis[3] = {2, 2, 1};
 
 /// Places in a slice are kept as whole numbers, too: so many are a voxel. With a kernel of up to
 /// kMostTrackReach voxels what is computed with them stays below 256 voxels.
@@ -20,24 +17,30 @@ constexpr int kTrackBits = 23;
 constexpr double kMostTrackReach = 72.0 * (1.0 + 1e-9);  ///< with room for rounding
 constexpr std::int32_t kTrackVoxel = 1 << kTrackBits;
 
-/// One beam. Lengths are in voxels where nothing else is said.
+/// From here on to its end at r = 1 the sparse kernel is below 1.1e-7, and is left out.
+constexpr double kReachThatCounts = 0.974;
+
+/// One beam in its slices. Lengths are in voxels where nothing else is said, `side` is counted in columns.
 struct alignas(64) BeamTrack {
-  double slope_lane, slope_row;      ///< steps from slice to slice
-  double rho_slice;                  ///< change of rho from slice to slice
-  std::int32_t step_lane, step_row;  ///< the slopes [1 / kTrackVoxel]
-  /// A place in the slice at (lane, row) from the beam is off the beam's line by the length of (e_lane lane +
-  /// e_row row, g_row row) [lengths of the kernel], and rho there is greater by rho_lane lane + rho_row row.
-  float e_lane, e_row, g_row, rho_lane, rho_row;
-  float half_lane, half_row;  ///< how far from the beam the kernel reaches along the lanes, and the rows
-  std::int32_t axis;
+  double slope_side, slope_height;      ///< steps from slice to slice
+  double rho_slice;                     ///< change of rho from slice to slice
+  std::int32_t step_side, step_height;  ///< the slopes [1 / kTrackVoxel]
+  /// A place in the slice at (side, height) from the beam is off the beam's line by the length of (e_side
+  /// side
+  /// + e_height height, g_height height) [lengths of the kernel], and rho there is greater by rho_side side +
+  /// rho_height height.
+  float e_side, e_height, g_height, rho_side, rho_height;
+  float half_side, half_height;  ///< how far from the beam the kernel reaches in a slice, as far as it counts
+  std::int32_t slicing;          ///< as BeamSlicing numbers them
 };
 
 /// The beams of a scan as arrays that inner loops read. Reading up to kBeamPadding past the last is allowed,
 /// but for `tracks`.
 struct BeamTrackArrays {
-  const std::int32_t* axis;             ///< main axes
-  const float *slope_lane, *slope_row;  ///< as in the tracks
-  const float* end;                     ///< of the beam along its main axis, from the sensor [voxels]
+  const std::int32_t* axis;                ///< main axes
+  const float *slope_side, *slope_height;  ///< along the side and height axes, by step along the main axis
+  const float* end;                        ///< of the beam along its main axis, from the sensor [voxels]
+  const float* skew;                       ///< of the slices
   const BeamTrack* tracks;
 };
 
@@ -49,12 +52,13 @@ class BeamTracks {
   void set(const Beams& beams, double resolution, double length, Workers& workers);
 
   BeamTrackArrays arrays() const {
-    return {axis_.data(), slope_lane_.data(), slope_row_.data(), end_.data(), tracks_.data()};
+    return {axis_.data(), slope_side_.data(), slope_height_.data(),
+            end_.data(),  skew_.data(),       tracks_.data()};
   }
 
  private:
   std::vector<std::int32_t> axis_;
-  std::vector<float> slope_lane_, slope_row_, end_;
+  std::vector<float> slope_side_, slope_height_, end_, skew_;
   std::vector<BeamTrack> tracks_;
 };
 
