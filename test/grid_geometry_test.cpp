@@ -37,6 +37,12 @@ TEST(GridGeometry, CentresLieInTheirVoxel) {
 TEST(GridGeometry, RefusesPointsWithoutAnIndex) {
   const GridGeometry grid(0.1);
   EXPECT_TRUE(grid.contains({1e6, -1e6, 0.0}));
+  for (const double x : {0.0, 1e6, -2.6e7, 2.68435e7}) {  // the map ends at 2^28 voxels
+    const double safe = static_cast<double>(grid.safeRange({0.0, x, 1.0}));
+    EXPECT_GT(safe, 0.0) << x;
+    EXPECT_TRUE(grid.contains({0.0, x + safe, 1.0}) && grid.contains({0.0, x - safe, 1.0})) << x;
+  }
+  EXPECT_LT(grid.safeRange({3e7, 0.0, 0.0}), 0.0f);
   EXPECT_FALSE(grid.contains({1e9, 0.0, 0.0}));
   EXPECT_FALSE(grid.contains({0.0, std::numeric_limits<double>::quiet_NaN(), 0.0}));
   EXPECT_FALSE(grid.contains({0.0, 0.0, std::numeric_limits<double>::infinity()}));

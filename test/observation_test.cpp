@@ -83,6 +83,29 @@ TEST(Observation, UnlabelledIsAHitUnlessIgnored) {
   EXPECT_EQ(seen.counts.unknown_label, 0u);
 }
 
+TEST(Observation, CountsEveryOneOfEqualLabels) {
+  MapperConfig config = plainConfig();
+  const auto countsOf = [&](const std::vector<std::uint32_t>& labels) {
+    std::vector<Eigen::Vector3f> points;
+    for (std::size_t n = 0; n < labels.size(); ++n)
+      points.emplace_back(2.0f + static_cast<float>(n), 0.0f, 0.0f);
+    return observe(scanOf(points, labels), config);
+  };
+  EXPECT_EQ(countsOf({77, 77, 10, 10, 77, 10}).counts.unknown_label, 3u);
+  EXPECT_EQ(countsOf({10, 77, 10}).hits.labels.size(), 2u);
+  config.unknown_labels = UnknownLabels::kUnlabelled;
+  const Observation seen = countsOf({77, 77, 10, 0, 77, 0});
+  EXPECT_EQ(seen.counts.labels_not_in_table, 3u);
+  const ClassId car = seen.hits.labels[2];
+  EXPECT_NE(car, 0);
+  EXPECT_EQ(seen.hits.labels, (std::vector<ClassId>{0, 0, car, 0, 0, 0}));
+  config.unlabelled_points = UnlabelledPoints::kIgnore;
+  const Observation fewer = countsOf({77, 77, 10, 0, 0, 10});
+  EXPECT_EQ(fewer.counts.labels_not_in_table, 2u);
+  EXPECT_EQ(fewer.counts.unlabelled, 4u);
+  EXPECT_EQ(fewer.counts.used, 2u);
+}
+
 TEST(Observation, LabelsMayBeIds) {
   MapperConfig config = plainConfig();
   config.label_values = LabelValues::kId;

@@ -33,11 +33,9 @@ struct Course {
 /// multiplied by the size of a box, and therefore in double precision.
 BeamTrack trackOf(const Course& course, int axis, float reach) {
   const auto s = static_cast<float>(course.side), t = static_cast<float>(course.height);
-  const float counts = reach * static_cast<float>(kReachThatCounts);
-  const float slant = std::sqrt(1.0f + s * s), skew_slices = 2.0f + std::abs(s);
-  const float squared = skew_slices * skew_slices;
-  const bool is_skew =
-      counts * slant <= 0.5f * skew_slices && counts * counts * (squared + 5.0f * t * t) <= squared;
+  const float counts = reach * static_cast<float>(kReachThatCounts), limit = 1.0f / (counts * counts);
+  const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
+  const bool is_skew = 4.0f * side <= squared * limit && squared + 5.0f * t * t <= squared * limit;
 
   const double slices = is_skew ? 2.0 + std::abs(course.side) : 1.0;  // by step along the main axis
   const double by_slice = 1.0 / slices;
@@ -52,19 +50,18 @@ BeamTrack trackOf(const Course& course, int axis, float reach) {
   track.step_side = steps(track.slope_side);
   track.step_height = steps(track.slope_height);
 
-  const float u = 1.0f / std::sqrt(1.0f + s * s + t * t);         // along the main axis
-  const float v_along = is_skew ? 1.0f - 2.0f * std::abs(s) : s;  // u v is u v_along
-  const float across = u * (is_skew ? skew_slices : 1.0f);        // u n
-  const float e = std::sqrt((is_skew ? 5.0f : 1.0f) - u * u * v_along * v_along);
-  const float by_reach = 1.0f / reach, by_e = by_reach / e, by_across = counts / across;
-  track.e_side = e * by_reach;
-  track.e_height = -u * u * v_along * t * by_e;
-  track.g_height = across * by_e;
-  const float rho = static_cast<float>(course.rho) * u * u;
+  const float uu = 1.0f / (side + t * t);                         // u along the main axis, squared
+  const float v_along = is_skew ? 1.0f - 2.0f * std::abs(s) : s;  // u v is that times u
+  const float across = is_skew ? squared : 1.0f;                  // (u n)^2 is that times u^2
+  const float a = (is_skew ? 5.0f : 1.0f) - uu * v_along * v_along, by_a = 1.0f / a, by_reach = 1.0f / reach;
+  track.e_side = std::sqrt(a) * by_reach;
+  track.e_height = -uu * v_along * t * by_a * track.e_side;
+  track.g_height = std::sqrt(uu * across * by_a) * by_reach;
+  const float rho = static_cast<float>(course.rho) * uu;
   track.rho_side = v_along * rho;
   track.rho_height = t * rho;
-  track.half_side = u * slant * by_across;
-  track.half_height = e * by_across;
+  track.half_side = is_skew ? 0.5f : counts * std::sqrt(side);
+  track.half_height = is_skew ? 1.0f : counts * std::sqrt(1.0f + t * t);
   return track;
 }
 

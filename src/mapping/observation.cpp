@@ -16,24 +16,47 @@ namespace {
 /// Points nearer than this are no hits: drivers put missing returns at the sensor [m].
 constexpr float kSensorRadius = 1e-3f;
 
-/// The class of a label, or none if hits with it are to be left out (and counted).
-std::optional<ClassId> classOf(std::uint32_t label, LabelValues values, const ClassTable& classes,
-                               const MapperConfig& config, PointCounts& counts) {
-  std::optional<ClassId> id = classes.classOf(label, values);
-  if (!id) {
-    ++counts.labels_not_in_table;
-    if (config.unknown_labels == UnknownLabels::kUnlabelled) id = classes.unlabelled();
-    if (!id) {
-      ++counts.unknown_label;
+/// Finds the classes of labels.
+class ClassFinder {
+ public:
+  ClassFinder(const ClassTable& classes, LabelValues values, const MapperConfig& config)
+      : classes_(classes), values_(values), config_(config) {}
+
+  /// The class of a label, or none if hits with it are to be left out (and counted).
+  std::optional<ClassId> classOf(std::uint32_t label, PointCounts& counts) {
+    if (knows_last_ && label == last_label_) return last_class_;  // most points have their neighbour's label
+    std::optional<ClassId> id = classes_.classOf(label, values_);
+    knows_last_ = false;
+    const bool listed = id.has_value();
+    if (!listed) {
+      ++counts.labels_not_in_table;
+      if (config_.unknown_labels == UnknownLabels::kUnlabelled) id = classes_.unlabelled();
+      if (!id) {
+        ++counts.unknown_label;
+        return std::nullopt;
+      }
+    }
+    if (config_.unlabelled_points == UnlabelledPoints::kIgnore && id == classes_.unlabelled()) {
+      ++counts.unlabelled;
       return std::nullopt;
     }
+    if (listed) {
+      knows_last_ = true;
+      last_label_ = label;
+      last_class_ = *id;
+    }
+    return id;
   }
-  if (config.unlabelled_points == UnlabelledPoints::kIgnore && id == classes.unlabelled()) {
-    ++counts.unlabelled;
-    return std::nullopt;
-  }
-  return id;
-}
+
+ private:
+  const ClassTable& classes_;
+  LabelValues values_;
+  const MapperConfig& config_;
+  // The last label, where nothing was to be counted:
+  bool knows_last_ = false;
+  std::uint32_t last_label_ = 0;
+  ClassId last_class_ = 0;
+};
 
 /// Which ranges hits can have.
 class RangeLimits {
@@ -90,9 +113,10 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
                           const Sorted& into) const {
   const double cell = config_.downsample_resolution;
   const GridGeometry geometry(cell > 0.0 ? std::min(cell, config_.resolution) : config_.resolution);
+  const float safe_range = geometry.safeRange(scan.origin);
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
-  const LabelValues values = scan.labels_are_ids ? LabelValues::kId : config_.label_values;
   const RangeLimits limits(sensor, scan.no_returns_at_max_range);
+  ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
   PointCounts& counts = into.counts;
   counts.points += last - first;
   for (std::size_t i = first; i < last; ++i) {
@@ -103,9 +127,9 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
           (config_.clear_beyond_max_range || limits.isAtMax(range))) {
         into.cut.add(point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
       }
-    } else if (!geometry.contains(scan.origin + point.cast<double>())) {
+    } else if (!(range < safe_range) && !geometry.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
-    } else if (const auto id = classOf(scan.labels[i], values, classes, config_, counts)) {
+    } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
       ++counts.used;
       into.hits.add(point, *id);
       if (!scan.soft.empty()) into.used.push_back({static_cast<std::uint32_t>(i), *id});

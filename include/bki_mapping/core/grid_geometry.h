@@ -34,6 +34,10 @@ class GridGeometry {
   bool contains(const Eigen::Vector3d& point) const {
     return (point.array().abs() < kMaxCoordinate * resolution_).all();  // false for NaN
   }
+  /// All points nearer to `origin` than that have one [m]; 0 or less if there are none.
+  float safeRange(const Eigen::Vector3d& origin) const {
+    return static_cast<float>(kMaxCoordinate * resolution_ * (1.0 - 1e-6) - origin.cwiseAbs().maxCoeff());
+  }
   VoxelIndex voxelAt(const Eigen::Vector3d& point) const {
     return {{cell(point.x()), cell(point.y()), cell(point.z())}};
   }

@@ -11,7 +11,7 @@ namespace bki_mapping {
 /// Splits items 0 to n - 1 into consecutive chunks. The split depends on n alone.
 class Chunks {
  public:
-  static constexpr std::size_t kMost = 32;  ///< chunks; enough to keep cores busy, few enough to merge
+  static constexpr std::size_t kMost = 16;  ///< chunks; enough to keep cores busy, few enough to merge
 
   explicit Chunks(std::size_t items)
       : items_(items), length_(std::max<std::size_t>(256, (items + kMost - 1) / kMost)) {}
