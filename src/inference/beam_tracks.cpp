@@ -24,18 +24,18 @@ struct Course {
 };
 
 /// In skew slices, where one column of each and two voxels of that hold the kernel; else in straight ones.
-/// @param reach of the kernel [voxels].
+/// @param reach of the kernel [voxels]. @param unit by which e and g are multiplied.
 ///
 /// Let v lead from a slice's column to the next, n stand across slices (v = (0, 1), n = (1, 0) in straight
 /// ones, v = (1, -2 skew), n = (2, skew) in skew ones, along the main and side axes), h along columns, u be
 /// the unit direction. A place at p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
 /// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Slopes are
 /// multiplied by the size of a box, and therefore in double precision.
-BeamTrack trackOf(const Course& course, int axis, float reach) {
+BeamTrack trackOf(const Course& course, int axis, float reach, float unit) {
   const auto s = static_cast<float>(course.side), t = static_cast<float>(course.height);
   const float counts = reach * static_cast<float>(kReachThatCounts), limit = 1.0f / (counts * counts);
   const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
-  const bool is_skew = 4.0f * side <= squared * limit && squared + 5.0f * t * t <= squared * limit;
+  const bool is_skew = squared + 5.0f * t * t <= squared * limit;  // half_side is below 0.5 then, too
 
   const double slices = is_skew ? 2.0 + std::abs(course.side) : 1.0;  // by step along the main axis
   const double by_slice = 1.0 / slices;
@@ -43,7 +43,7 @@ BeamTrack trackOf(const Course& course, int axis, float reach) {
   track.slicing = BeamSlicing{axis, !is_skew ? 0 : course.side < 0.0 ? -1 : 1}.number();
   track.slope_side = (is_skew ? 1.0 : course.side) * by_slice;
   track.slope_height = course.height * by_slice;
-  track.rho_slice = course.rho * by_slice;
+  track.rho_slice = static_cast<float>(course.rho * by_slice);
   const auto steps = [](double slope) {
     return static_cast<std::int32_t>(slope * kTrackVoxel + std::copysign(0.5, slope));  // rounded
   };
@@ -53,7 +53,7 @@ BeamTrack trackOf(const Course& course, int axis, float reach) {
   const float uu = 1.0f / (side + t * t);                         // u along the main axis, squared
   const float v_along = is_skew ? 1.0f - 2.0f * std::abs(s) : s;  // u v is that times u
   const float across = is_skew ? squared : 1.0f;                  // (u n)^2 is that times u^2
-  const float a = (is_skew ? 5.0f : 1.0f) - uu * v_along * v_along, by_a = 1.0f / a, by_reach = 1.0f / reach;
+  const float a = (is_skew ? 5.0f : 1.0f) - uu * v_along * v_along, by_a = 1.0f / a, by_reach = unit / reach;
   track.e_side = std::sqrt(a) * by_reach;
   track.e_height = -uu * v_along * t * by_a * track.e_side;
   track.g_height = std::sqrt(uu * across * by_a) * by_reach;
@@ -67,7 +67,7 @@ BeamTrack trackOf(const Course& course, int axis, float reach) {
 
 }  // namespace
 
-void BeamTracks::set(const Beams& beams, double resolution, double length, Workers& workers) {
+void BeamTracks::set(const Beams& beams, double resolution, double length, float unit, Workers& workers) {
   const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
   axis_.resize(padded, 0);
   for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
@@ -89,7 +89,7 @@ void BeamTracks::set(const Beams& beams, double resolution, double length, Worke
         const double inverse = 1.0 / static_cast<double>(beam[axis]);
         course = {static_cast<double>(beam[kSideAxis[axis]]) * inverse,
                   static_cast<double>(beam[kHeightAxis[axis]]) * inverse, resolution * inverse};
-        track = trackOf(course, axis, reach);
+        track = trackOf(course, axis, reach, unit);
       }
       tracks_[b] = track;
       axis_[b] = axis;

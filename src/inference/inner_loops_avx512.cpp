@@ -6,8 +6,8 @@
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsAvx512() {
-  static const InnerLoops loops = {"avx512",        sumPointsLoop,  traceBeamsLoop,
-                                   placePointsLoop, placeCellsLoop, reachBlocksLoop};
+  static const InnerLoops loops = {"avx512",       sumPointsLoop,   traceBeamsLoop,    placePointsLoop,
+                                   placeCellsLoop, reachBlocksLoop, LaneKernel::unit()};
   return loops;
 }
 

@@ -6,8 +6,8 @@
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsGeneric() {
-  static const InnerLoops loops = {"generic",       sumPointsLoop,  traceBeamsLoop,
-                                   placePointsLoop, placeCellsLoop, reachBlocksLoop};
+  static const InnerLoops loops = {"generic",      sumPointsLoop,   traceBeamsLoop,    placePointsLoop,
+                                   placeCellsLoop, reachBlocksLoop, LaneKernel::unit()};
   return loops;
 }
 

@@ -1,6 +1,8 @@
 /// @file The sparse kernel of several squared distances side by side; included by the inner loops alone.
 #pragma once
 
+#include <cmath>
+
 #include "bki_mapping/inference/kernel.h"
 #include "bki_mapping/inference/kernel_table.h"
 #include "lanes.h"
@@ -15,6 +17,7 @@ class LaneKernel {
  public:
   /// Of the squared distance that operator() takes: kScale (d / l)^2 + kShift.
   static constexpr float kScale = KernelTable::kScale, kShift = KernelTable::kShift;
+  static float unit() { return std::sqrt(kScale); }
 
   LaneKernel() {
     const KernelTable& table = kernelTable();
@@ -44,6 +47,7 @@ class LaneKernel {
 class LaneKernel {
  public:
   static constexpr float kScale = 1.0f, kShift = 0.0f;
+  static float unit() { return 1.0f; }
 
   [[gnu::always_inline]] FloatLanes operator()(FloatLanes t) const {
     const FloatLanes r = squareRoot(greater(t, FloatLanes{}));  // rounding may make squares negative

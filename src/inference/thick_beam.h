@@ -87,21 +87,22 @@ class ThickVectors {
     for (int n = 0; n < slices; n += kLanes) {
       const int here = std::min(slices - n, kLanes);
       const IntLanes slice = countUp() + (first + n - kMiddleSlice);
-      const IntLanes side = beam.side + slice * beam.step_side,
-                     height = beam.height + slice * beam.step_height;
+      const IntLanes side = beam.side + slice * beam.track.step_side,
+                     height = beam.height + slice * beam.track.step_height;
       IntLanes first_side = (side + (kUp - reach.side)) >> kTrackBits,
                first_height = (height + (kUp - reach.height)) >> kTrackBits;
       first_side = first_side > 1 - kSides ? first_side : IntLanes{} + (1 - kSides);
       first_height = first_height > heights.first ? first_height : IntLanes{} + heights.first;
       first_height = first_height < last_start ? first_height : IntLanes{} + last_start;
       const FloatLanes h = toFloat((first_height << kTrackBits) - height) * kStep;
-      const FloatLanes slice_rho = beam.rho + toFloat(slice) * beam.rho_slice + h * beam.rho_height;
+      const FloatLanes slice_rho =
+          beam.rho + toFloat(slice) * beam.track.rho_slice + h * beam.track.rho_height;
       const IntLanes slice_at = (slice + kMiddleSlice) * strides.slice + first_height * strides.height;
       for (int run = 0; run < runs; ++run) {
         const IntLanes from = first_side < kGroupVoxels ? first_side : IntLanes{} + kGroupVoxels;
         const FloatLanes s = toFloat((from << kTrackBits) - side) * kStep;
-        FloatLanes e = s * beam.e_side + h * beam.e_height, g = h * beam.g_height,
-                   rho = slice_rho + s * beam.rho_side;
+        FloatLanes e = s * beam.track.e_side + h * beam.track.e_height, g = h * beam.track.g_height,
+                   rho = slice_rho + s * beam.track.rho_side;
         IntLanes at = slice_at + from;
         for (int time = 0; time < times; ++time, end += here) {
           store(at_ + end, at);
@@ -109,9 +110,9 @@ class ThickVectors {
           store(g_ + end, g);
           store(rho_ + end, rho);
           at += Shape::kRows * strides.height;
-          e += Shape::kRows * beam.e_height;
-          g += Shape::kRows * beam.g_height;
-          rho += Shape::kRows * beam.rho_height;
+          e += Shape::kRows * beam.track.e_height;
+          g += Shape::kRows * beam.track.g_height;
+          rho += Shape::kRows * beam.track.rho_height;
         }
         first_side += kSides;
       }
@@ -122,9 +123,9 @@ class ThickVectors {
   /// Adds them all.
   [[gnu::always_inline]] void addTo(float* sums, const TracedBeam& beam, const Shape& shape,
                                     const LaneKernel kernel, SliceStrides strides) {
-    const FloatLanes e_lanes = shape.side * beam.e_side + shape.height * beam.e_height,
-                     g_lanes = shape.height * beam.g_height,
-                     rho_lanes = shape.side * beam.rho_side + shape.height * beam.rho_height;
+    const FloatLanes e_lanes = shape.side * beam.track.e_side + shape.height * beam.track.e_height,
+                     g_lanes = shape.height * beam.track.g_height,
+                     rho_lanes = shape.side * beam.track.rho_side + shape.height * beam.track.rho_height;
     const int count = count_;
     for (int n = 0; n < count; ++n) {
       const FloatLanes e = e_lanes + e_[n], g = g_lanes + g_[n];
@@ -166,8 +167,9 @@ template <BeamWeight kWeight, int kSides>
     const int steps = slice - kMiddleSlice;
     const Span heights = heightsThatMatter(
         layers[layer],
-        ThickReach::span(beam.side + steps * beam.step_side, beam.step_side, slices, reach.side),
-        ThickReach::span(beam.height + steps * beam.step_height, beam.step_height, slices, reach.height));
+        ThickReach::span(beam.side + steps * beam.track.step_side, beam.track.step_side, slices, reach.side),
+        ThickReach::span(beam.height + steps * beam.track.step_height, beam.track.step_height, slices,
+                         reach.height));
     if (heights.empty()) continue;
     if (vectors.full()) vectors.addTo(sums, beam, shape, kernel, strides);
     vectors.add(beam, reach, slice, slices, heights, strides);

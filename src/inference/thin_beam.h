@@ -31,32 +31,31 @@ class ThinSlices {
     if (sums != sums_ || count_ + slices > kRoom) flush();
     sums_ = sums;
     const int begin = count_, end = begin + slices;
+    const BeamTrack track = beam.track;
     const IntLanes number = countUp() + (first - middle);
     // The nearest column, and the voxel of it below.
-    IntLanes side = number * beam.step_side + (beam.side + kTrackVoxel / 2),
-             height = number * beam.step_height + beam.height, slice = (number + middle) * strides.slice;
+    IntLanes side = number * track.step_side + (beam.side + kTrackVoxel / 2),
+             height = number * track.step_height + beam.height, slice = (number + middle) * strides.slice;
     FloatLanes step = toFloat(number);
-    const float rho = beam.rho + 1.5f * beam.rho_side + beam.rho_height;
-    const float e_first = 1.5f * beam.e_side + beam.e_height;
     for (int n = begin; n < end; n += kLanes) {
       store(voxel_ + n, (side >> kTrackBits) * strides.side + (height >> kTrackBits) + slice);  // height: 1
-      const FloatLanes s = fractionAndOne(side), h = fractionAndOne(height);
-      FloatLanes e = e_first - s * beam.e_side - h * beam.e_height, g = beam.g_height - h * beam.g_height,
-                 w = step * beam.rho_slice + rho - s * beam.rho_side - h * beam.rho_height;
+      // That voxel's place, from the beam's on.
+      const FloatLanes s = 1.5f - fractionAndOne(side), h = 1.0f - fractionAndOne(height);
+      FloatLanes e = s * track.e_side + h * track.e_height, g = h * track.g_height,
+                 w = step * track.rho_slice + beam.rho + s * track.rho_side + h * track.rho_height;
       for (int voxel = 0; voxel < 2; ++voxel) {
         store(squared_[voxel] + n, e * e + LaneKernel::kShift + g * g);
         store(rho_[voxel] + n, w);
-        e += beam.e_height;
-        g += beam.g_height;
-        w += beam.rho_height;
+        e += track.e_height;
+        g += track.g_height;
+        w += track.rho_height;
       }
-      side += kLanes * beam.step_side;
-      height += kLanes * beam.step_height;
+      side += kLanes * track.step_side;
+      height += kLanes * track.step_height;
       slice += kLanes * strides.slice;
       step += static_cast<float>(kLanes);
     }
-    // Two slices are added at a time, which have to be of one beam.
-    voxel_[end] = kNowhere;
+    // Two slices are added at a time, which have to be of one beam: with the one behind, if need be.
     count_ = end + end % 2;
   }
 

@@ -42,7 +42,9 @@ struct BoxSlices {
   double heightOf(const BeamTrack& track, int slice) const {
     return (first + slice) * track.slope_height - height;
   }
-  double rhoOf(const BeamTrack& track, int slice) const { return (first + slice) * track.rho_slice; }
+  double rhoOf(const BeamTrack& track, int slice) const {
+    return (first + slice) * static_cast<double>(track.rho_slice);
+  }
 
   /// Leaves out slices at both ends in which the beam is beside the box.
   void trim(const BeamTrack& track, BeamPass& pass) const {
@@ -95,8 +97,10 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
     float*& array = arrays[slices.row_axis];
     if (!array) array = sums.open(slices.row_axis);
     const int middle = slices.middle;
-    const TracedBeam beam(track, slices.rhoOf(track, middle) - static_cast<double>(Weight<kWeight>::kMiddle),
-                          slices.sideOf(track, middle), slices.heightOf(track, middle));
+    const TracedBeam beam = {
+        track,
+        static_cast<float>(slices.rhoOf(track, middle) - static_cast<double>(Weight<kWeight>::kMiddle)),
+        TracedBeam::place(slices.sideOf(track, middle)), TracedBeam::place(slices.heightOf(track, middle))};
     if (slices.skew != 0) {
       thin.add(beam, pass.first, pass.last - pass.first + 1, middle, array, slices.strides);
       continue;

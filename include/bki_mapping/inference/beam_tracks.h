@@ -23,13 +23,13 @@ constexpr double kReachThatCounts = 0.974;
 /// One beam in its slices. Lengths are in voxels where nothing else is said, `side` is counted in columns.
 struct alignas(64) BeamTrack {
   double slope_side, slope_height;      ///< steps from slice to slice
-  double rho_slice;                     ///< change of rho from slice to slice
   std::int32_t step_side, step_height;  ///< the slopes [1 / kTrackVoxel]
   /// A place in the slice at (side, height) from the beam is off the beam's line by the length of (e_side
   /// side
-  /// + e_height height, g_height height) [lengths of the kernel], and rho there is greater by rho_side side +
-  /// rho_height height.
+  /// + e_height height, g_height height) [lengths of the kernel / BeamTracks' unit], and rho there is greater
+  /// by rho_side side + rho_height height.
   float e_side, e_height, g_height, rho_side, rho_height;
+  float rho_slice;               ///< change of rho from slice to slice
   float half_side, half_height;  ///< how far from the beam the kernel reaches in a slice, as far as it counts
   std::int32_t slicing;          ///< as BeamSlicing numbers them
 };
@@ -47,9 +47,9 @@ struct BeamTrackArrays {
 /// The tracks of a scan's beams. Keeps its memory from scan to scan.
 class BeamTracks {
  public:
-  /// Replaces the beams. @param length of the kernel [m].
+  /// Replaces the beams. @param length of the kernel [m]. @param unit by which e and g are multiplied.
   /// @throws std::invalid_argument if that is more than 72 voxels.
-  void set(const Beams& beams, double resolution, double length, Workers& workers);
+  void set(const Beams& beams, double resolution, double length, float unit, Workers& workers);
 
   BeamTrackArrays arrays() const {
     return {axis_.data(), slope_side_.data(), slope_height_.data(),
