@@ -21,9 +21,13 @@ using namespace bki_mapping;
 namespace po = tools::po;
 using benchmark::Case;
 
+/// Times of scans, of all repeats [ms].
 struct Timing {
-  double median_ms, p99_ms;
-  std::size_t map_bytes;
+  std::vector<double> yardstick, integration;
+  std::size_t map_bytes = 0;
+
+  double median() const { return quantile(integration, 0.5); }
+  double ratio() const { return median() / quantile(yardstick, 0.5); }
 };
 
 std::vector<Case> cases() {
@@ -37,7 +41,8 @@ po::options_description options() {
   options.add(tools::sequenceOptions());
   options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "table to write")(
       "warm-up", po::value<std::size_t>()->value_name("N")->default_value(3),
-      "first scans that are not timed")(
+      "first scans that are not timed")("repeats", po::value<int>()->value_name("N")->default_value(5),
+                                        "times that each mode maps the sequence anew")(
       "curves", po::value<std::string>()->value_name("DIR"),
       "measure simulated drives too, and write curves as CSV and PNG into this folder")(
       "curve-scans", po::value<std::size_t>()->value_name("N")->default_value(2000),
@@ -45,9 +50,8 @@ po::options_description options() {
   return options;
 }
 
-/// The median time of pcl::VoxelGrid with 0.1 m leaves on raw scans, one thread [ms].
-double yardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up) {
-  std::vector<double> times;
+/// Times pcl::VoxelGrid with 0.1 m leaves on raw scans, one thread.
+void timeYardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up, Timing& timing) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
     for (std::size_t p = 0; p < frames[i].points.size(); ++p) {
@@ -62,31 +66,30 @@ double yardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up) 
     grid.setInputCloud(cloud);
     grid.setLeafSize(0.1f, 0.1f, 0.1f);
     grid.filter(output);
-    if (i >= warm_up) times.push_back(watch.lap());
+    if (i >= warm_up) timing.yardstick.push_back(watch.lap());
   }
-  return quantile(times, 0.5);
 }
 
-Timing timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& frames, std::size_t warm_up,
-                const std::shared_ptr<const ClassTable>& classes) {
+void timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& frames, std::size_t warm_up,
+              const std::shared_ptr<const ClassTable>& classes, Timing& timing) {
   MapperConfig config;
   setParameters(config, c.settings);
   config.threads = threads;
   SemanticMapper mapper(config, classes);
-  std::vector<double> times;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Scan scan = frames[i].scan();
     Stopwatch watch;
     mapper.integrate(scan);
-    if (i >= warm_up) times.push_back(watch.lap());
+    if (i >= warm_up) timing.integration.push_back(watch.lap());
   }
-  return {quantile(times, 0.5), quantile(times, 0.99), mapper.map().bytes()};
+  timing.map_bytes = mapper.map().bytes();
 }
 
 int measure(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const std::size_t warm_up = given["warm-up"].as<std::size_t>();
+  if (given["repeats"].as<int>() < 1) throw std::invalid_argument("--repeats must be at least 1");
   if (last - first <= warm_up) throw std::invalid_argument("there are no scans left after --warm-up");
   std::vector<SequenceFrame> frames;
   for (std::size_t i = first; i < last; ++i) frames.push_back(sequence.read(i));
@@ -96,22 +99,27 @@ int measure(const po::variables_map& given) {
   std::printf("%-26s %10s %7s %9s %9s %8s %8s %8s\n", "mode", "resolution", "threads", "median ms", "p99 ms",
               "ratio", "map MB", "speed-up");
   for (const Case& c : cases()) {
-    double one_thread_ms = 0.0;
-    for (const int threads : {1, 2}) {
-      // The yardstick is taken again for each row, so that both sides of a ratio meet the same machine.
-      const double y = yardstick(frames, warm_up);
-      const Timing t = timeCase(c, threads, frames, warm_up, classes);
-      const auto set = c.settings.find("resolution");
-      const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
-      if (threads == 1) one_thread_ms = t.median_ms;
+    const auto set = c.settings.find("resolution");
+    const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
+    Timing timings[2];  // with one thread, and with two
+    for (int repeat = 0; repeat < given["repeats"].as<int>(); ++repeat) {
+      for (int threads = 1; threads <= 2; ++threads) {
+        // The yardstick is taken each time, so that both sides of a ratio meet the same machine.
+        timeYardstick(frames, warm_up, timings[threads - 1]);
+        timeCase(c, threads, frames, warm_up, classes, timings[threads - 1]);
+      }
+    }
+    for (int threads = 1; threads <= 2; ++threads) {
+      const Timing& t = timings[threads - 1];
+      const double p99_ms = quantile(t.integration, 0.99);
       std::printf("%-26s %10s %7d %9.1f %9.1f %8.2f %8.1f %8.2f\n", c.name.c_str(), edge.c_str(), threads,
-                  t.median_ms, t.p99_ms, t.median_ms / y, static_cast<double>(t.map_bytes) / 1e6,
-                  one_thread_ms / t.median_ms);
-      std::fflush(stdout);
-      csv += '"' + c.name + "\"," + edge + "," + std::to_string(threads) + "," + std::to_string(t.median_ms) +
-             "," + std::to_string(t.p99_ms) + "," + std::to_string(t.median_ms / y) + "," +
+                  t.median(), p99_ms, t.ratio(), static_cast<double>(t.map_bytes) / 1e6,
+                  timings[0].median() / t.median());
+      csv += '"' + c.name + "\"," + edge + "," + std::to_string(threads) + "," + std::to_string(t.median()) +
+             "," + std::to_string(p99_ms) + "," + std::to_string(t.ratio()) + "," +
              std::to_string(t.map_bytes) + "\n";
     }
+    std::fflush(stdout);
   }
   std::printf("peak memory of the whole run: %.0f MB\n", static_cast<double>(peakResidentBytes()) / 1e6);
   if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);

@@ -147,7 +147,11 @@ class Tools(unittest.TestCase):
         self.assertLess(figures['robot']['floor_holes'], 0.2 * figures['paper_line']['floor_holes'])
 
     def test_benchmark(self):
-        result = call('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--csv', self.path('times.csv'))
+        result = call('benchmark_sequence', '--sequence', self.drive, '--repeats', '0')
+        self.assertNotEqual(result.returncode, 0)
+        self.assertIn('--repeats', result.stderr)
+        result = call('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--repeats', '2',
+                      '--csv', self.path('times.csv'))
         self.assertEqual(result.returncode, 0, result.stderr)
         with open(self.path('times.csv'), newline='') as file:
             rows = list(csv.DictReader(file))
