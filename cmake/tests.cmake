@@ -20,9 +20,10 @@ function(bki_mapping_unit_test name)
 endfunction()
 
 foreach(name
-    allocation_test beam_index_test brute_force_test column_map_test downsample_test dynamics_quality_test
-    grid_geometry_test instruction_sets_test kernel_test laws_test map_query_test observation_test occlusion_test
-    parallel_for_test point_bins_test sampling_test semantic_map_test semantic_quality_test tile_grid_test)
+    allocation_test beam_index_test beam_tracks_test brute_force_test column_map_test downsample_test
+    dynamics_quality_test grid_geometry_test instruction_sets_test kernel_test laws_test map_query_test
+    observation_test occlusion_test parallel_for_test point_bins_test sampling_test semantic_map_test
+    semantic_quality_test tile_grid_test)
   bki_mapping_unit_test(${name})
 endforeach()
 foreach(name class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
