@@ -110,9 +110,8 @@ class BoxSearch {
   void turnSkew(FloatLanes skew, const Across& side, IntLanes& first, IntLanes& last) const {
     // A column is up to half a voxel along the main axis from the beam's place in its skew slice.
     constexpr float kBehind = 64.0f;  // so that there are none below 0
-    const FloatLanes by_voxel = 2.0f + magnitude(side.slope),
-                     slice =
-                         skew * (side.at + kHalf) + (2.0f * kHalf + kBehind);  // of the beam at the centre
+    const FloatLanes by_voxel = 2.0f + magnitude(side.slope);
+    const FloatLanes slice = skew * (side.at + kHalf) + (2.0f * kHalf + kBehind);  // at the box's centre
     const FloatLanes low = (toFloat(first) - (kHalf + 0.5f)) * by_voxel + slice,
                      high = (toFloat(last) - (kHalf - 0.5f)) * by_voxel + slice;
     const IntLanes straight = skew == 0.0f;

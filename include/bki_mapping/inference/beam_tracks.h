@@ -24,10 +24,9 @@ constexpr double kReachThatCounts = 0.974;
 struct alignas(64) BeamTrack {
   double slope_side, slope_height;      ///< steps from slice to slice
   std::int32_t step_side, step_height;  ///< the slopes [1 / kTrackVoxel]
-  /// A place in the slice at (side, height) from the beam is off the beam's line by the length of (e_side
-  /// side
-  /// + e_height height, g_height height) [lengths of the kernel / BeamTracks' unit], and rho there is greater
-  /// by rho_side side + rho_height height.
+  /// A place in the slice at (side, height) from the beam is off the beam's line by the length of the vector
+  /// (e_side side + e_height height, g_height height) [lengths of the kernel / BeamTracks' unit], and rho
+  /// there is greater by rho_side side + rho_height height.
   float e_side, e_height, g_height, rho_side, rho_height;
   float rho_slice;               ///< change of rho from slice to slice
   float half_side, half_height;  ///< how far from the beam the kernel reaches in a slice, as far as it counts
