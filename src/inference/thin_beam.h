@@ -38,7 +38,8 @@ class ThinSlices {
              height = number * track.step_height + beam.height, slice = (number + middle) * strides.slice;
     FloatLanes step = toFloat(number);
     for (int n = begin; n < end; n += kLanes) {
-      store(voxel_ + n, (side >> kTrackBits) * strides.side + (height >> kTrackBits) + slice);  // height: 1
+      // A column's voxels stand one behind the other.
+      store(voxel_ + n, (side >> kTrackBits) * strides.side + (height >> kTrackBits) + slice);
       // That voxel's place, from the beam's on.
       const FloatLanes s = 1.5f - fractionAndOne(side), h = 1.0f - fractionAndOne(height);
       FloatLanes e = s * track.e_side + h * track.e_height, g = h * track.g_height,

@@ -76,7 +76,7 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
   for (int axis = 0; axis < 3; ++axis) {
     for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
   }
-  constexpr int kFew = kLanes < 4 ? kLanes : 4, kMany = kLanes < 8 ? kLanes : 8;
+  constexpr int kFew = 4, kMany = kLanes < 8 ? kLanes : 8;
   const LaneKernel kernel;
   const ThickShape<kFew> few;
   const ThickShape<kMany> many;
