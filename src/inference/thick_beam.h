@@ -74,6 +74,8 @@ class ThickVectors {
  public:
   using Shape = ThickShape<kSides>;
 
+  explicit ThickVectors(const LaneKernel& kernel) : kernel_(kernel) {}
+
   /// Takes slices from `first` on. @param heights that matter.
   [[gnu::always_inline]] void add(const TracedBeam& beam, const ThickReach& reach, int first, int slices,
                                   const Span& heights, SliceStrides strides) {
@@ -121,8 +123,9 @@ class ThickVectors {
   }
 
   /// Adds them all.
-  [[gnu::always_inline]] void addTo(float* sums, const TracedBeam& beam, const Shape& shape,
-                                    const LaneKernel kernel, SliceStrides strides) {
+  [[gnu::always_inline]] void addTo(float* sums, const TracedBeam& beam, SliceStrides strides) {
+    const Shape shape = shape_;  // in registers, as the kernel
+    const LaneKernel kernel = kernel_;
     const FloatLanes e_lanes = shape.side * beam.track.e_side + shape.height * beam.track.e_height,
                      g_lanes = shape.height * beam.track.g_height,
                      rho_lanes = shape.side * beam.track.rho_side + shape.height * beam.track.rho_height;
@@ -147,6 +150,8 @@ class ThickVectors {
       kBlockEdge * (kGroupVoxels / Shape::kRows + 1) * (kGroupVoxels / kSides + 1);
   static constexpr int kRoom = 512 + kMostAtOnce;
 
+  const Shape shape_;
+  const LaneKernel kernel_;
   int count_ = 0;
   // The first voxel, and e, g and rho there.
   alignas(64) std::int32_t at_[kRoom + kLanes];
@@ -158,7 +163,6 @@ class ThickVectors {
 template <BeamWeight kWeight, int kSides>
 [[gnu::always_inline]] inline void addThick(const TracedBeam& beam, const ThickReach& reach,
                                             const BeamPass& pass, const std::uint32_t (&layers)[kGroupEdge],
-                                            const ThickShape<kSides>& shape, const LaneKernel& kernel,
                                             ThickVectors<kWeight, kSides>& vectors, float* sums,
                                             SliceStrides strides) {
   for (int slice = pass.first, slices; slice <= pass.last; slice += slices) {
@@ -171,22 +175,20 @@ template <BeamWeight kWeight, int kSides>
         ThickReach::span(beam.height + steps * beam.track.step_height, beam.track.step_height, slices,
                          reach.height));
     if (heights.empty()) continue;
-    if (vectors.full()) vectors.addTo(sums, beam, shape, kernel, strides);
+    if (vectors.full()) vectors.addTo(sums, beam, strides);
     vectors.add(beam, reach, slice, slices, heights, strides);
   }
-  vectors.addTo(sums, beam, shape, kernel, strides);
+  vectors.addTo(sums, beam, strides);
 }
 
 /// The same where the kernel is so short that leaving out heights does not pay.
 template <BeamWeight kWeight, int kSides>
 [[gnu::always_inline]] inline void addThickWhole(const TracedBeam& beam, const ThickReach& reach,
-                                                 const BeamPass& pass, const ThickShape<kSides>& shape,
-                                                 const LaneKernel& kernel,
-                                                 ThickVectors<kWeight, kSides>& vectors, float* sums,
-                                                 SliceStrides strides) {
+                                                 const BeamPass& pass, ThickVectors<kWeight, kSides>& vectors,
+                                                 float* sums, SliceStrides strides) {
   constexpr Span kAll = {-GroupSums::kBeside, kGroupVoxels - 1 + GroupSums::kBeside};
   vectors.add(beam, reach, pass.first, pass.last - pass.first + 1, kAll, strides);
-  vectors.addTo(sums, beam, shape, kernel, strides);
+  vectors.addTo(sums, beam, strides);
 }
 
 }  // namespace

@@ -78,10 +78,8 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
   }
   constexpr int kFew = 4, kMany = kLanes < 8 ? kLanes : 8;
   const LaneKernel kernel;
-  const ThickShape<kFew> few;
-  const ThickShape<kMany> many;
-  ThickVectors<kWeight, kFew> few_vectors;
-  ThickVectors<kWeight, kMany> many_vectors;
+  ThickVectors<kWeight, kFew> few(kernel);
+  ThickVectors<kWeight, kMany> many(kernel);
   float* arrays[3] = {};  // by the axis of rows
   ThinSlices<kWeight> thin(kernel);
   constexpr std::size_t kAhead = 8;  // passes, whose tracks are sent for
@@ -107,9 +105,9 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
     }
     const ThickReach reach(track);
     if (2 * reach.side < kFew * kTrackVoxel) {
-      addThickWhole(beam, reach, pass, few, kernel, few_vectors, array, slices.strides);
+      addThickWhole(beam, reach, pass, few, array, slices.strides);
     } else {
-      addThick(beam, reach, pass, layers[slices.axis], many, kernel, many_vectors, array, slices.strides);
+      addThick(beam, reach, pass, layers[slices.axis], many, array, slices.strides);
     }
   }
   thin.flush();
