@@ -5,6 +5,7 @@
 #include <random>
 
 #include "bki_mapping/inference/beam_tracks.h"
+#include "bki_mapping/inference/inner_loops.h"
 
 namespace bki_mapping {
 namespace {
@@ -40,14 +41,15 @@ struct Basis {
   }
 };
 
-TEST(BeamTracks, AgreeWithGeometry) {
+void expectTracksAgreeWithGeometry(const InnerLoops& loops) {
   Workers workers(2);
+  const double unit = static_cast<double>(loops.kernel_unit);
   std::mt19937 random(6);
   std::uniform_real_distribution<double> uniform(-3.0, 3.0);
   const std::vector<Eigen::Vector3f> ends = directions();
   for (const double reach : {0.4, 1.0, 1.5, 4.0}) {  // [voxels]
     BeamTracks tracks;
-    tracks.set({{}, ends}, kResolution, reach * kResolution, 2.0f, workers);
+    tracks.set({{}, ends}, kResolution, reach * kResolution, loops, workers);
     int skews = 0, straights = 0;
     for (std::size_t b = 0; b < ends.size(); ++b) {
       const BeamTrack& track = tracks.arrays().tracks[b];
@@ -71,11 +73,11 @@ TEST(BeamTracks, AgreeWithGeometry) {
       for (int n = 0; n < 10; ++n) {
         const double side = uniform(random), height = uniform(random);
         const Eigen::Vector3d p = side * basis.side + height * basis.height;
-        const double distance = (p - p.dot(u) * u).norm() / reach * 2.0;
+        const double distance = (p - p.dot(u) * u).norm() / reach * unit;
         const double e = side * track.e_side + height * track.e_height, g = height * track.g_height;
-        EXPECT_NEAR(std::hypot(e, g), distance, 1e-5 * (1.0 + 1.0 / reach)) << ends[b].transpose();
+        EXPECT_NEAR(std::hypot(e, g), distance, unit * 5e-6 * (1.0 + 1.0 / reach)) << ends[b].transpose();
         EXPECT_NEAR(side * track.rho_side + height * track.rho_height, p.dot(u) / end.norm(), 1e-6);
-        if (distance < 2.0 * kReachThatCounts) {
+        if (distance < unit * kReachThatCounts) {
           EXPECT_LE(std::abs(side), track.half_side + 1e-5f);
           EXPECT_LE(std::abs(height), track.half_height + 1e-5f);
         }
@@ -86,11 +88,19 @@ TEST(BeamTracks, AgreeWithGeometry) {
   }
 }
 
+TEST(BeamTracks, AgreeWithGeometryOnEachInstructionSet) {
+  for (const std::string& set : instructionSets()) {
+    SCOPED_TRACE(set);
+    expectTracksAgreeWithGeometry(innerLoopsFor(set));
+  }
+}
+
 TEST(BeamTracks, KernelsOfMoreThan72VoxelsAreTooLong) {
   Workers workers(1);
   BeamTracks tracks;
-  tracks.set({{}, directions()}, 0.1, 7.2, 1.0f, workers);
-  EXPECT_THROW(tracks.set({{}, directions()}, 0.1, 7.21, 1.0f, workers), std::invalid_argument);
+  const InnerLoops& loops = innerLoopsFor("");
+  tracks.set({{}, directions()}, 0.1, 7.2, loops, workers);
+  EXPECT_THROW(tracks.set({{}, directions()}, 0.1, 7.21, loops, workers), std::invalid_argument);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ bool scaleAndLimit(float scale, float limit, float* sums) {
 void BeamEvidence::setField(const BeamField& field, Workers& workers) {
   field_ = &field;
   if (field.kernel().type == KernelType::kCounting) return;
-  tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), loops_.kernel_unit, workers);
+  tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), loops_, workers);
 }
 
 const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {

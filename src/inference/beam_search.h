@@ -83,16 +83,32 @@ class BoxSearch {
     if (!anyOf(found)) return to;
     first = first > from ? first : from;
     last = last < until ? last : until;
-    turnSkew(load(beams.skew + b), side, first, last);
-    for (int n = 0; n < kLanes; ++n) {
-      *to = {b + static_cast<std::uint32_t>(n), first[n], last[n]};
-      to -= found[n];
-    }
-    return to;
+    const FloatLanes skew = load(beams.skew + b);
+    turnSkew(skew, side, first, last);
+    return emit({countUp() + static_cast<std::int32_t>(b), first, last, slicing(axis, skew)}, found, to);
   }
 
  private:
   static constexpr auto kHalf = static_cast<float>(BeamBox::kHalf);
+
+  /// As BeamSlicing numbers them.
+  static IntLanes slicing(IntLanes axis, FloatLanes skew) {
+    static_assert(BeamSlicing{0, 1}.number() == 3 && BeamSlicing{0, -1}.number() == 6);
+    return axis + (skew == 0.0f ? IntLanes{} : skew > 0.0f ? IntLanes{} + 3 : IntLanes{} + 6);
+  }
+  /// Writes the passes found. @param numbers of a pass, in their order.
+  static BeamPass* emit(const IntLanes (&numbers)[4], IntLanes found, BeamPass* to) {
+    static_assert(sizeof(BeamPass) == 4 * sizeof(std::int32_t));
+    alignas(64) std::int32_t passes[4 * kLanes];
+    storeFours(passes, numbers);
+    const IntLanes step = found & static_cast<std::int32_t>(sizeof(BeamPass));
+    auto* bytes = reinterpret_cast<unsigned char*>(to);
+    for (int n = 0; n < kLanes; ++n) {
+      __builtin_memcpy(bytes, passes + fourOf(n), sizeof(BeamPass));
+      bytes += step[n];
+    }
+    return reinterpret_cast<BeamPass*>(bytes);
+  }
 
   /// How beams run along the side axis, or the height axis.
   struct Across {
@@ -136,11 +152,15 @@ class BoxSearch {
   float reach_, slack_;
 };
 
-/// Finds the passes of beams through a box, in the order of the beams.
+/// So many passes ahead, tracks are sent for.
+constexpr std::size_t kAhead = 8;
+
+/// Finds the passes of beams through a box, in the order of the beams. Of kAhead behind the last, there are
+/// any numbers.
 inline void findPasses(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
                        const BeamBox& box, GroupSums& sums) {
   const BoxSearch search(box);
-  std::size_t most = kLanes;
+  std::size_t most = std::max<std::size_t>(kLanes, kAhead);
   for (std::size_t r = 0; r < count; ++r) most += ranges[r].last - ranges[r].first;
   if (sums.passes.size() < most) sums.passes.resize(most);
   BeamPass* to = sums.passes.data();

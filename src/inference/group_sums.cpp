@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <memory>
+#if defined(__SSE__)
+#include <immintrin.h>
+#endif
 
 namespace bki_mapping {
 namespace {
@@ -31,12 +34,42 @@ void forEachRow(int row_axis, Visit&& visit) {
   }
 }
 
-/// Adds rows to a block's sums, in which a row's voxels are kStride apart.
-template <int kStride>
-void addRows(int row_axis, const float* numbers, float* sums) {
-  forEachRow(row_axis, [&](int row, int offset) {
-    for (int n = 0; n < kBlockEdge; ++n) sums[offset + n * kStride] += numbers[row + n];
+/// Adds four rows of four numbers to four rows of others, columns to rows.
+inline void addTurned(const float* from, int from_row, float* to, int to_row) {
+#if defined(__SSE__)
+  __m128 rows[4];
+  for (int n = 0; n < 4; ++n) rows[n] = _mm_loadu_ps(from + n * from_row);
+  _MM_TRANSPOSE4_PS(rows[0], rows[1], rows[2], rows[3]);
+  for (int n = 0; n < 4; ++n) {
+    _mm_storeu_ps(to + n * to_row, _mm_add_ps(_mm_loadu_ps(to + n * to_row), rows[n]));
+  }
+#else
+  for (int n = 0; n < 4; ++n) {
+    for (int m = 0; m < 4; ++m) to[n * to_row + m] += from[m * from_row + n];
+  }
+#endif
+}
+
+/// Adds rows along x to a block's sums.
+void addRows(const float* numbers, float* sums) {
+  forEachRow(0, [&](int row, int offset) {
+    for (int n = 0; n < kBlockEdge; ++n) sums[offset + n] += numbers[row + n];
   });
+}
+
+/// Adds rows along y or z.
+void addTurnedRows(int row_axis, const float* numbers, float* sums) {
+  constexpr int kOffset[3] = {1, kBlockEdge, kBlockEdge * kBlockEdge};
+  const int other = 3 - row_axis, from_row = GroupSums::stride(row_axis, 0), to_row = kOffset[row_axis];
+  for (int n = 0; n < kBlockEdge; ++n) {
+    const float* const from = numbers + n * GroupSums::stride(row_axis, other);
+    float* const to = sums + n * kOffset[other];
+    for (int x = 0; x < kBlockEdge; x += 4) {
+      for (int k = 0; k < kBlockEdge; k += 4) {
+        addTurned(from + x * from_row + k, from_row, to + x + k * to_row, to_row);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -72,9 +105,10 @@ void GroupSums::sumsOf(const std::array<int, 3>& place, float* sums) const {
   const auto numbers = [&](int row_axis) {
     return arrays_[static_cast<std::size_t>(row_axis)].numbers + cornerOf(row_axis, place);
   };
-  if (arrays_[0].is_open) addRows<1>(0, numbers(0), sums);
-  if (arrays_[1].is_open) addRows<kBlockEdge>(1, numbers(1), sums);
-  if (arrays_[2].is_open) addRows<kBlockEdge * kBlockEdge>(2, numbers(2), sums);
+  if (arrays_[0].is_open) addRows(numbers(0), sums);
+  for (const int row_axis : {1, 2}) {
+    if (arrays_[static_cast<std::size_t>(row_axis)].is_open) addTurnedRows(row_axis, numbers(row_axis), sums);
+  }
 }
 
 void GroupSums::reserveAs(const GroupSums& other) {

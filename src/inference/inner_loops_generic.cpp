@@ -2,12 +2,13 @@
 #include "point_loop.h"
 #include "tile_loop.h"
 #include "trace_loop.h"
+#include "track_loop.h"
 
 namespace bki_mapping {
 
 const InnerLoops& innerLoopsGeneric() {
-  static const InnerLoops loops = {"generic",      sumPointsLoop,   traceBeamsLoop,    placePointsLoop,
-                                   placeCellsLoop, reachBlocksLoop, LaneKernel::unit()};
+  static const InnerLoops loops = {"generic",       sumPointsLoop,  makeTracksLoop,  traceBeamsLoop,
+                                   placePointsLoop, placeCellsLoop, reachBlocksLoop, LaneKernel::unit()};
   return loops;
 }
 

@@ -181,6 +181,41 @@ constexpr int pairOf(int lane) {
 #endif
 }
 
+/// Stores four numbers of each lane side by side; where those of a lane then are, fourOf says.
+[[gnu::always_inline]] inline void storeFours(std::int32_t* to, const IntLanes (&numbers)[4]) {
+#if defined(__AVX512F__)
+  const auto n = [&](int k) { return reinterpret_cast<__m512i>(numbers[k]); };
+  const __m512i low[2] = {_mm512_unpacklo_epi32(n(0), n(1)), _mm512_unpacklo_epi32(n(2), n(3))},
+                high[2] = {_mm512_unpackhi_epi32(n(0), n(1)), _mm512_unpackhi_epi32(n(2), n(3))};
+  _mm512_storeu_si512(to, _mm512_unpacklo_epi64(low[0], low[1]));
+  _mm512_storeu_si512(to + kLanes, _mm512_unpackhi_epi64(low[0], low[1]));
+  _mm512_storeu_si512(to + 2 * kLanes, _mm512_unpacklo_epi64(high[0], high[1]));
+  _mm512_storeu_si512(to + 3 * kLanes, _mm512_unpackhi_epi64(high[0], high[1]));
+#elif defined(__AVX2__)
+  const auto n = [&](int k) { return reinterpret_cast<__m256i>(numbers[k]); };
+  const auto put = [&](int k, __m256i four) {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + k * kLanes), four);
+  };
+  const __m256i low[2] = {_mm256_unpacklo_epi32(n(0), n(1)), _mm256_unpacklo_epi32(n(2), n(3))},
+                high[2] = {_mm256_unpackhi_epi32(n(0), n(1)), _mm256_unpackhi_epi32(n(2), n(3))};
+  put(0, _mm256_unpacklo_epi64(low[0], low[1]));
+  put(1, _mm256_unpackhi_epi64(low[0], low[1]));
+  put(2, _mm256_unpacklo_epi64(high[0], high[1]));
+  put(3, _mm256_unpackhi_epi64(high[0], high[1]));
+#else
+  for (int lane = 0; lane < kLanes; ++lane) {
+    for (int k = 0; k < 4; ++k) to[4 * lane + k] = numbers[k][lane];
+  }
+#endif
+}
+constexpr int fourOf(int lane) {
+#if defined(__AVX2__)
+  return lane % 4 * kLanes + lane / 4 * 4;  // by quarters of what unpacking gives
+#else
+  return 4 * lane;
+#endif
+}
+
 /// Adds two numbers each to two places that share nothing.
 [[gnu::always_inline]] inline void addPairs(float* a, float* b, Part<4>::Lanes numbers) {
 #if defined(__SSE__)

@@ -15,11 +15,13 @@ namespace bki_mapping {
 namespace {
 
 /// A box cut into slices of one kind.
-struct BoxSlices {
+struct alignas(64) BoxSlices {
   double first, side, height;  ///< the slice, side and height of its first voxel, from the sensor on
+  double middle_first;         ///< the middle slice, from the sensor on
+  int middle;                  ///< its number
   SliceStrides strides;
   int row_axis;  ///< of the sums
-  int axis, skew, middle;
+  int axis, skew;
 
   BoxSlices(const BeamBox& box, BeamSlicing slicing) : axis(slicing.axis), skew(slicing.skew) {
     const int side_axis = kSideAxis[axis], height_axis = kHeightAxis[axis];
@@ -29,6 +31,7 @@ struct BoxSlices {
     height = box.first[height_axis];
     row_axis = skew == 0 ? side_axis : height_axis;
     middle = skew == 0 ? kMiddleSlice : kMiddleSkewSlice[skew + 1];
+    middle_first = first + middle;
     const auto stride = [&](int of) { return GroupSums::stride(row_axis, of); };
     strides = {stride(axis), stride(side_axis), stride(height_axis)};
     if (skew != 0) {
@@ -37,13 +40,18 @@ struct BoxSlices {
     }
   }
 
+  /// A beam in the middle slice.
+  template <BeamWeight kWeight>
+  [[gnu::always_inline]] TracedBeam traced(const BeamTrack& track) const {
+    return {track, static_cast<float>(middle_first) * track.rho_slice - Weight<kWeight>::kMiddle,
+            TracedBeam::place(middle_first * track.slope_side - side),
+            TracedBeam::place(middle_first * track.slope_height - height)};
+  }
+
   /// Where a beam is in a slice, from the box's first voxel on.
   double sideOf(const BeamTrack& track, int slice) const { return (first + slice) * track.slope_side - side; }
   double heightOf(const BeamTrack& track, int slice) const {
     return (first + slice) * track.slope_height - height;
-  }
-  double rhoOf(const BeamTrack& track, int slice) const {
-    return (first + slice) * static_cast<double>(track.rho_slice);
   }
 
   /// Leaves out slices at both ends in which the beam is beside the box.
@@ -82,25 +90,20 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
   ThickVectors<kWeight, kMany> many(kernel);
   float* arrays[3] = {};  // by the axis of rows
   ThinSlices<kWeight> thin(kernel);
-  constexpr std::size_t kAhead = 8;  // passes, whose tracks are sent for
   for (std::size_t n = 0; n < sums.pass_count; ++n) {
     BeamPass pass = sums.passes[n];
-    __builtin_prefetch(&beams.tracks[sums.passes[std::min(n + kAhead, sums.pass_count - 1)].beam]);
+    __builtin_prefetch(&beams.tracks[sums.passes[n + kAhead].beam]);
     const BeamTrack& track = beams.tracks[pass.beam];
-    const BoxSlices& slices = all[track.slicing];
+    const BoxSlices& slices = all[pass.slicing];
     if (distant) {
       slices.trim(track, pass);
       if (pass.first > pass.last) continue;
     }
     float*& array = arrays[slices.row_axis];
     if (!array) array = sums.open(slices.row_axis);
-    const int middle = slices.middle;
-    const TracedBeam beam = {
-        track,
-        static_cast<float>(slices.rhoOf(track, middle) - static_cast<double>(Weight<kWeight>::kMiddle)),
-        TracedBeam::place(slices.sideOf(track, middle)), TracedBeam::place(slices.heightOf(track, middle))};
+    const TracedBeam beam = slices.traced<kWeight>(track);
     if (slices.skew != 0) {
-      thin.add(beam, pass.first, pass.last - pass.first + 1, middle, array, slices.strides);
+      thin.add(beam, pass.first, pass.last - pass.first + 1, slices.middle, array, slices.strides);
       continue;
     }
     const ThickReach reach(track);

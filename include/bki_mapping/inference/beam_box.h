@@ -24,6 +24,7 @@ struct BeamBox {
 struct BeamPass {
   std::uint32_t beam;
   std::int32_t first, last;
+  std::int32_t slicing;  ///< as BeamSlicing numbers them
 };
 
 /// The blocks that matter in a layer of a box across a main axis: bit side + 4 height.

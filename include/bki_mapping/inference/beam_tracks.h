@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/inference/beam_slicing.h"
 #include "bki_mapping/inference/beams.h"
 #include "bki_mapping/inference/parallel_for.h"
@@ -25,8 +24,8 @@ struct alignas(64) BeamTrack {
   double slope_side, slope_height;      ///< steps from slice to slice
   std::int32_t step_side, step_height;  ///< the slopes [1 / kTrackVoxel]
   /// A place in the slice at (side, height) from the beam is off the beam's line by the length of the vector
-  /// (e_side side + e_height height, g_height height) [lengths of the kernel / BeamTracks' unit], and rho
-  /// there is greater by rho_side side + rho_height height.
+  /// (e_side side + e_height height, g_height height) [lengths of the kernel / InnerLoops' kernel_unit], and
+  /// rho there is greater by rho_side side + rho_height height.
   float e_side, e_height, g_height, rho_side, rho_height;
   float rho_slice;               ///< change of rho from slice to slice
   float half_side, half_height;  ///< how far from the beam the kernel reaches in a slice, as far as it counts
@@ -43,12 +42,21 @@ struct BeamTrackArrays {
   const BeamTrack* tracks;
 };
 
+/// The same, to be written.
+struct BeamTrackTargets {
+  std::int32_t* axis;
+  float *slope_side, *slope_height, *end, *skew;
+  BeamTrack* tracks;
+};
+
+struct InnerLoops;
+
 /// The tracks of a scan's beams. Keeps its memory from scan to scan.
 class BeamTracks {
  public:
-  /// Replaces the beams. @param length of the kernel [m]. @param unit by which e and g are multiplied.
+  /// Replaces the beams. @param length of the kernel [m]. @param loops that will read them, too.
   /// @throws std::invalid_argument if that is more than 72 voxels.
-  void set(const Beams& beams, double resolution, double length, float unit, Workers& workers);
+  void set(const Beams& beams, double resolution, double length, const InnerLoops& loops, Workers& workers);
 
   BeamTrackArrays arrays() const {
     return {axis_.data(), slope_side_.data(), slope_height_.data(),

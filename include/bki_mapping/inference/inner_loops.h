@@ -21,10 +21,14 @@ struct InnerLoops {
   /// @param reach length of the kernel [voxels]. @param scale of the kernel. @return the layers outside of
   /// which all sums are 0.
   Block::Layers (*sum_points)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
+  /// Makes tracks of beams. @param beams from the sensor to their ends [m]. @param resolution [m]. @param
+  /// reach length of the kernel [voxels], at most kMostTrackReach.
+  void (*make_tracks)(const Eigen::Vector3f* beams, std::size_t count, double resolution, float reach,
+                      const BeamTrackTargets& to);
   /// Sets the sums of the blocks of a box that matter to those of w(rho) k(d) over the beams of some ranges,
   /// the kernel being of unit scale: d the distance to the beam's line, w the weight along it, 0 unless 0 <
   /// rho < 1.
-  /// @param beams set with kernel_unit.
+  /// @param beams made by make_tracks of the same instruction set.
   void (*trace_beams)(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
                       const BeamBox& box, BeamWeight weight, GroupSums& sums);
   /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
@@ -34,7 +38,7 @@ struct InnerLoops {
   void (*place_cells)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
   /// Finds the blocks that placed points reach, tiles being blocks. @param reach [voxels], at most 8.
   void (*reach_blocks)(std::size_t count, float reach, TilePlaces& places);
-  float kernel_unit;  ///< in which trace_beams measures distances, by lengths of the kernel
+  float kernel_unit;  ///< in which tracks measure distances, by lengths of the kernel
 };
 
 /// The instruction sets that this build and this processor have: "generic" first, better ones behind it.
