@@ -14,7 +14,7 @@ struct Weight {
 
   [[gnu::always_inline]] static FloatLanes at(FloatLanes rho) {
     if constexpr (kWeight == BeamWeight::kBilinear) {
-      return greater(0.5f - magnitude(rho), FloatLanes{});
+      return 0.5f - lesserMagnitude(rho, FloatLanes{} + 0.5f);
     } else {
       const FloatLanes weight = kWeight == BeamWeight::kUniform ? FloatLanes{} + 1.0f : rho;
       return ((rho > 0.0f) & (rho < 1.0f)) ? weight : FloatLanes{};

@@ -108,6 +108,16 @@ struct Table {
 }
 #endif
 
+/// The lesser of two magnitudes.
+[[gnu::always_inline]] inline FloatLanes lesserMagnitude(FloatLanes a, FloatLanes b) {
+#if defined(__AVX512F__)
+  constexpr int kLesserWithoutSign = 0b1010;
+  return _mm512_range_ps(a, b, kLesserWithoutSign);
+#else
+  return lesser(magnitude(a), magnitude(b));
+#endif
+}
+
 /// Whether any lane is set, all lanes being 0 or -1.
 [[gnu::always_inline]] inline bool anyOf(IntLanes lanes) {
 #if defined(__AVX512F__)

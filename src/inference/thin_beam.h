@@ -26,18 +26,19 @@ class ThinSlices {
 
   /// Takes slices of a beam, up to kRoom. @param sums at the group's first voxel. @param middle slice, in
   /// which the beam's place is.
-  [[gnu::always_inline]] void add(const TracedBeam beam, int first, int slices, int middle, float* sums,
+  [[gnu::always_inline]] void add(const TracedBeam& beam, int first, int slices, int middle, float* sums,
                                   SliceStrides strides) {
     if (sums != sums_ || count_ + slices > kRoom) flush();
     sums_ = sums;
     const int begin = count_, end = begin + slices;
-    const BeamTrack track = beam.track;
+    const BeamTrack& track = beam.track;
     const IntLanes number = countUp() + (first - middle);
     // The nearest column, and the voxel of it below.
     IntLanes side = number * track.step_side + (beam.side + kTrackVoxel / 2),
              height = number * track.step_height + beam.height, slice = (number + middle) * strides.slice;
     FloatLanes step = toFloat(number);
-    for (int n = begin; n < end; n += kLanes) {
+    int n = begin;
+    do {  // there is a slice
       // A column's voxels stand one behind the other.
       store(voxel_ + n, (side >> kTrackBits) * strides.side + (height >> kTrackBits) + slice);
       // That voxel's place, from the beam's on.
@@ -55,7 +56,8 @@ class ThinSlices {
       height += kLanes * track.step_height;
       slice += kLanes * strides.slice;
       step += static_cast<float>(kLanes);
-    }
+      n += kLanes;
+    } while (n < end);
     // Two slices are added at a time, which have to be of one beam: with the one behind, if need be.
     count_ = end + end % 2;
   }
@@ -70,15 +72,20 @@ class ThinSlices {
     }
     // Of the lanes before and those at hand by turns: what is added then has not to wait for its values.
     const LaneKernel kernel = kernel_;  // in registers
-    alignas(64) float pairs[2][2 * kLanes];
-    compute(kernel, 0, pairs[0]);
-    int at_hand = 1;
-    for (int n = kLanes; n < end; n += kLanes) {
-      compute(kernel, n, pairs[at_hand]);
-      at_hand = 1 - at_hand;
-      addLanes(n - kLanes, pairs[at_hand]);
+    alignas(64) float even[2 * kLanes], odd[2 * kLanes];
+    compute(kernel, 0, even);
+    int n = 0;
+    for (; n + 2 * kLanes < end; n += 2 * kLanes) {
+      compute(kernel, n + kLanes, odd);
+      addLanes(n, even);
+      compute(kernel, n + 2 * kLanes, even);
+      addLanes(n + kLanes, odd);
     }
-    addLanes(end - kLanes, pairs[1 - at_hand]);
+    addLanes(n, even);
+    if (n + kLanes < end) {
+      compute(kernel, n + kLanes, odd);
+      addLanes(n + kLanes, odd);
+    }
     count_ = 0;
   }
 
