@@ -192,7 +192,8 @@ constexpr int pairOf(int lane) {
 }
 
 /// Stores four numbers of each lane side by side; where those of a lane then are, fourOf says.
-[[gnu::always_inline]] inline void storeFours(std::int32_t* to, const IntLanes (&numbers)[4]) {
+template <typename Number, typename Lanes>
+[[gnu::always_inline]] inline void storeFours(Number* to, const Lanes (&numbers)[4]) {
 #if defined(__AVX512F__)
   const auto n = [&](int k) { return reinterpret_cast<__m512i>(numbers[k]); };
   const __m512i low[2] = {_mm512_unpacklo_epi32(n(0), n(1)), _mm512_unpacklo_epi32(n(2), n(3))},

@@ -89,7 +89,8 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
   ThickVectors<kWeight, kFew> few(kernel);
   ThickVectors<kWeight, kMany> many(kernel);
   float* arrays[3] = {};  // by the axis of rows
-  ThinSlices<kWeight> thin(kernel);
+  ThinSlices<kWeight, 2> thin(kernel);
+  ThinSlices<kWeight, 4> steep(kernel);
   for (std::size_t n = 0; n < sums.pass_count; ++n) {
     BeamPass pass = sums.passes[n];
     __builtin_prefetch(&beams.tracks[sums.passes[n + kAhead].beam]);
@@ -103,7 +104,12 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
     if (!array) array = sums.open(slices.row_axis);
     const TracedBeam beam = slices.traced<kWeight>(track);
     if (slices.skew != 0) {
-      thin.add(beam, pass.first, pass.last - pass.first + 1, slices.middle, array, slices.strides);
+      const int count = pass.last - pass.first + 1;
+      if (track.half_height <= 1.0f) {
+        thin.add(beam, pass.first, count, slices.middle, array, slices.strides);
+      } else {
+        steep.add(beam, pass.first, count, slices.middle, array, slices.strides);
+      }
       continue;
     }
     const ThickReach reach(track);
@@ -114,6 +120,7 @@ void addBeams(const BeamTrackArrays& beams, const BeamBox& box, GroupSums& sums)
     }
   }
   thin.flush();
+  steep.flush();
 }
 
 template <BeamWeight kWeight>

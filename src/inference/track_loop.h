@@ -47,21 +47,24 @@ void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolut
   }
 }
 
-/// In skew slices, where one column of each and two voxels of that hold the kernel; else in straight ones.
+/// In skew slices, where one column of each and four voxels of that hold the kernel; else in straight ones.
 /// @param reach of the kernel [voxels].
 ///
 /// Let v lead from a slice's column to the next, n stand across slices (v = (0, 1), n = (1, 0) in straight
 /// ones, v = (1, -2 skew), n = (2, skew) in skew ones, along the main and side axes), h along columns, u be
 /// the unit direction. A place at p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
-/// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Slopes are
-/// multiplied by the size of a box, and therefore in double precision.
+/// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Within d =
+/// 1 are places up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size of a
+/// box, and therefore in double precision.
 void findTracks(std::size_t count, float reach, TrackBatch& batch) {
-  const float counts = reach * static_cast<float>(kReachThatCounts), limit = 1.0f / (counts * counts);
+  const float counts = reach * static_cast<float>(kReachThatCounts), counts2 = counts * counts;
   const float by_reach = LaneKernel::unit() / reach;
   for (std::size_t n = 0; n < count; ++n) {
     const auto s = static_cast<float>(batch.slope_side[n]), t = static_cast<float>(batch.slope_height[n]);
     const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
-    const bool is_skew = squared + 5.0f * t * t <= squared * limit;  // half_side is below 0.5 then, too
+    // Squares of how far the kernel reaches in skew slices, times (2 + |s|)^2.
+    const float a2 = counts2 * side, b2 = counts2 * (squared + 5.0f * t * t);
+    const bool is_skew = a2 <= 0.25f * squared && b2 <= 4.0f * squared;
     const std::int32_t skew_number = s < 0.0f ? 6 : 3;
     batch.slicing[n] = batch.axis[n] + (is_skew ? skew_number : 0);
 
@@ -89,7 +92,7 @@ void findTracks(std::size_t count, float reach, TrackBatch& batch) {
     batch.rho_side[n] = v_along * rho;
     batch.rho_height[n] = t * rho;
     batch.half_side[n] = is_skew ? 0.5f : counts * std::sqrt(side);
-    batch.half_height[n] = is_skew ? 1.0f : counts * std::sqrt(1.0f + t * t);
+    batch.half_height[n] = is_skew ? std::sqrt(b2 / squared) : counts * std::sqrt(1.0f + t * t);
   }
 }
 
