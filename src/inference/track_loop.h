@@ -62,9 +62,10 @@ void findTracks(std::size_t count, float reach, TrackBatch& batch) {
   for (std::size_t n = 0; n < count; ++n) {
     const auto s = static_cast<float>(batch.slope_side[n]), t = static_cast<float>(batch.slope_height[n]);
     const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
-    // Squares of how far the kernel reaches in skew slices, times (2 + |s|)^2.
+    // Squares of how far the kernel reaches in skew slices, times (2 + |s|)^2. Where a is up to 0.5, b is
+    // below 2.
     const float a2 = counts2 * side, b2 = counts2 * (squared + 5.0f * t * t);
-    const bool is_skew = a2 <= 0.25f * squared && b2 <= 4.0f * squared;
+    const bool is_skew = a2 <= 0.25f * squared;
     const std::int32_t skew_number = s < 0.0f ? 6 : 3;
     batch.slicing[n] = batch.axis[n] + (is_skew ? skew_number : 0);
 
