@@ -20,7 +20,7 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
   cells_.resize(count);
   workers.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-      cells_[b] = BeamTable::cellOf(beams.ends[b].normalized());
+      cells_[b] = BeamTable::cellOf(beams.ends[b]);
     }
   });
   table_.build(cells_, order_);

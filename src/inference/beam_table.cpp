@@ -5,10 +5,6 @@
 
 namespace bki_mapping {
 
-std::uint32_t BeamTable::cellOf(const Eigen::Vector3f& u) {
-  return static_cast<std::uint32_t>(beamRow(u.z()) * kBeamColumns + beamColumn(pseudoAngle(u.x(), u.y())));
-}
-
 void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order) {
   // A counting sort.
   constexpr std::size_t kCells = kBeamRows * kBeamColumns;

@@ -27,8 +27,11 @@ class BeamIndex {
 /// to scan.
 class BeamTable : public BeamIndex {
  public:
-  /// The cell of a direction. @param u unit vector.
-  static std::uint32_t cellOf(const Eigen::Vector3f& u);
+  /// The cell of a direction. @param v of any length.
+  static std::uint32_t cellOf(const Eigen::Vector3f& v) {
+    const float length = v.norm(), sine = length > 0.0f ? v.z() / length : 0.0f;
+    return static_cast<std::uint32_t>(beamRow(sine) * kBeamColumns + beamColumn(pseudoAngle(v.x(), v.y())));
+  }
 
   /// Replaces the beams.
   /// @param cells of all beams. @param[out] order their numbers, sorted by cell: what a query's numbers
