@@ -16,12 +16,13 @@ namespace {
 struct TrackBatch {
   static constexpr std::size_t kMost = 64;
 
-  std::int32_t axis[kMost];                       ///< main axes
-  float main[kMost], side[kMost], height[kMost];  ///< where beams end, along these axes [m]
-  double slope_side[kMost], slope_height[kMost];  ///< by step along the main axis
-  float rho[kMost];                               ///< change of rho by that step
-  std::int32_t slicing[kMost];                    ///< as BeamSlicing numbers them
-  double by_slice_side[kMost], by_slice_height[kMost];
+  std::int32_t axis[kMost];                             ///< main axes
+  float end[kMost];                                     ///< of the beam along its main axis [m]
+  double slope_side[kMost], slope_height[kMost];        ///< by step along the main axis, as rho below
+  float rho[kMost];                                     ///< change of rho by that step
+  std::int32_t slicing[kMost];                          ///< as BeamSlicing numbers them
+  double by_slice_side[kMost], by_slice_height[kMost];  ///< slopes by step from slice to slice
+  // As in BeamTrack:
   std::int32_t step_side[kMost], step_height[kMost];
   float rho_slice[kMost], e_side[kMost], e_height[kMost], g_height[kMost], rho_side[kMost], rho_height[kMost],
       half_side[kMost], half_height[kMost];
@@ -34,13 +35,13 @@ void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolut
     const float x = beams[n].x(), y = beams[n].y(), z = beams[n].z();
     const float size_x = std::abs(x), size_y = std::abs(y), size_z = std::abs(z);
     const bool is_y = size_y > size_x, is_z = size_z > (is_y ? size_y : size_x);
-    const float most = is_z ? z : is_y ? y : x;
-    const bool is_beam = std::abs(most) >= kShortest;
+    const float end = is_z ? z : is_y ? y : x;
+    const bool is_beam = std::abs(end) >= kShortest;
     static_assert(kSideAxis[0] == 1 && kSideAxis[1] == 0 && kSideAxis[2] == 1);
     static_assert(kHeightAxis[0] == 2 && kHeightAxis[1] == 2 && kHeightAxis[2] == 0);
-    const double inverse = is_beam ? 1.0 / static_cast<double>(is_beam ? most : 1.0f) : 0.0;
+    const double inverse = is_beam ? 1.0 / static_cast<double>(is_beam ? end : 1.0f) : 0.0;
     batch.axis[n] = is_z ? 2 : is_y ? 1 : 0;
-    batch.main[n] = most;
+    batch.end[n] = end;
     batch.slope_side[n] = static_cast<double>(!is_z && is_y ? x : y) * inverse;
     batch.slope_height[n] = static_cast<double>(is_z ? x : z) * inverse;
     batch.rho[n] = static_cast<float>(resolution * inverse);
@@ -131,7 +132,7 @@ void makeTracksLoop(const Eigen::Vector3f* beams, std::size_t count, double reso
       to.axis[begin + n] = batch.axis[n];
       to.slope_side[begin + n] = static_cast<float>(batch.slope_side[n]);
       to.slope_height[begin + n] = static_cast<float>(batch.slope_height[n]);
-      to.end[begin + n] = batch.main[n] * per_metre;
+      to.end[begin + n] = batch.end[n] * per_metre;
       to.skew[begin + n] = batch.slicing[n] < 3 ? 0.0f : batch.slicing[n] < 6 ? 1.0f : -1.0f;
     }
     for (std::size_t n = 0; n < some; n += kLanes) {
