@@ -67,8 +67,7 @@ void findTracks(std::size_t count, float reach, TrackBatch& batch) {
     // below 2.
     const float a2 = counts2 * side, b2 = counts2 * (squared + 5.0f * t * t);
     const bool is_skew = a2 <= 0.25f * squared;
-    const std::int32_t skew_number = s < 0.0f ? 6 : 3;
-    batch.slicing[n] = batch.axis[n] + (is_skew ? skew_number : 0);
+    batch.slicing[n] = BeamSlicing{batch.axis[n], !is_skew ? 0 : s < 0.0f ? -1 : 1}.number();
 
     // Slices by step along the main axis.
     const double by_slice = is_skew ? 1.0 / (2.0 + std::abs(batch.slope_side[n])) : 1.0;
@@ -133,7 +132,7 @@ void makeTracksLoop(const Eigen::Vector3f* beams, std::size_t count, double reso
       to.slope_side[begin + n] = static_cast<float>(batch.slope_side[n]);
       to.slope_height[begin + n] = static_cast<float>(batch.slope_height[n]);
       to.end[begin + n] = batch.end[n] * per_metre;
-      to.skew[begin + n] = batch.slicing[n] < 3 ? 0.0f : batch.slicing[n] < 6 ? 1.0f : -1.0f;
+      to.skew[begin + n] = static_cast<float>(BeamSlicing::of(batch.slicing[n]).skew);
     }
     for (std::size_t n = 0; n < some; n += kLanes) {
       writeTracks(batch, n, std::min<std::size_t>(some - n, kLanes), to.tracks + begin + n);
