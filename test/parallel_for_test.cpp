@@ -29,6 +29,49 @@ TEST(Workers, DoEachJobOnceRoundAfterRound) {
   }
 }
 
+TEST(Workers, BeginWithAShareOfTheirOwn) {
+  Workers workers(2);
+  for (int round = 0; round < 50; ++round) {
+    std::atomic<int> begun{0};
+    std::vector<std::size_t> worker_of(2);
+    workers.forEach(2, [&](std::size_t job, std::size_t worker) {
+      worker_of[job] = worker;
+      for (++begun; begun < 2;) std::this_thread::yield();  // nobody is free to help
+    });
+    ASSERT_EQ(worker_of, (std::vector<std::size_t>{0, 1})) << "round " << round;
+  }
+}
+
+TEST(Workers, TakeJobsInOrderWhereAsked) {
+  Workers workers(2);
+  for (int round = 0; round < 50; ++round) {
+    std::vector<std::atomic<int>> times(40);
+    std::atomic<std::size_t> begun{0};
+    std::atomic<bool> in_order{true};
+    workers.forEachInOrder(times.size(), [&](std::size_t job, std::size_t) {
+      ++times[job];
+      if (job > begun++ + 1) in_order = false;  // the other thread may be about to begin one before it
+    });
+    ASSERT_TRUE(in_order);
+    for (const auto& each : times) ASSERT_EQ(each, 1);
+  }
+}
+
+TEST(Workers, HelpThoseWhoHaveMoreToDo) {
+  Workers workers(2);
+  std::atomic<bool> others_done{false};
+  std::atomic<int> done{0};
+  // The first job ends when all others have, those of its share among them.
+  workers.forEach(20, [&](std::size_t job, std::size_t) {
+    if (job == 0) {
+      while (!others_done) std::this_thread::yield();
+    } else if (++done == 19) {
+      others_done = true;
+    }
+  });
+  EXPECT_EQ(done, 19);
+}
+
 TEST(Workers, PassOnWhatAJobThrowsAndGoOn) {
   Workers workers(3);
   for (int time = 0; time < 20; ++time) {

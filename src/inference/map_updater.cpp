@@ -82,8 +82,12 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
     scratch.limits = limits_;
     for (const EvidenceScratch& other : scratch_) scratch.reserveAs(other);
   }
-  workers.forEach(groups_.size(),
-                  [&](std::size_t g, std::size_t worker) { work(evidence, groups_[g], scratch_[worker]); });
+  const auto each = [&](std::size_t g, std::size_t worker) { work(evidence, groups_[g], scratch_[worker]); };
+  if (!groups_.empty() && groups_.front().effort > 0.0) {
+    workers.forEachInOrder(groups_.size(), each);
+  } else {
+    workers.forEach(groups_.size(), each);
+  }
   for (const Job& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);

@@ -33,7 +33,7 @@ int threadCount(int setting) {
   return setting > 0 ? setting : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-Workers::Workers(int setting) {
+Workers::Workers(int setting) : shares_(static_cast<std::size_t>(threadCount(setting))) {
   for (int worker = 1; worker < threadCount(setting); ++worker) {
     helpers_.emplace_back([this, worker] { help(static_cast<std::size_t>(worker)); });
   }
@@ -50,11 +50,14 @@ Workers::~Workers() {
 
 void Workers::work(std::size_t worker) {
   try {
-    for (std::size_t j = next_++; j < jobs_; j = next_++) call_(callable_, j, worker);
+    for (std::size_t s = 0; s < shares_.size(); ++s) {
+      Share& share = shares_[(worker + s) % shares_.size()];
+      for (std::size_t j = share.next++; j < share.end; j = share.next++) call_(callable_, j, worker);
+    }
   } catch (...) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!failure_) failure_ = std::current_exception();
-    next_ = jobs_;
+    for (Share& share : shares_) share.next = share.end;
   }
 }
 
@@ -75,12 +78,14 @@ void Workers::help(std::size_t worker) {
   }
 }
 
-void Workers::run(std::size_t jobs, Call call, void* callable) {
+void Workers::run(std::size_t jobs, std::size_t shares, Call call, void* callable) {
   if (jobs == 0) return;
   call_ = call;
   callable_ = callable;
-  jobs_ = jobs;
-  next_ = 0;
+  for (std::size_t s = 0; s < shares_.size(); ++s) {
+    shares_[s].next = std::min(s, shares) * jobs / shares;
+    shares_[s].end = std::min(s + 1, shares) * jobs / shares;
+  }
   if (jobs > 1 && !helpers_.empty()) {
     busy_ = helpers_.size();
     {

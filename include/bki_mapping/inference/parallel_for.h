@@ -28,33 +28,46 @@ class Workers {
   std::size_t count() const { return helpers_.size() + 1; }
 
   /// Calls job(j, worker) for each j in [0, jobs); returns when all are done. Jobs must not depend on each
-  /// other. `worker` in [0, count()) tells threads apart. Allocates no memory. Not to be called from two
-  /// threads at once, nor from a job.
+  /// other. `worker` in [0, count()) tells threads apart; each begins with a consecutive share of the jobs,
+  /// so that the same job of two calls finds its data in the same core's cache, and then helps the others.
+  /// Allocates no memory. Not to be called from two threads at once, nor from a job.
   /// @throws what the first failing job threw; jobs not yet begun are then left out.
   template <typename Job>
   void forEach(std::size_t jobs, Job&& job) {
-    using Callable = std::remove_reference_t<Job>;
-    run(
-        jobs,
-        [](void* callable, std::size_t j, std::size_t worker) {
-          (*static_cast<Callable*>(callable))(j, worker);
-        },
-        const_cast<void*>(static_cast<const void*>(&job)));
+    runAny(jobs, count(), job);
+  }
+  /// The same, but whoever is free takes the next job in order: for jobs sorted by effort, largest first.
+  template <typename Job>
+  void forEachInOrder(std::size_t jobs, Job&& job) {
+    runAny(jobs, 1, job);
   }
 
  private:
   using Call = void (*)(void* callable, std::size_t job, std::size_t worker);
 
-  void run(std::size_t jobs, Call call, void* callable);
+  template <typename Job>
+  void runAny(std::size_t jobs, std::size_t shares, Job& job) {
+    run(
+        jobs, shares,
+        [](void* callable, std::size_t j, std::size_t worker) { (*static_cast<Job*>(callable))(j, worker); },
+        const_cast<void*>(static_cast<const void*>(&job)));
+  }
+  /// @param shares into which jobs are split, at most one a worker.
+  void run(std::size_t jobs, std::size_t shares, Call call, void* callable);
   void work(std::size_t worker);
   void help(std::size_t worker);
+
+  /// Consecutive jobs. Each worker begins with the share of its number.
+  struct alignas(64) Share {
+    std::atomic<std::size_t> next{0};  ///< first job that nobody has taken; may pass `end`
+    std::size_t end = 0;
+  };
 
   // Of the work at hand; written before `round_` goes up.
   Call call_ = nullptr;
   void* callable_ = nullptr;
-  std::size_t jobs_ = 0;
+  std::vector<Share> shares_;  ///< one a worker
 
-  std::atomic<std::size_t> next_{0};     ///< first job that nobody has taken
   std::atomic<std::size_t> busy_{0};     ///< helpers that have not finished this round
   std::atomic<std::uint64_t> round_{0};  ///< goes up with each piece of work
   std::atomic<bool> stop_{false};
