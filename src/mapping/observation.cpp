@@ -117,8 +117,8 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const RangeLimits limits(sensor, scan.no_returns_at_max_range);
   ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
-  PointCounts& counts = into.counts;
-  counts.points += last - first;
+  PointCounts counts;
+  counts.points = last - first;
   for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3f& point = scan.points[i];
     const float range = point.norm();
@@ -135,6 +135,7 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
       if (!scan.soft.empty()) into.used.push_back({static_cast<std::uint32_t>(i), *id});
     }
   }
+  into.counts = counts;
 }
 
 void Observer::addNoReturns(const Scan& scan, Downsampler::Input& cut) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "bki_mapping/inference/parallel_for.h"
 #include "bki_mapping/inference/tile_grid.h"
 
 namespace bki_mapping {
@@ -28,8 +29,9 @@ struct MergedPoints {
   }
 };
 
-/// Adds up points cell by cell, one tile at a time. Keeps its memory from tile to tile.
-class CellMerger {
+/// Adds up points cell by cell, one tile at a time. Keeps its memory from tile to tile. Each thread has its
+/// own.
+class alignas(kThreadsApart) CellMerger {
  public:
   /// @return the place of the cell among those of this tile, in the order of their first points; kKnown if
   /// the point is not its cell's first.

@@ -34,7 +34,7 @@ class Downsampler {
   Downsampler(double cell, double tile, const std::string& instruction_set = "");
 
   /// Takes the points of one chunk; each thread has its own.
-  class Input {
+  class alignas(kThreadsApart) Input {
    public:
     void add(const Eigen::Vector3f& point, ClassId label) {
       x_[count_] = point.x();
@@ -87,7 +87,7 @@ class Downsampler {
   void inOrder(Workers& workers, LabelledPoints& output);
 
  private:
-  struct Chunk {
+  struct alignas(kThreadsApart) Chunk {
     IndexNumbering tiles;
     std::vector<std::uint32_t> begin;  ///< of each tile's points; one more than tiles
     std::vector<TilePoint> points;     ///< by tile
@@ -102,7 +102,7 @@ class Downsampler {
     std::uint32_t size() const { return end - begin; }
   };
   /// Consecutive tiles.
-  struct Group {
+  struct alignas(kThreadsApart) Group {
     std::uint32_t first_tile, end_tile;
     MergedPoints merged;
   };

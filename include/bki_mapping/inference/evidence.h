@@ -23,7 +23,7 @@ struct EvidenceLimits {
 };
 
 /// Working memory of one thread.
-struct EvidenceScratch {
+struct alignas(kThreadsApart) EvidenceScratch {
   EvidenceLimits limits;
   alignas(64) std::array<float, kBlockVoxels> sums{};
   alignas(64) std::array<float, kBlockVoxels> share{};  ///< of the evidence of hits that is within the limit

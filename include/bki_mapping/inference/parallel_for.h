@@ -15,6 +15,10 @@ namespace bki_mapping {
 /// @return the number of threads meant by a setting: itself, or all cores if it is 0.
 int threadCount(int setting);
 
+/// What one thread writes while others are at work stands in cache lines of its own: so many bytes apart,
+/// since some processors fetch lines in pairs.
+constexpr std::size_t kThreadsApart = 128;
+
 /// Threads that wait for work. Between two pieces of work they stay awake for a moment, then sleep.
 class Workers {
  public:
@@ -58,7 +62,7 @@ class Workers {
   void help(std::size_t worker);
 
   /// Consecutive jobs. Each worker begins with the share of its number.
-  struct alignas(64) Share {
+  struct alignas(kThreadsApart) Share {
     std::atomic<std::size_t> next{0};  ///< first job that nobody has taken; may pass `end`
     std::size_t end = 0;
   };

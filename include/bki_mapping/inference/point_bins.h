@@ -39,7 +39,7 @@ class PointBins {
 
  private:
   /// Working memory of one thread.
-  struct Scratch {
+  struct alignas(kThreadsApart) Scratch {
     TilePlaces places;
     const ClassId* labels = nullptr;     ///< of the batch
     std::array<std::uint32_t, 27> near;  ///< numbers of the blocks around `home`, or none
@@ -49,7 +49,7 @@ class PointBins {
     std::size_t size = 0;              ///< of these two; they are longer
   };
   /// The points of a group of the down-sampler's, by block.
-  struct Group {
+  struct alignas(kThreadsApart) Group {
     IndexNumbering blocks;
     std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
     std::vector<LocalPoint> points;
