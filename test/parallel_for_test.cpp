@@ -1,4 +1,4 @@
-// Workers do every job once, pass on what jobs throw, and go on.
+// Workers do every job once, pass on what jobs throw, and go on; what goes in turn goes in order.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "bki_mapping/inference/in_turn.h"
 #include "bki_mapping/inference/parallel_for.h"
 
 namespace bki_mapping {
@@ -92,6 +93,38 @@ TEST(Workers, WakeFromSleep) {
     std::atomic<int> done{0};
     workers.forEach(10, [&](std::size_t, std::size_t) { ++done; });
     EXPECT_EQ(done, 10);
+  }
+}
+
+TEST(InTurn, TakesEachPieceInOrderAsSoonAsItMay) {
+  InTurn turns;
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::size_t> taken;
+    const auto take = [&](std::size_t piece) { taken.push_back(piece); };
+    turns.start(4);
+    turns.finish(1, take);
+    EXPECT_EQ(taken, std::vector<std::size_t>());
+    turns.finish(0, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
+    turns.finish(3, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
+    turns.finish(2, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1, 2, 3}));
+  }
+}
+
+TEST(InTurn, KeepsTheOrderWhateverThreadsDo) {
+  Workers workers(4);
+  InTurn turns;
+  for (std::size_t round = 0; round < 200; ++round) {
+    const std::size_t pieces = round % 40;
+    std::vector<std::size_t> taken, all;
+    for (std::size_t p = 0; p < pieces; ++p) all.push_back(p);
+    turns.start(pieces);
+    workers.forEach(pieces, [&](std::size_t piece, std::size_t) {
+      turns.finish(piece, [&](std::size_t next) { taken.push_back(next); });
+    });
+    ASSERT_EQ(taken, all);
   }
 }
 

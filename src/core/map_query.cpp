@@ -66,7 +66,8 @@ VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel) {
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {
   const VoxelIndex voxel = map.geometry().voxelAt(point);
   const Block* block = map.find(GridGeometry::blockOf(voxel));
-  return viewVoxel(map, block ? *block : Block(), GridGeometry::offsetInBlock(voxel));
+  const int offset = GridGeometry::offsetInBlock(voxel);
+  return block ? viewVoxel(map, *block, offset) : viewVoxel(map, Block(), offset);
 }
 
 std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map) {

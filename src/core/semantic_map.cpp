@@ -40,7 +40,7 @@ const Block* SemanticMap::find(const BlockIndex& index) const {
   return place == GridTable::kNone ? nullptr : entries_[place].block.get();
 }
 
-Block& SemanticMap::getOrAllocate(const BlockIndex& index) {
+SemanticMap::Entry& SemanticMap::entry(const BlockIndex& index) {
   const auto fresh = static_cast<std::uint32_t>(entries_.size());
   const std::uint32_t place = place_.insert(index, fresh);
   if (place == fresh) {
@@ -54,7 +54,7 @@ Block& SemanticMap::getOrAllocate(const BlockIndex& index) {
       spare_.pop_back();
     }
   }
-  return *entries_[place].block;
+  return entries_[place];
 }
 
 void SemanticMap::erase(const BlockIndex& index) {

@@ -41,6 +41,8 @@ void Downsampler::start(const Eigen::Vector3d& origin, std::size_t chunks, const
   ordered_ = ordered;
   grid_.emplace(cells_, origin, edge_);
   used_ = chunks;
+  turns_.start(chunks);
+  tiles_.clear();
   if (chunks_.size() < chunks) chunks_.resize(chunks);
   inputs_.resize(workers.count());
   mergers_.resize(workers.count());
@@ -126,16 +128,15 @@ void Downsampler::close(std::size_t chunk_number, std::size_t worker) {
     chunk.points[to] = input.points_[i];
     if (ordered_) chunk.place[to] = static_cast<std::uint32_t>(i);
   }
+  turns_.finish(chunk_number, [this](std::size_t c) { collectRuns(c); });
 }
 
-void Downsampler::collectRuns() {
-  tiles_.clear();
-  for (std::uint32_t c = 0; c < used_; ++c) {
-    const std::vector<GridIndex>& tiles = chunks_[c].tiles.members();
-    const std::vector<std::uint32_t>& begin = chunks_[c].begin;
-    for (std::size_t t = 0; t < tiles.size(); ++t) tiles_.add(tiles[t], {c, begin[t], begin[t + 1]});
+void Downsampler::collectRuns(std::size_t c) {
+  const std::vector<GridIndex>& tiles = chunks_[c].tiles.members();
+  const std::vector<std::uint32_t>& begin = chunks_[c].begin;
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    tiles_.add(tiles[t], {static_cast<std::uint32_t>(c), begin[t], begin[t + 1]});
   }
-  tiles_.sort();
 }
 
 void Downsampler::splitIntoGroups(std::size_t points) {
@@ -185,7 +186,7 @@ void Downsampler::merge(std::uint32_t g, CellMerger& merger) {
 void Downsampler::finish(Workers& workers) {
   std::size_t points = 0;
   for (std::size_t c = 0; c < used_; ++c) points += chunks_[c].points.size();
-  collectRuns();
+  tiles_.sort();
   splitIntoGroups(points);
   workers.forEach(used_groups_, [&](std::size_t g, std::size_t worker) {
     merge(static_cast<std::uint32_t>(g), mergers_[worker]);

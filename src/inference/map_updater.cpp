@@ -6,24 +6,41 @@
 
 namespace bki_mapping {
 
+std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
+  const std::size_t size = map.size();
+  SemanticMap::Entry& entry = map.entry(index);
+  // What an earlier update wrote there is the number of no job now, or of another block's.
+  if (entry.job < jobs_.size() && jobs_[entry.job].index == index) return entry.job;
+  entry.job = static_cast<std::uint32_t>(jobs_.size());
+  jobs_.push_back({index, entry.block.get(), map.size() > size, false, 0});
+  touched_.push_back(index);
+  return entry.job;
+}
+
 void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers) {
-  numbering_.clear();
+  touched_.clear();
   jobs_.clear();
   if (number_of_.size() < evidence.size()) number_of_.resize(evidence.size());
   for (std::size_t e = 0; e < evidence.size(); ++e) {
-    const std::vector<GridIndex>& touched = evidence[e]->collectBlocks(map, workers);
+    const std::vector<GridIndex>& blocks = evidence[e]->collectBlocks(map, workers);
     std::vector<std::uint32_t>& number_of = number_of_[e];
     number_of.assign(jobs_.size(), kNone);
-    for (std::size_t number = 0; number < touched.size(); ++number) {
-      const std::uint32_t job = numbering_.insert(touched[number]);
-      if (job == jobs_.size()) {
-        const std::size_t size = map.size();
-        Block& block = map.getOrAllocate({touched[number]});
-        jobs_.push_back({{touched[number]}, &block, map.size() > size, false, 0});
-        number_of.push_back(kNone);
-      }
+    for (std::size_t number = 0; number < blocks.size(); ++number) {
+      const std::uint32_t job = jobOf(map, {blocks[number]});
+      if (job == number_of.size()) number_of.push_back(kNone);
       number_of[job] = static_cast<std::uint32_t>(number);
     }
+  }
+}
+
+std::uint32_t MapUpdater::numberIn(std::size_t evidence, std::size_t job) const {
+  return job < number_of_[evidence].size() ? number_of_[evidence][job] : kNone;
+}
+
+void MapUpdater::prefetch(const std::vector<Evidence*>& evidence, std::size_t number) const {
+  jobs_[number].block->prefetch();
+  for (std::size_t e = 0; e < evidence.size(); ++e) {
+    if (numberIn(e, number) != kNone) evidence[e]->prefetch(numberIn(e, number));
   }
 }
 
@@ -32,8 +49,8 @@ void MapUpdater::work(const std::vector<Evidence*>& evidence, std::size_t number
   const std::size_t before = job.is_new ? 0 : job.block->bytes();
   scratch.held.reset();
   for (std::size_t e = 0; e < evidence.size(); ++e) {
-    if (number >= number_of_[e].size() || number_of_[e][number] == kNone) continue;
-    evidence[e]->addTo(number_of_[e][number], job.index, *job.block, scratch);
+    const std::uint32_t number_there = numberIn(e, number);
+    if (number_there != kNone) evidence[e]->addTo(number_there, job.index, *job.block, scratch);
   }
   job.empty = job.block->empty();
   const std::size_t after = job.empty ? 0 : job.block->bytes();
@@ -64,6 +81,7 @@ void MapUpdater::work(const std::vector<Evidence*>& evidence, const Group& group
   for (const Evidence* piece : evidence) piece->enter(group.group, scratch);
   for (const std::uint32_t* job = group_jobs_.begin(group.number); job != group_jobs_.end(group.number);
        ++job) {
+    if (job + 1 != group_jobs_.end(group.number)) prefetch(evidence, job[1]);
     work(evidence, *job, scratch);
   }
 }

@@ -161,24 +161,18 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
                                       [&](ClassId label) { return label != group.first_class; });
 }
 
-void PointBins::collectRuns() {
-  one_class_ = true;
-  for (std::size_t g = 0; g < used_; ++g) {
-    one_class_ &= !groups_[g].has_other_class && groups_[g].first_class == groups_[0].first_class;
+void PointBins::collectRuns(const Group& group) {
+  one_class_ &= !group.has_other_class && group.first_class == groups_[0].first_class;
+  const std::vector<GridIndex>& indices = group.blocks.members();
+  for (std::size_t b = 0; b < indices.size(); ++b) {
+    blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b]});
   }
-  blocks_.clear();
-  for (std::size_t g = 0; g < used_; ++g) {
-    const Group& group = groups_[g];
-    const std::vector<GridIndex>& indices = group.blocks.members();
-    for (std::size_t b = 0; b < indices.size(); ++b) {
-      blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b]});
-    }
-  }
-  blocks_.sort();
 }
 
 void PointBins::start(std::size_t groups, const Workers& workers) {
-  used_ = groups;
+  one_class_ = true;
+  turns_.start(groups);
+  blocks_.clear();
   if (groups_.size() < groups) groups_.resize(groups);
   scratch_.resize(workers.count());
   // Who gets which group is chance: all have room for what one has met.
@@ -197,8 +191,9 @@ void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& poin
   start(points.groups(), workers);
   workers.forEach(points.groups(), [&](std::size_t g, std::size_t worker) {
     binGroup(grid, points.merged(g), scratch_[worker], groups_[g]);
+    turns_.finish(g, [this](std::size_t next) { collectRuns(groups_[next]); });
   });
-  collectRuns();
+  blocks_.sort();
 }
 
 }  // namespace bki_mapping

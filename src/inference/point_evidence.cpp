@@ -75,6 +75,14 @@ void PointEvidence::addClass(ClassId label, const PointRun* runs, std::size_t co
   if (!nothing) block.add(label, scratch.sums.data(), layers);
 }
 
+void PointEvidence::prefetch(std::size_t number) const {
+  constexpr std::size_t kPointsALine = 64 / sizeof(LocalPoint), kMostLines = 16;
+  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) {
+    const std::size_t end = std::min(run->count, kMostLines * kPointsALine);
+    for (std::size_t i = 0; i < end; i += kPointsALine) __builtin_prefetch(run->points + i);
+  }
+}
+
 void PointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
                           EvidenceScratch& scratch) const {
   const PointRun* const runs = bins_.begin(number);

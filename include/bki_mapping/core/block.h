@@ -46,6 +46,14 @@ class Block {
   }
   void add(ClassId id, const float* values) { add(id, values, Layers()); }
 
+  /// Fetches the first cache lines of the planes, to be written; processors see to those that follow.
+  void prefetch() const {
+    constexpr int kFloatsALine = 64 / sizeof(float), kLines = 8;
+    for (std::size_t p = 0; p < classes_.size(); ++p) {
+      for (int line = 0; line < kLines; ++line) __builtin_prefetch(plane(p) + kFloatsALine * line, 1);
+    }
+  }
+
   /// Voxels that the last scan to reach them saw only behind its hits.
   const Occlusion& occlusion() const { return occlusion_; }
   void setOcclusion(const Occlusion& occlusion) { occlusion_ = occlusion; }

@@ -21,6 +21,7 @@ class SemanticMap {
     BlockIndex index;
     std::unique_ptr<Block> block;
     std::uint32_t place_in_region;
+    std::uint32_t job = 0;  ///< for who updates the map: number of the block's job, or any other
   };
 
   /// @param prior concentration alpha0 of each class before any scan, > 0.
@@ -55,7 +56,9 @@ class SemanticMap {
 
   /// @return nullptr where no block is.
   const Block* find(const BlockIndex& index) const;
-  Block& getOrAllocate(const BlockIndex& index);
+  Block& getOrAllocate(const BlockIndex& index) { return *entry(index).block; }
+  /// The entry of a block, which is made where missing. It may move with the next one made or erased.
+  Entry& entry(const BlockIndex& index);
   void erase(const BlockIndex& index);
   void clear();
 

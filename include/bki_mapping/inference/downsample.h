@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/inference/cell_merger.h"
+#include "bki_mapping/inference/in_turn.h"
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/inner_loops.h"
 #include "bki_mapping/inference/parallel_for.h"
@@ -107,7 +108,7 @@ class Downsampler {
     MergedPoints merged;
   };
 
-  void collectRuns();
+  void collectRuns(std::size_t chunk);
   void splitIntoGroups(std::size_t points);
   void prefetch(const Run& run) const;
   void merge(std::uint32_t group, CellMerger& merger);
@@ -123,6 +124,7 @@ class Downsampler {
   std::vector<Chunk> chunks_;
   std::vector<Input> inputs_;        ///< one a worker
   std::vector<CellMerger> mergers_;  ///< one a worker
+  InTurn turns_;                     ///< of chunks, to hand their runs to
   RunsByIndex<Run> tiles_;
   std::vector<Group> groups_;
 };

@@ -82,6 +82,9 @@ class Evidence {
   /// @param group with the blocks that the update touches.
   virtual void enter(const BlockGroup& /*group*/, EvidenceScratch& /*scratch*/) const {}
 
+  /// Fetches what addTo will read for a block.
+  virtual void prefetch(std::size_t /*number*/) const {}
+
   /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
   /// @param number of the block in what collectBlocks gave.
   virtual void addTo(std::size_t number, const BlockIndex& index, Block& block,

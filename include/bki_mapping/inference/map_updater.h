@@ -25,7 +25,7 @@ class MapUpdater {
   MapUpdateStats update(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
 
   /// The blocks that the last update may have changed, made or erased; each once.
-  const std::vector<GridIndex>& touched() const { return numbering_.members(); }
+  const std::vector<GridIndex>& touched() const { return touched_; }
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -46,12 +46,18 @@ class MapUpdater {
   };
 
   void collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers);
+  /// @return the number of a block's job, a new one if it has none yet.
+  std::uint32_t jobOf(SemanticMap& map, const BlockIndex& index);
   void groupJobs(const std::vector<Evidence*>& evidence);
+  /// @return the number of a job's block in a piece of evidence, or kNone.
+  std::uint32_t numberIn(std::size_t evidence, std::size_t job) const;
+  /// Fetches what work will read and write for a job.
+  void prefetch(const std::vector<Evidence*>& evidence, std::size_t number) const;
   void work(const std::vector<Evidence*>& evidence, const Group& group, EvidenceScratch& scratch);
   void work(const std::vector<Evidence*>& evidence, std::size_t number, EvidenceScratch& scratch);
 
   EvidenceLimits limits_;
-  IndexNumbering numbering_;
+  std::vector<GridIndex> touched_;  ///< blocks, job by job
   std::vector<Job> jobs_;
   RunsByIndex<std::uint32_t> group_jobs_;  ///< jobs by group
   std::vector<Group> groups_;              ///< what takes long first

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bki_mapping/inference/downsample.h"
+#include "bki_mapping/inference/in_turn.h"
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/inner_loops.h"
 #include "bki_mapping/inference/kernel.h"
@@ -63,15 +64,15 @@ class PointBins {
   void binNear(std::size_t count, Scratch& scratch, Group& group) const;
   void binFar(std::size_t i, Scratch& scratch, Group& group) const;
   void sortGroup(const Scratch& scratch, Group& group) const;
-  void collectRuns();
+  void collectRuns(const Group& group);
 
   GridGeometry geometry_;
   VoxelKernel kernel_;
   const InnerLoops& loops_;
   bool home_always_ = false, one_class_ = false;
-  std::size_t used_ = 0;
   std::vector<Scratch> scratch_;  ///< one a worker
   std::vector<Group> groups_;
+  InTurn turns_;  ///< of groups, to hand their runs to
   RunsByIndex<PointRun> blocks_;
 };
 

@@ -29,6 +29,7 @@ class PointEvidence : public Evidence {
 
   /// Exactly the blocks with a voxel centre within reach of a point.
   const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  void prefetch(std::size_t number) const override;
   void addTo(std::size_t number, const BlockIndex& index, Block& block,
              EvidenceScratch& scratch) const override;
 
