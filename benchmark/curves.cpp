@@ -1,5 +1,6 @@
 #include "curves.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -68,24 +69,46 @@ const std::vector<Case>& curveCases() {
   return cases;
 }
 
-/// Time against the size of the map: all modes see each scan, one after the other.
+/// A mode, in a map that grows all the while and in one that begins with the last scans.
+struct GrowingCase {
+  explicit GrowingCase(const Case& of)
+      : name(of.name), grown(mapperOf(of.settings)), fresh(mapperOf(of.settings)) {}
+
+  std::string name;
+  std::unique_ptr<SemanticMapper> grown, fresh;
+  std::vector<double> ms_grown, ms_fresh;  ///< of the same scans
+};
+
+double millisecondsOf(SemanticMapper& mapper, const Scan& scan) {
+  Stopwatch watch;
+  mapper.integrate(scan);
+  return watch.lap();
+}
+
+/// Time against the size of the map: all modes see each scan, one after the other. Prints what the last scans
+/// took, and what the same scans take in a map of their own: streets differ from each other.
 std::string growth(std::size_t count) {
   const simulation::Drive drive({static_cast<int>(count), kSpeed, 1, {}});
+  const std::size_t last = std::min<std::size_t>(200, count / 2), begin = count - last;
   std::string csv = "mode,scan,blocks,map_bytes,ms\n";
-  std::vector<std::unique_ptr<SemanticMapper>> all;
-  for (const Case& c : curveCases()) {
-    all.push_back(mapperOf(c.settings));
-  }
+  std::vector<GrowingCase> all(curveCases().begin(), curveCases().end());
   for (std::size_t i = 0; i < count; ++i) {
     const Scan scan = drive.frame(i).scan();
-    for (std::size_t c = 0; c < all.size(); ++c) {
-      Stopwatch watch;
-      all[c]->integrate(scan);
-      const double ms = watch.lap();
-      csv += '"' + curveCases()[c].name + "\"," + std::to_string(i) + "," +
-             std::to_string(all[c]->map().size()) + "," + std::to_string(all[c]->map().bytes()) + "," +
-             std::to_string(ms) + "\n";
+    for (GrowingCase& c : all) {
+      const double ms = millisecondsOf(*c.grown, scan);
+      csv += '"' + c.name + "\"," + std::to_string(i) + "," + std::to_string(c.grown->map().size()) + "," +
+             std::to_string(c.grown->map().bytes()) + "," + std::to_string(ms) + "\n";
+      if (i < begin) continue;
+      const double ms_fresh = millisecondsOf(*c.fresh, scan);
+      if (i < begin + last / 10) continue;  // all is new to the fresh map
+      c.ms_grown.push_back(ms);
+      c.ms_fresh.push_back(ms_fresh);
     }
+  }
+  for (const GrowingCase& c : all) {
+    std::printf("growth, %-26s %6.1f ms in a map of %zu blocks, %6.1f ms in one of %zu\n", c.name.c_str(),
+                quantile(c.ms_grown, 0.5), c.grown->map().size(), quantile(c.ms_fresh, 0.5),
+                c.fresh->map().size());
   }
   return csv;
 }

@@ -49,8 +49,7 @@ void expectEqualsBruteForce(const Scan& scan, const MapperConfig& config, const 
           const auto id = static_cast<ClassId>(label);
           const reference::Value truth = brute.evidence(v, id);
           const double got = evidenceAt(mapper.map(), v, id);
-          const double tolerance = 2e-5 * config.kernel.scale + 2e-5 * truth.sum + truth.slack;
-          if (std::abs(got - truth.sum) > tolerance && ++faults < 5) {
+          if (std::abs(got - truth.sum) > truth.tolerance(config.kernel.scale) && ++faults < 5) {
             ADD_FAILURE() << what << ": voxel " << v.x << ' ' << v.y << ' ' << v.z << " class " << label
                           << " has evidence " << got << ", but the brute-force sum is " << truth.sum;
           }

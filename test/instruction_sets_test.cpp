@@ -23,7 +23,7 @@ std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& bru
     const float* plane = entry.block->evidence(id);
     for (int v = 0; v < kBlockVoxels; ++v) {
       const reference::Value truth = brute.evidence(GridGeometry::voxelOf(entry.index, v), id);
-      const double tolerance = 2e-5 * config.kernel.scale + 2e-5 * truth.sum + truth.slack + room;
+      const double tolerance = truth.tolerance(config.kernel.scale) + room;
       const float got = plane ? plane[v] : 0.0f;
       faults += std::abs(got - truth.sum) > tolerance || got < 0.0f;
     }

@@ -197,6 +197,7 @@ Value ScanReference::lineEvidence(const VoxelIndex& voxel) const {
   for (const Eigen::Vector3d& beam : beams_) {
     double rho = 0.0, k = 0.0;
     if (!reaches(beam, centre, rho, k)) continue;
+    ++value.beams;
     const bool close = std::min(std::abs(rho), std::abs(1.0 - rho)) < kClose;
     if (close) value.slack += k;
     if (close || rho <= 0.0 || rho >= 1.0) continue;

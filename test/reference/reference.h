@@ -17,6 +17,11 @@ namespace bki_mapping::reference {
 struct Value {
   double sum = 0.0;
   double slack = 0.0;
+  int beams = 0;  ///< that reach the voxel
+
+  /// By how much a sum in single precision may err: where many beams hardly reach a voxel, the sum is small,
+  /// but each errs for itself, by some roundings of a number like the kernel's scale.
+  double tolerance(double scale) const { return 2e-5 * scale + 2e-7 * scale * beams + 2e-5 * sum + slack; }
 };
 
 struct Point {
