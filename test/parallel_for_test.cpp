@@ -34,12 +34,13 @@ TEST(Workers, BeginWithAShareOfTheirOwn) {
   Workers workers(2);
   for (int round = 0; round < 50; ++round) {
     std::atomic<int> begun{0};
-    std::vector<std::size_t> worker_of(2);
-    workers.forEach(2, [&](std::size_t job, std::size_t worker) {
+    std::vector<std::size_t> worker_of(4);
+    workers.forEach(4, [&](std::size_t job, std::size_t worker) {
       worker_of[job] = worker;
-      for (++begun; begun < 2;) std::this_thread::yield();  // nobody is free to help
+      for (++begun; begun < 2;) std::this_thread::yield();  // until both have a job
     });
-    ASSERT_EQ(worker_of, (std::vector<std::size_t>{0, 1})) << "round " << round;
+    ASSERT_EQ(worker_of[0], 0u) << "round " << round;
+    ASSERT_EQ(worker_of[2], 1u) << "round " << round;
   }
 }
 
