@@ -20,7 +20,7 @@ function(bki_mapping_unit_test name)
 endfunction()
 
 foreach(name
-    allocation_test beam_index_test beam_tracks_test brute_force_test column_map_test downsample_test
+    allocation_test beam_index_test beam_tracks_test bounds_test brute_force_test column_map_test downsample_test
     dynamics_quality_test grid_geometry_test instruction_sets_test kernel_test laws_test map_query_test
     observation_test occlusion_test parallel_for_test point_bins_test sampling_test semantic_map_test
     semantic_quality_test tile_grid_test)
@@ -41,6 +41,8 @@ endfunction()
 bki_mapping_script_test(figures_test)
 bki_mapping_script_test(layering_test)
 bki_mapping_script_test(tools_test)
+add_test(NAME vector_symbols_test
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/vector_symbols_test.py $<TARGET_OBJECTS:bki_mapping_core>)
 
 if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)

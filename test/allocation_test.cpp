@@ -1,8 +1,13 @@
-// Once its memory has grown to the size of the scans, mapping allocates nothing.
+// Once its memory has grown to the size of the scans, mapping allocates nothing; and whichever allocation
+// fails, a scan is in the map whole or not at all.
 #include <gtest/gtest.h>
+
+#include <malloc.h>
 
 #include <atomic>
 #include <cstdlib>
+#include <cstring>
+#include <map>
 #include <new>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -11,14 +16,34 @@
 namespace {
 
 std::atomic<std::size_t> allocations{0};
+std::atomic<std::ptrdiff_t> allocated_bytes{0};
+/// Allocations that are yet to succeed before one fails, or, if `fails_on`, all that follow; none if
+/// negative.
+std::atomic<std::ptrdiff_t> until_failure{-1};
+std::atomic<bool> fails_on{false};
+
+bool failsNow() {
+  if (until_failure < 0) return false;
+  const std::ptrdiff_t left = until_failure--;
+  if (left > 0) return false;
+  if (fails_on) until_failure = 0;
+  return true;
+}
 
 void* countedAllocation(std::size_t size, std::size_t alignment) {
   ++allocations;
+  if (failsNow()) throw std::bad_alloc();
   void* memory = alignment <= alignof(std::max_align_t)
                      ? std::malloc(size)
                      : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
   if (!memory) throw std::bad_alloc();
+  allocated_bytes += static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
   return memory;
+}
+
+void countedRelease(void* memory) noexcept {
+  allocated_bytes -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
+  std::free(memory);
 }
 
 }  // namespace
@@ -30,16 +55,16 @@ void* operator new(std::size_t size, std::align_val_t alignment) {
   return countedAllocation(size, static_cast<std::size_t>(alignment));
 }
 void operator delete(void* memory) noexcept {
-  std::free(memory);
+  countedRelease(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  countedRelease(memory);
 }
 void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
+  countedRelease(memory);
 }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
+  countedRelease(memory);
 }
 
 namespace bki_mapping {
@@ -90,6 +115,132 @@ TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {
   std::size_t quiet = 0;
   for (int time = 0; time < 20; ++time) quiet += allocationsOf(mapper, scan) == 0;
   EXPECT_GE(quiet, 15u);
+}
+
+/// A map's planes as bytes, block by block, and its marks of occlusion.
+std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
+  std::map<GridIndex, std::string> content;
+  for (const auto& entry : map.entries()) {
+    std::string& text = content[entry.index];
+    for (std::size_t c = 0; c < entry.block->classes().size(); ++c) {
+      text += static_cast<char>(entry.block->classes()[c]);
+      text.append(reinterpret_cast<const char*>(entry.block->plane(c)), kBlockVoxels * sizeof(float));
+    }
+    text += entry.block->occlusion().to_string();
+  }
+  return content;
+}
+
+/// A failure somewhere in a scan, then the scan once more with the failure one allocation later, until it
+/// meets none.
+void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& second, bool on) {
+  SemanticMapper whole(config, reference::smallTable()), failing(config, reference::smallTable());
+  whole.integrate(first);
+  failing.integrate(first);
+  const auto before = contentOf(failing.map());
+  whole.integrate(second);
+  const auto after = contentOf(whole.map());
+  ASSERT_NE(before, after);
+  std::ptrdiff_t failures = 0;
+  for (bool succeeded = false; !succeeded; ++failures) {
+    fails_on = on;
+    until_failure = failures;
+    try {
+      failing.integrate(second);
+      succeeded = true;
+    } catch (const ScanRefused& refused) {
+      EXPECT_EQ(refused.reason(), ScanRefused::Reason::kMemory);
+    } catch (const std::bad_alloc&) {  // there was not even memory for the sentence
+    }
+    until_failure = -1;
+    if (succeeded) break;
+    ASSERT_EQ(contentOf(failing.map()), before) << "after " << failures << " allocations";
+    ASSERT_EQ(failing.mapBytes(), failing.map().bytes()) << "after " << failures << " allocations";
+    ASSERT_TRUE(failing.touchedBlocks().empty());
+  }
+  EXPECT_EQ(contentOf(failing.map()), after);
+  EXPECT_EQ(failing.mapBytes(), failing.map().bytes());
+  EXPECT_GT(failures, 50) << "too few allocations to have tried much";
+}
+
+Scan fewPoints(unsigned seed) {
+  Scan scan = reference::nastyScenes(60)[0].scan;
+  scan.origin += Eigen::Vector3d(0.9 * seed, -0.4 * seed, 0.2);
+  scan.stamp += seed;
+  for (std::uint32_t& label : scan.labels) label = 10u * ((label / 10 + seed) % 4);
+  return scan;
+}
+
+/// The same with two classes a point.
+Scan withShares(Scan scan) {
+  scan.labels_are_ids = true;
+  for (std::uint32_t& label : scan.labels) {
+    label /= 10u;
+    scan.soft.startPoint();
+    scan.soft.add({static_cast<ClassId>(label), 0.75f});
+    scan.soft.add({static_cast<ClassId>((label + 1) % 4), 0.25f});
+  }
+  return scan;
+}
+
+TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
+  for (const bool on : {false, true}) {
+    for (const char* mode : {"none", "even", "uniform", "linear", "line"}) {
+      MapperConfig config;
+      config.free_space.mode = mode;
+      config.threads = 1;
+      failEverywhere(config, fewPoints(0), fewPoints(1), on);
+      config.free_space.hits_before_misses = true;
+      config.free_space.evidence_before_misses = true;
+      config.scan_limit.hits = 0.2;
+      config.scan_limit.free = 0.1;
+      failEverywhere(config, fewPoints(0), fewPoints(2), on);
+    }
+  }
+}
+
+TEST(Allocation, AFailureLeavesTheMapAsItWasWithEveryKindOfEvidence) {
+  for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+    for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
+      for (const BeamIndexType index : {BeamIndexType::kTable, BeamIndexType::kRtree}) {
+        MapperConfig config;
+        config.kernel.type = kernel;
+        config.free_space.extent = extent;
+        config.free_space.beam_index = index;
+        config.occlusion =
+            extent == FreeSpaceExtent::kMapped ? OcclusionExtent::kMapped : OcclusionExtent::kAll;
+        config.threads = 1;
+        failEverywhere(config, fewPoints(0), fewPoints(1), false);
+        failEverywhere(config, fewPoints(0), withShares(fewPoints(1)), false);
+      }
+    }
+  }
+}
+
+TEST(Allocation, AFailureOnOneOfTwoThreadsLeavesTheMapAsItWas) {
+  for (const char* mode : {"linear", "line"}) {
+    MapperConfig config;
+    config.free_space.mode = mode;
+    config.threads = 2;
+    failEverywhere(config, everywhere(), fewPoints(1), false);
+  }
+}
+
+TEST(Allocation, BytesOfAMapAreWhatItTakes) {
+  MapperConfig config;
+  config.threads = 1;
+  SemanticMapper mapper(config, reference::smallTable());
+  Scan scan = everywhere();
+  for (int n = 0; n < 2; ++n) mapper.integrate(scan);  // working memory has its size
+  const auto beside = [&] { return allocated_bytes - static_cast<std::ptrdiff_t>(mapper.map().bytes()); };
+  const std::ptrdiff_t before = beside();
+  for (int n = 0; n < 300; ++n) {
+    scan.origin.x() += 8.1;
+    mapper.integrate(scan);
+  }
+  const auto bytes = static_cast<double>(mapper.map().bytes());
+  EXPECT_GT(bytes, 5e6);
+  EXPECT_NEAR(static_cast<double>(beside() - before), 0.0, 0.02 * bytes);
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ void expectEqualsBruteForce(const Scan& scan, const MapperConfig& config, const 
   }
   EXPECT_EQ(inside, mapper.map().size()) << what << ": blocks lie outside the scene";
   // A kernel shorter than a voxel may find nothing to clear.
-  if (config.kernel.length >= config.resolution) {
+  if (config.kernel.lengthFor(config.resolution) >= config.resolution) {
     EXPECT_EQ(free_seen > 0.0, config.free_space.mode != "none") << what;
   }
 }

@@ -112,6 +112,7 @@ TEST(InstructionSets, LinesFarFromTheSensorEqualBruteForceOnEach) {
         });
     MapperConfig config;
     config.downsample_resolution = 0.0;
+    config.sensor_model.max_range = 1e7;
     config.free_space.weight = BeamWeight::kUniform;
     const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
     const GridGeometry geometry(config.resolution);

@@ -230,20 +230,13 @@ TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
   EXPECT_EQ(changed.config().free_space.mode, "linear");
 }
 
-/// The bytes of all blocks, one by one.
-std::size_t bytesOf(const SemanticMap& map) {
-  std::size_t sum = 0;
-  for (const auto& entry : map.entries()) sum += entry.block->bytes();
-  return sum;
-}
-
 TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
   for (const std::string& mode : kModes) {
     SemanticMapper mapper(configOf(mode), reference::smallTable());
     SemanticMap before = mapOf({}, configOf(mode));
     for (const Scan& scan : someScans()) {
       mapper.integrate(scan);
-      EXPECT_EQ(mapper.blockBytes(), bytesOf(mapper.map())) << mode;
+      EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes()) << mode;
       std::set<std::tuple<int, int, int>> touched;
       for (const GridIndex& b : mapper.touchedBlocks()) {
         EXPECT_TRUE(touched.emplace(b.x, b.y, b.z).second) << "a block is named twice";
@@ -266,9 +259,9 @@ TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
     EXPECT_GT(gone.size(), 0u);
     EXPECT_EQ(mapper.map().size(), size - gone.size());
     for (const auto& entry : mapper.map().entries()) EXPECT_GE(entry.index.x, 0);
-    EXPECT_EQ(mapper.blockBytes(), bytesOf(mapper.map())) << mode;
+    EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes()) << mode;
     mapper.reset();
-    EXPECT_EQ(mapper.blockBytes(), 0u);
+    EXPECT_EQ(mapper.mapBytes(), 0u);
   }
 }
 

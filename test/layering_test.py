@@ -9,7 +9,8 @@ LEVELS = [['core'], ['inference'], ['free_space'], ['mapping'], ['io'], ['simula
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 # What else a room may include, beside the standard library and Eigen.
 LIBRARIES = {
-    'inference/beam_rtree.cpp': ('boost/geometry',),
+    'inference/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
+    'mapping/semantic_mapper.cpp': ('malloc.h',),
     'io': ('pcl/', 'yaml-cpp/', 'nlohmann/'),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),

@@ -117,8 +117,12 @@ TEST(Observation, LabelsMayBeIds) {
 
 TEST(Observation, PointsFarFromTheMapAreCounted) {
   Scan scan = scanOf({{1, 0, 0}, {1e10f, 0, 0}, {1e30f, 0, 0}}, {10, 10, 10});
-  SemanticMapper mapper(plainConfig(), reference::smallTable());
-  EXPECT_EQ(mapper.integrate(scan).counts.outside_map, 2u);
+  MapperConfig config = plainConfig();
+  config.sensor_model.max_range = 1e11;
+  SemanticMapper mapper(config, reference::smallTable());
+  const PointCounts counts = mapper.integrate(scan).counts;
+  EXPECT_EQ(counts.outside_map, 1u);
+  EXPECT_EQ(counts.beyond_max, 1u);
   scan.origin.x() = std::numeric_limits<double>::quiet_NaN();
   const std::size_t before = mapper.map().size();
   EXPECT_THROW(mapper.integrate(scan), std::invalid_argument);

@@ -33,7 +33,7 @@ std::string textOf(const std::string& file) {
 TEST(Parameters, DefaultsAreThePapers) {
   const MapperConfig config;
   EXPECT_EQ(config.resolution, 0.3);
-  EXPECT_EQ(config.kernel.length, 0.3);
+  EXPECT_EQ(config.kernel.lengthFor(config.resolution), 0.3);
   EXPECT_EQ(config.kernel.scale, 0.1);
   EXPECT_EQ(config.prior, 0.001);
   EXPECT_EQ(config.downsample_resolution, 0.1);

@@ -1,9 +1,19 @@
 #include "bki_mapping/core/semantic_map.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 namespace bki_mapping {
+namespace {
+
+/// Makes room for so many elements in all; at least doubles what there is, so that it is seldom called for.
+template <typename T>
+void makeRoom(std::size_t size, std::vector<T>& elements) {
+  if (elements.capacity() < size) elements.reserve(std::max(size, 2 * elements.capacity()));
+}
+
+}  // namespace
 
 GridIndex SemanticMap::regionOf(const BlockIndex& block) {
   static_assert(kRegionEdge == kBlockEdge, "blocks lie in a region as voxels lie in a block");
@@ -11,19 +21,21 @@ GridIndex SemanticMap::regionOf(const BlockIndex& block) {
 }
 
 std::vector<std::uint32_t>& SemanticMap::regionAt(const BlockIndex& block) {
-  const auto fresh = static_cast<std::uint32_t>(regions_.size());
-  const std::uint32_t number = region_number_.insert(regionOf(block), fresh);
-  if (number == fresh) {
-    regions_.push_back({regionOf(block), {}});
-    if (!spare_places_.empty()) {
-      regions_.back().places = std::move(spare_places_.back());
-      spare_places_.pop_back();
-    }
+  const std::uint32_t known = region_number_.find(regionOf(block));
+  if (known != GridTable::kNone) return regions_[known].places;
+  // What takes memory comes first; then nothing can fail.
+  makeRoom(regions_.size() + 1, regions_);
+  makeRoom(regions_.size() + spare_places_.size() + 1, spare_places_);
+  region_number_.insert(regionOf(block), static_cast<std::uint32_t>(regions_.size()));
+  regions_.push_back({regionOf(block), {}});
+  if (!spare_places_.empty()) {
+    regions_.back().places = std::move(spare_places_.back());
+    spare_places_.pop_back();
   }
-  return regions_[number].places;
+  return regions_.back().places;
 }
 
-void SemanticMap::dropIfEmpty(const BlockIndex& block) {
+void SemanticMap::dropIfEmpty(const BlockIndex& block) noexcept {
   const std::uint32_t number = region_number_.find(regionOf(block));
   if (!regions_[number].places.empty()) return;
   spare_places_.push_back(std::move(regions_[number].places));
@@ -40,24 +52,36 @@ const Block* SemanticMap::find(const BlockIndex& index) const {
   return place == GridTable::kNone ? nullptr : entries_[place].block.get();
 }
 
-SemanticMap::Entry& SemanticMap::entry(const BlockIndex& index) {
-  const auto fresh = static_cast<std::uint32_t>(entries_.size());
-  const std::uint32_t place = place_.insert(index, fresh);
-  if (place == fresh) {
-    std::vector<std::uint32_t>& region = regionAt(index);
-    entries_.push_back({index, nullptr, static_cast<std::uint32_t>(region.size())});
-    region.push_back(place);
-    if (spare_.empty()) {
-      entries_.back().block = std::make_unique<Block>();
-    } else {
-      entries_.back().block = std::move(spare_.back());
+void SemanticMap::append(const BlockIndex& index) {
+  // What takes memory comes first; then nothing can fail.
+  makeRoom(entries_.size() + 1, entries_);
+  makeRoom(entries_.size() + spare_.size() + 1, spare_);
+  std::vector<std::uint32_t>& region = regionAt(index);
+  try {
+    makeRoom(region.size() + 1, region);
+    std::unique_ptr<Block> block = spare_.empty() ? std::make_unique<Block>() : nullptr;
+    place_.insert(index, static_cast<std::uint32_t>(entries_.size()));
+    if (!block) {
+      block = std::move(spare_.back());
+      spare_bytes_ -= block->bytes();
       spare_.pop_back();
     }
+    entries_.push_back({index, std::move(block), static_cast<std::uint32_t>(region.size())});
+  } catch (...) {
+    dropIfEmpty(index);
+    throw;
   }
-  return entries_[place];
+  region.push_back(static_cast<std::uint32_t>(entries_.size() - 1));
 }
 
-void SemanticMap::erase(const BlockIndex& index) {
+SemanticMap::Entry& SemanticMap::entry(const BlockIndex& index) {
+  const std::uint32_t place = place_.find(index);
+  if (place != GridTable::kNone) return entries_[place];
+  append(index);
+  return entries_.back();
+}
+
+void SemanticMap::erase(const BlockIndex& index) noexcept {
   const std::uint32_t hole = place_.find(index);
   if (hole == GridTable::kNone) return;
   const auto removeFrom = [this](std::vector<std::uint32_t>& region, std::uint32_t place) {
@@ -68,7 +92,10 @@ void SemanticMap::erase(const BlockIndex& index) {
   removeFrom(regionAt(index), entries_[hole].place_in_region);
   dropIfEmpty(index);
   place_.erase(index);
-  if (entries_[hole].block->empty()) spare_.push_back(std::move(entries_[hole].block));
+  if (entries_[hole].block->empty()) {
+    spare_bytes_ += entries_[hole].block->bytes();
+    spare_.push_back(std::move(entries_[hole].block));
+  }
   if (hole + 1 != entries_.size()) {
     Entry& last = entries_.back();
     place_.set(last.index, hole);
@@ -78,11 +105,14 @@ void SemanticMap::erase(const BlockIndex& index) {
   entries_.pop_back();
 }
 
-void SemanticMap::clear() {
-  entries_.clear();
-  place_.clear();
-  regions_.clear();
-  region_number_.clear();
+void SemanticMap::clear() noexcept {
+  entries_ = decltype(entries_)();
+  place_ = GridTable();
+  regions_ = decltype(regions_)();
+  region_number_ = GridTable();
+  spare_ = decltype(spare_)();
+  spare_places_ = decltype(spare_places_)();
+  spare_bytes_ = 0;
 }
 
 void SemanticMap::add(const SemanticMap& other) {
@@ -99,13 +129,17 @@ void SemanticMap::add(const SemanticMap& other) {
   }
 }
 
-std::size_t SemanticMap::bytes() const {
+std::size_t SemanticMap::indexBytes() const {
   std::size_t sum = entries_.capacity() * sizeof(Entry) + place_.bytes() + region_number_.bytes() +
                     regions_.capacity() * sizeof(regions_[0]) + spare_.capacity() * sizeof(spare_[0]) +
-                    spare_.size() * sizeof(Block);
-  sum += spare_places_.capacity() * sizeof(spare_places_[0]);
+                    spare_places_.capacity() * sizeof(spare_places_[0]) + spare_bytes_;
   for (const Region& region : regions_) sum += region.places.capacity() * sizeof(region.places[0]);
   for (const auto& places : spare_places_) sum += places.capacity() * sizeof(places[0]);
+  return sum;
+}
+
+std::size_t SemanticMap::bytes() const {
+  std::size_t sum = indexBytes();
   for (const Entry& entry : entries_) sum += entry.block->bytes();
   return sum;
 }

@@ -12,6 +12,8 @@ class RandomSamples : public FreeSpaceModel {
   explicit RandomSamples(const MapperConfig& config) : config_(config.free_space), samples_(config) {}
 
   FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, Workers& workers) override {
+    BeamSamples::limit(static_cast<double>(beams.beams().ends.size()) * config_.samples_per_beam,
+                       config_.samples_per_beam);
     const CounterRandom random(static_cast<std::uint64_t>(config_.seed), stamp);
     return samples_.sample(beams.beams(), workers, [&](std::size_t beam, double length, auto&& add) {
       const std::uint64_t key = random.beamKey(beam);

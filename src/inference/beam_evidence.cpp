@@ -36,15 +36,21 @@ void BeamEvidence::setField(const BeamField& field, Workers& workers) {
   tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), loops_, workers);
 }
 
-const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, Workers& workers) {
+const std::vector<GridIndex>& BeamEvidence::collectBlocks(const SemanticMap& map, std::size_t most,
+                                                          Workers& workers) {
   const double reach = field_->reachMetres();
   touched_.clear();
   if (extent_ == FreeSpaceExtent::kMapped) {
     insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {
-    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, workers, touched_);
+    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, most, workers, touched_);
   }
   return touched_.members();
+}
+
+void BeamEvidence::reserve(EvidenceScratch& scratch) const {
+  field_->reserve(scratch);
+  if (field_->kernel().type == KernelType::kSparse) scratch.group.reserve(field_->beams().ends.size());
 }
 
 double BeamEvidence::effort(const BlockGroup& group) const {
@@ -69,7 +75,9 @@ void BeamEvidence::addTo(std::size_t, const BlockIndex& index, Block& block, Evi
     scratch.group.sumsOf({placeInGroup(index.x), placeInGroup(index.y), placeInGroup(index.z)}, sums);
   }
   scratch.leaveHeldAlone();
-  if (scaleAndLimit(field_->kernel().scale, scratch.limits.free, sums)) block.add(kFreeClass, sums);
+  if (scaleAndLimit(field_->kernel().scale, scratch.limits.free, sums)) {
+    scratch.not_finite += block.add(kFreeClass, sums);
+  }
 }
 
 }  // namespace bki_mapping

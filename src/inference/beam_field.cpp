@@ -47,6 +47,12 @@ void BeamField::setBeams(const Beams& beams, Workers& workers) {
   }
 }
 
+void BeamField::reserve(EvidenceScratch& scratch) const {
+  const std::size_t count = beams_.ends.size();
+  scratch.ranges.reserve(rtree_ ? count : std::min(count, BeamTable::kMostRanges));
+  if (kernel_.type == KernelType::kCounting) scratch.beams.reserve(count);
+}
+
 BeamBox BeamField::boxOf(const BlockGroup& group) const {
   const BlockIndex first{
       {group.index.x * kGroupEdge, group.index.y * kGroupEdge, group.index.z * kGroupEdge}};

@@ -1,6 +1,7 @@
 #define BOOST_ALLOW_DEPRECATED_HEADERS  // Boost 1.74 warns of its own use of old headers
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
+#include <boost/iterator/function_output_iterator.hpp>
 #include <cmath>
 #include <iterator>
 #include <utility>
@@ -38,9 +39,10 @@ class BeamRtree : public BeamIndex {
         distance > radius ? Eigen::Vector3f(centre / distance) : Eigen::Vector3f::Zero();
     const Box box(Point(q.x() - half, q.y() - half, q.z() - half),
                   Point(q.x() + half, q.y() + half, q.z() + half));
-    for (auto found = tree_.qbegin(bg::index::intersects(box)); found != tree_.qend(); ++found) {
-      ranges.push_back({found->second, found->second + 1});
-    }
+    // Not by query iterators: they take memory for themselves.
+    tree_.query(bg::index::intersects(box), boost::make_function_output_iterator([&](const Value& found) {
+                  ranges.push_back({found.second, found.second + 1});
+                }));
   }
 
  private:

@@ -156,13 +156,12 @@ class BoxSearch {
 constexpr std::size_t kAhead = 8;
 
 /// Finds the passes of beams through a box, in the order of the beams. Of kAhead behind the last, there are
-/// any numbers.
+/// any numbers. `sums` has room for all beams (GroupSums::reserve): a vector that grew here would leave its
+/// code, compiled for this instruction set, to the linker's choice.
 inline void findPasses(const BeamTrackArrays& beams, const BeamRange* ranges, std::size_t count,
                        const BeamBox& box, GroupSums& sums) {
   const BoxSearch search(box);
-  std::size_t most = std::max<std::size_t>(kLanes, kAhead);
-  for (std::size_t r = 0; r < count; ++r) most += ranges[r].last - ranges[r].first;
-  if (sums.passes.size() < most) sums.passes.resize(most);
+  static_assert(kLanes <= GroupSums::kPassPadding && kAhead <= GroupSums::kPassPadding);
   BeamPass* to = sums.passes.data();
   for (std::size_t r = 0; r < count; ++r) {
     for (BeamRange left = ranges[r]; left.first < left.last; left.first += kLanes) {

@@ -77,8 +77,10 @@ void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, dou
 
 void BlockWalk::clearMarks(std::size_t count) {
   if (capacity_ < count) {
+    capacity_ = 0;
+    marks_ = nullptr;  // first, so that there are never two
+    marks_ = std::make_unique<std::atomic<std::uint8_t>[]>(count);
     capacity_ = count;
-    marks_ = std::make_unique<std::atomic<std::uint8_t>[]>(capacity_);
   }
   for (std::size_t m = 0; m < count; ++m) marks_[m].store(0, std::memory_order_relaxed);
 }
@@ -97,7 +99,7 @@ void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
 }
 
 void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
-                                  double reach, Workers& workers, IndexNumbering& blocks) {
+                                  double reach, std::size_t most, Workers& workers, IndexNumbering& blocks) {
   if (beams.ends.empty()) return;
   Eigen::Array3d low = Eigen::Array3d::Zero(), high = Eigen::Array3d::Zero();
   for (const Eigen::Vector3f& end : beams.ends) {
@@ -113,9 +115,12 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
   const Eigen::Array3d size =
       ((high + room + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
   if (size.prod() > kMostMarks) {
+    const std::size_t before = blocks.size();
     for (std::size_t b = 0; b < beams.ends.size(); ++b) {
+      const double share = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
       forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
         blocks.insert({x, y, z});
+        limitBlocks(blocks.size() - before, most, share);
       });
     }
     return;
@@ -132,6 +137,11 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
       });
     }
   });
+  std::size_t marked = 0;
+  for (std::size_t m = 0; m < static_cast<std::size_t>(size.prod()); ++m) {
+    marked += marks_[m].load(std::memory_order_relaxed);
+  }
+  limitBlocks(marked, most);
   insertMarked(box, blocks);
 }
 

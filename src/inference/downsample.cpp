@@ -84,8 +84,8 @@ void Downsampler::Input::place() {
   const std::size_t count = count_;
   owner_->loops_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
   if (points_.size() < size_ + count) {
-    points_.resize(2 * (size_ + count));
-    tile_of_.resize(points_.size());
+    tile_of_.resize(2 * (size_ + count));
+    points_.resize(tile_of_.size());
   }
   TilePoint* const points = points_.data() + size_;
   std::uint32_t* const tile_of = tile_of_.data() + size_;

@@ -89,7 +89,6 @@ void GroupSums::start(std::uint64_t blocks) {
 
 float* GroupSums::open(int row_axis) {
   Array& array = arrays_[static_cast<std::size_t>(row_axis)];
-  array.takeMemory();
   array.is_open = true;
   for (int n = 0; n < kGroupEdge * kGroupEdge * kGroupEdge; ++n) {
     if ((blocks_ >> n & 1) == 0) continue;
@@ -111,11 +110,9 @@ void GroupSums::sumsOf(const std::array<int, 3>& place, float* sums) const {
   }
 }
 
-void GroupSums::reserveAs(const GroupSums& other) {
-  if (passes.size() < other.passes.size()) passes.resize(other.passes.size());
-  for (std::size_t axis = 0; axis < arrays_.size(); ++axis) {
-    if (other.arrays_[axis].numbers) arrays_[axis].takeMemory();
-  }
+void GroupSums::reserve(std::size_t beams) {
+  if (passes.size() < beams + kPassPadding) passes.resize(beams + kPassPadding);
+  for (Array& array : arrays_) array.takeMemory();
 }
 
 }  // namespace bki_mapping

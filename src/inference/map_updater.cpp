@@ -1,6 +1,7 @@
 #include "bki_mapping/inference/map_updater.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "bki_mapping/core/stopwatch.h"
 
@@ -12,17 +13,22 @@ std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
   // What an earlier update wrote there is the number of no job now, or of another block's.
   if (entry.job < jobs_.size() && jobs_[entry.job].index == index) return entry.job;
   entry.job = static_cast<std::uint32_t>(jobs_.size());
-  jobs_.push_back({index, entry.block.get(), map.size() > size, false, 0});
-  touched_.push_back(index);
+  const bool is_new = map.size() > size;
+  try {
+    touched_.push_back(index);
+    jobs_.push_back({index, entry.block.get(), is_new, is_new ? 0 : entry.block->bytes(), false, 0});
+  } catch (...) {
+    if (is_new) map.erase(index);
+    throw;
+  }
   return entry.job;
 }
 
-void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers) {
-  touched_.clear();
-  jobs_.clear();
+void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence,
+                             const UpdateLimits& limits, Workers& workers) {
   if (number_of_.size() < evidence.size()) number_of_.resize(evidence.size());
   for (std::size_t e = 0; e < evidence.size(); ++e) {
-    const std::vector<GridIndex>& blocks = evidence[e]->collectBlocks(map, workers);
+    const std::vector<GridIndex>& blocks = evidence[e]->collectBlocks(map, limits.blocks, workers);
     std::vector<std::uint32_t>& number_of = number_of_[e];
     number_of.assign(jobs_.size(), kNone);
     for (std::size_t number = 0; number < blocks.size(); ++number) {
@@ -46,7 +52,6 @@ void MapUpdater::prefetch(const std::vector<Evidence*>& evidence, std::size_t nu
 
 void MapUpdater::work(const std::vector<Evidence*>& evidence, std::size_t number, EvidenceScratch& scratch) {
   Job& job = jobs_[number];
-  const std::size_t before = job.is_new ? 0 : job.block->bytes();
   scratch.held.reset();
   for (std::size_t e = 0; e < evidence.size(); ++e) {
     const std::uint32_t number_there = numberIn(e, number);
@@ -54,7 +59,7 @@ void MapUpdater::work(const std::vector<Evidence*>& evidence, std::size_t number
   }
   job.empty = job.block->empty();
   const std::size_t after = job.empty ? 0 : job.block->bytes();
-  job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(before);
+  job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
 }
 
 void MapUpdater::groupJobs(const std::vector<Evidence*>& evidence) {
@@ -86,20 +91,69 @@ void MapUpdater::work(const std::vector<Evidence*>& evidence, const Group& group
   }
 }
 
-MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>& evidence,
-                                  Workers& workers) {
+std::size_t MapUpdater::reservePlanes(const std::vector<Evidence*>& evidence, std::size_t number) {
+  ClassSet classes;
+  for (std::size_t e = 0; e < evidence.size(); ++e) {
+    const std::uint32_t number_there = numberIn(e, number);
+    if (number_there != kNone) evidence[e]->markClasses(number_there, classes);
+  }
+  Block& block = *jobs_[number].block;
+  for (const ClassId known : block.classes()) classes.reset(known);
+  block.reserve(classes.count());
+  return block.bytes() - jobs_[number].bytes_before;
+}
+
+void MapUpdater::reserve(const std::vector<Evidence*>& evidence, const UpdateLimits& limits,
+                         std::ptrdiff_t index_bytes, Workers& workers) {
+  scratch_.resize(workers.count());
+  for (EvidenceScratch& scratch : scratch_) {
+    scratch.limits = limits.evidence;
+    scratch.not_finite = 0;
+    for (const Evidence* piece : evidence) piece->reserve(scratch);
+  }
+  std::atomic<std::ptrdiff_t> bytes{index_bytes};
+  const auto most = static_cast<std::ptrdiff_t>(
+      std::min<std::size_t>(limits.bytes, std::numeric_limits<std::ptrdiff_t>::max()));
+  workers.forEach(groups_.size(), [&](std::size_t g, std::size_t) {
+    std::ptrdiff_t of_group = 0;
+    const std::size_t number = groups_[g].number;
+    for (const std::uint32_t* job = group_jobs_.begin(number); job != group_jobs_.end(number); ++job) {
+      of_group += static_cast<std::ptrdiff_t>(reservePlanes(evidence, *job));
+    }
+    const std::ptrdiff_t sum = bytes += of_group;
+    if (sum > most) throw TooMuchWork(TooMuchWork::What::kBytes, static_cast<double>(sum));
+  });
+}
+
+void MapUpdater::rollBack(SemanticMap& map) noexcept {
+  for (const Job& job : jobs_) {
+    job.block->shrink();
+    if (job.is_new) map.erase(job.index);
+  }
+  jobs_.clear();
+  touched_.clear();
+}
+
+MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>& evidence, Workers& workers,
+                                  const UpdateLimits& limits) {
   MapUpdateStats stats;
   Stopwatch watch;
-  collectJobs(map, evidence, workers);
-  groupJobs(evidence);
+  touched_.clear();
+  jobs_.clear();
+  const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
+  const std::ptrdiff_t index_before = indexBytes();
+  try {
+    collectJobs(map, evidence, limits, workers);
+    groupJobs(evidence);
+    reserve(evidence, limits, indexBytes() - index_before, workers);
+  } catch (...) {
+    rollBack(map);
+    throw;
+  }
   stats.blocks = jobs_.size();
   stats.collect_ms = watch.lap();
 
-  scratch_.resize(workers.count());
-  for (EvidenceScratch& scratch : scratch_) {
-    scratch.limits = limits_;
-    for (const EvidenceScratch& other : scratch_) scratch.reserveAs(other);
-  }
+  // From here on nothing takes memory, so that nothing can fail.
   const auto each = [&](std::size_t g, std::size_t worker) { work(evidence, groups_[g], scratch_[worker]); };
   if (!groups_.empty() && groups_.front().effort > 0.0) {
     workers.forEachInOrder(groups_.size(), each);
@@ -110,6 +164,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
+  for (const EvidenceScratch& scratch : scratch_) stats.not_finite += scratch.not_finite;
   stats.update_ms = watch.lap();
   return stats;
 }

@@ -2,14 +2,21 @@
 
 namespace bki_mapping {
 
-const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, Workers& workers) {
+const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, std::size_t most,
+                                                       Workers& workers) {
   const double reach = field_->reachMetres();
   touched_.clear();
   insertMappedBlocks(map, field_->origin(), range_ + reach, touched_);
   if (extent_ == OcclusionExtent::kAll) {
-    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, workers, touched_);
+    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, most, workers,
+                            touched_);
   }
   return touched_.members();
+}
+
+void Occlusion::reserve(EvidenceScratch& scratch) const {
+  field_->reserve(scratch);
+  scratch.beams.reserve(field_->beams().ends.size());
 }
 
 void Occlusion::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {

@@ -1,9 +1,11 @@
 #include "bki_mapping/inference/point_bins.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "bki_mapping/inference/axis_blocks.h"
+#include "bki_mapping/inference/work_limit.h"
 
 namespace bki_mapping {
 namespace {
@@ -30,6 +32,9 @@ constexpr std::array<Away, 27> kAway = [] {
 }();
 constexpr std::size_t kHome = 13;
 
+/// A point is kept in each block that it reaches; this many take a gigabyte.
+constexpr double kMostBinned = 1 << 26;
+
 /// Appends point i of the batch to a block. @param away of the block from the point's own [voxels].
 template <typename Scratch, typename Group>
 [[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* away,
@@ -50,7 +55,7 @@ template <typename Scratch, typename Group>
 PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops)
     : geometry_(geometry), kernel_(kernel), loops_(loops) {
   const double most = kBlockEdge * (AxisBlocks::kMost - 2) / 2.0;
-  if (!(kernel_.reach < most)) {
+  if (kernel_.type == KernelType::kSparse && !(kernel_.reach < most)) {
     throw std::invalid_argument("kernel/length is more than " + std::to_string(static_cast<int>(most)) +
                                 " voxels; make it shorter, or resolution coarser");
   }
@@ -86,8 +91,8 @@ void PointBins::binFar(std::size_t i, Scratch& scratch, Group& group) const {
   // A kernel may reach hundreds of blocks.
   const std::size_t room = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
   if (scratch.points.size() < room) {
-    scratch.points.resize(room);
     scratch.block.resize(room);
+    scratch.points.resize(room);
   }
   bool at_home = false;
   for (const AxisBlock& bz : zs) {
@@ -187,6 +192,13 @@ void PointBins::start(std::size_t groups, const Workers& workers) {
 void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
                           Workers& workers) {
   home_always_ = home_always;
+  // A ball about a point meets so many blocks in the mean.
+  const double blocks_a_point =
+      kernel_.type == KernelType::kCounting
+          ? 1.0
+          : std::pow(2.0 * static_cast<double>(kernel_.reach) / kBlockEdge + 1.0, 3.0);
+  const double binned = static_cast<double>(points.size()) * blocks_a_point;
+  if (binned > kMostBinned) throw TooMuchWork(TooMuchWork::What::kBlocks, binned);
   const TileGrid grid(geometry_, origin, kBlockEdge);
   start(points.groups(), workers);
   workers.forEach(points.groups(), [&](std::size_t g, std::size_t worker) {

@@ -23,8 +23,32 @@ void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& 
   bins_.setPoints(origin, points, protect_, workers);
 }
 
-const std::vector<GridIndex>& PointEvidence::collectBlocks(const SemanticMap&, Workers&) {
+const std::vector<GridIndex>& PointEvidence::collectBlocks(const SemanticMap&, std::size_t most, Workers&) {
+  limitBlocks(bins_.blocks().size(), most);
   return bins_.blocks().members();
+}
+
+void PointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
+  if (bins_.oneClass()) {
+    classes.set(bins_.begin(number)->points->label);
+    return;
+  }
+  std::size_t last = ClassSet().size();  // no class; neighbours mostly have the same
+  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) {
+    for (std::size_t i = 0; i < run->count; ++i) {
+      if (run->points[i].label != last) classes.set(last = run->points[i].label);
+    }
+  }
+}
+
+void PointEvidence::reserve(EvidenceScratch& scratch) const {
+  std::size_t most = scratch.points.size();
+  for (std::size_t block = 0; block < bins_.blocks().size() && !bins_.oneClass(); ++block) {
+    std::size_t count = 0;
+    for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) count += run->count;
+    most = std::max(most, count);
+  }
+  scratch.points.resize(most);
 }
 
 Block::Layers PointEvidence::sumPoints(const PointRun* runs, std::size_t count,
@@ -52,7 +76,6 @@ std::size_t PointEvidence::sortByClass(std::size_t block, EvidenceScratch& scrat
   }
   // A counting sort; most blocks see two or three classes.
   for (std::size_t label = 1; label <= last; ++label) end[label] += end[label - 1];
-  scratch.points.resize(std::max(scratch.points.size(), count));
   for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
       scratch.points[end[run->points[i].label]++] = run->points[i];
@@ -72,7 +95,7 @@ void PointEvidence::addClass(ClassId label, const PointRun* runs, std::size_t co
     scratch.limitHits();
   }
   const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(), isZero);
-  if (!nothing) block.add(label, scratch.sums.data(), layers);
+  if (!nothing) scratch.not_finite += block.add(label, scratch.sums.data(), layers);
 }
 
 void PointEvidence::prefetch(std::size_t number) const {

@@ -53,8 +53,14 @@ void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledP
   }
 }
 
-const std::vector<GridIndex>& SoftPointEvidence::collectBlocks(const SemanticMap&, Workers&) {
+const std::vector<GridIndex>& SoftPointEvidence::collectBlocks(const SemanticMap&, std::size_t most,
+                                                               Workers&) {
+  limitBlocks(blocks_.size(), most);
   return blocks_.members();
+}
+
+void SoftPointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
+  for (const Record& record : records_[number]) classes.set(record.point.label);
 }
 
 void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
@@ -94,7 +100,7 @@ void SoftPointEvidence::addTo(std::size_t number, const BlockIndex&, Block& bloc
     if (limited) scratch.limitHits();
     const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(),
                                                  [](float sum) { return sum == 0.0f; });
-    if (!nothing) block.add(label, scratch.sums.data());
+    if (!nothing) scratch.not_finite += block.add(label, scratch.sums.data());
   }
 }
 

@@ -59,11 +59,43 @@ Json scanJson(const ScanReport& scan) {
           {"hits", s.hits},
           {"free_samples_or_beams", s.free_count},
           {"blocks", s.blocks},
+          {"evidence_not_finite", s.not_finite},
           {"total_ms", s.totalMs()},
           {"observe_ms", s.observe_ms},
           {"evidence_ms", s.evidence_ms},
           {"collect_ms", s.collect_ms},
           {"update_ms", s.update_ms}};
+}
+
+/// What became of the points that are not in the map; "" if all are.
+std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig& config) {
+  PointCounts sum;
+  std::size_t refused = 0;
+  for (const ScanReport& scan : scans) {
+    sum += scan.stats.counts;
+    refused += scan.stats.not_finite;
+  }
+  const std::string reach = numberText(config.sensor_model.reach()) + " m";
+  const std::pair<std::size_t, std::string> reasons[] = {
+      {sum.not_finite, "not finite"},
+      {sum.at_sensor, "at the sensor"},
+      {sum.too_near, "nearer than sensor_model/min_range"},
+      {sum.beyond_max, config.sensor_model.knowsRange()
+                           ? "beyond sensor_model/max_range"
+                           : "beyond " + reach + " (set sensor_model/max_range if the sensor sees farther)"},
+      {sum.outside_map, "outside of the map"},
+      {sum.unknown_label, "with labels that the class table does not list (see --classes and label_values)"},
+      {sum.unlabelled, "unlabelled"}};
+  std::string text;
+  for (const auto& [count, reason] : reasons) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
+  }
+  if (!text.empty()) text = "left out of " + std::to_string(sum.points) + " points: " + text;
+  if (refused > 0) {
+    text += (text.empty() ? "" : "\n") + std::to_string(refused) +
+            " voxels took no more evidence, which would not have stayed finite; lower kernel/scale";
+  }
+  return text;
 }
 
 }  // namespace
@@ -105,6 +137,8 @@ std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanRepo
   const VoxelCounts counts = countVoxels(mapper.map());
   std::ostringstream out;
   out << std::fixed << std::setprecision(1);
+  const std::string left_out = leftOutText(scans, mapper.config());
+  if (!left_out.empty()) out << left_out << "\n";
   out << scans.size() << " scans, median " << quantile(totals(scans), 0.5) << " ms, 99th percentile "
       << quantile(totals(scans), 0.99) << " ms\n"
       << "voxels: " << counts.occupied << " occupied, " << counts.free << " free, " << counts.occluded

@@ -62,12 +62,11 @@ class ClassFinder {
 class RangeLimits {
  public:
   RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
-      : sensor_(sensor), limited_(sensor.max_range > 0.0), none_at_max_(limited_ && none_at_max) {}
+      : sensor_(sensor), reach_(sensor.reach()), none_at_max_(sensor.knowsRange() && none_at_max) {}
 
   /// False for NaN and infinity.
   bool contain(float range) const {
-    return range >= kSensorRadius && range >= sensor_.min_range &&
-           range <= (limited_ ? sensor_.max_range : std::numeric_limits<float>::max()) && !isAtMax(range);
+    return range >= kSensorRadius && range >= sensor_.min_range && range <= reach_ && !isAtMax(range);
   }
   bool isAtMax(float range) const {
     return none_at_max_ && std::abs(range - sensor_.max_range) <= kAtMaxRange * sensor_.max_range;
@@ -83,19 +82,24 @@ class RangeLimits {
     } else if (isAtMax(range)) {
       ++counts.no_returns;
       return true;
-    } else if (limited_) {
-      ++counts.beyond_max;
-      return true;
     } else {
-      ++counts.outside_map;  // squares overflow
+      ++counts.beyond_max;
+      return sensor_.knowsRange();
     }
     return false;
   }
 
  private:
   const SensorModelConfig& sensor_;
-  bool limited_, none_at_max_;
+  double reach_;
+  bool none_at_max_;
 };
+
+/// Whether the shares of the classes in a point are probabilities: evidence must stay finite.
+bool areShares(const ClassShare* begin, const ClassShare* end) {
+  constexpr float kMost = 1.001f;  // with room for rounding
+  return std::all_of(begin, end, [=](const ClassShare& s) { return s.share > 0.0f && s.share <= kMost; });
+}
 
 }  // namespace
 
@@ -111,9 +115,7 @@ PointCounts& PointCounts::operator+=(const PointCounts& other) {
 
 void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
                           const Sorted& into) const {
-  const double cell = config_.downsample_resolution;
-  const GridGeometry geometry(cell > 0.0 ? std::min(cell, config_.resolution) : config_.resolution);
-  const float safe_range = geometry.safeRange(scan.origin);
+  const float safe_range = cells_.safeRange(scan.origin);
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const RangeLimits limits(sensor, scan.no_returns_at_max_range);
   ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
@@ -125,10 +127,12 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
     if (!limits.contain(range)) {
       if (limits.countOutside(point, range, counts) &&
           (config_.clear_beyond_max_range || limits.isAtMax(range))) {
-        into.cut.add(point * (static_cast<float>(sensor.max_range) / range), kFreeClass);
+        addCut(scan.origin, point * (static_cast<float>(sensor.max_range) / range), into.cut);
       }
-    } else if (!(range < safe_range) && !geometry.contains(scan.origin + point.cast<double>())) {
+    } else if (!(range < safe_range) && !cells_.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
+    } else if (!scan.soft.empty() && !areShares(scan.soft.begin(i), scan.soft.end(i))) {
+      ++counts.not_finite;
     } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
       ++counts.used;
       into.hits.add(point, *id);
@@ -138,17 +142,22 @@ void Observer::sortPoints(const Scan& scan, const ClassTable& classes, std::size
   into.counts = counts;
 }
 
+void Observer::addCut(const Eigen::Vector3d& origin, const Eigen::Vector3f& end,
+                      Downsampler::Input& cut) const {
+  if (cells_.contains(origin + end.cast<double>())) cut.add(end, kFreeClass);
+}
+
 void Observer::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     const float length = direction.norm();
     ++seen_.counts.points;
-    if (!direction.allFinite() || !(length > 0.0f) || !(sensor.max_range > 0.0)) {
+    if (!direction.allFinite() || !(length > 0.0f) || !sensor.knowsRange()) {
       ++seen_.counts.not_finite;
       continue;
     }
     ++seen_.counts.no_returns;
-    cut.add(direction * (static_cast<float>(sensor.max_range) / length), kFreeClass);
+    addCut(scan.origin, direction * (static_cast<float>(sensor.max_range) / length), cut);
   }
 }
 

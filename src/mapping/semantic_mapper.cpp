@@ -1,11 +1,19 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
+#include <algorithm>
+#include <cmath>
 #include <map>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/core/stopwatch.h"
+#include "bki_mapping/free_space/beam_samples.h"
 #include "bki_mapping/free_space/registry.h"
 
 namespace bki_mapping {
@@ -24,31 +32,63 @@ MapperConfig checked(const MapperConfig& config, const ClassTable& classes) {
   return config;
 }
 
+/// Gives freed memory back to the system; the C library would keep most of it.
+void returnMemory() {
+#if defined(__GLIBC__)
+  malloc_trim(0);
+#endif
+}
+
+/// A rounded number for people, like "41 million".
+std::string about(double number) {
+  for (const auto& [unit, name] : {std::pair(1e9, " billion"), std::pair(1e6, " million")}) {
+    if (number >= unit) return numberText(std::round(10.0 * number / unit) / 10.0) + name;
+  }
+  return numberText(std::round(number));
+}
+
+std::string megabytes(double bytes) {
+  return numberText(std::round(bytes / 1e6)) + " MB";
+}
+
 }  // namespace
+
+struct SemanticMapper::Pipeline {
+  Observer observer;
+  PointEvidence hits;
+  SoftPointEvidence soft_hits;
+  LazyBeamField beams;
+  std::unique_ptr<FreeSpaceModel> free_space;
+  Occlusion occlusion;
+  MapUpdater updater;
+  std::vector<Evidence*> evidence;
+
+  Pipeline(const MapperConfig& config, const GridGeometry& geometry)
+      : observer(config),
+        hits(geometry, config.kernel),
+        soft_hits(geometry, config.kernel),
+        beams(geometry, config.kernel, config.free_space.beam_index),
+        free_space(makeFreeSpaceModel(config)),
+        occlusion(config.occlusion) {
+    hits.protectVoxels(config.free_space.hits_before_misses);
+    soft_hits.protectVoxels(config.free_space.hits_before_misses);
+    hits.protectEvidence(config.free_space.evidence_before_misses);
+    soft_hits.protectEvidence(config.free_space.evidence_before_misses);
+  }
+};
 
 SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
     : config_(checked(config, *classes)),
       classes_(std::move(classes)),
       map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
       workers_(config_.threads),
-      observer_(config_),
-      hits_(map_.geometry(), config_.kernel),
-      soft_hits_(map_.geometry(), config_.kernel),
-      beams_(map_.geometry(), config_.kernel, config_.free_space.beam_index),
-      free_space_(makeFreeSpaceModel(config_)),
-      occlusion_(config_.occlusion) {
-  applySettings();
+      pipeline_(std::make_unique<Pipeline>(config_, map_.geometry())) {
+  setGains();
 }
 
-void SemanticMapper::applySettings() {
-  hits_.protectVoxels(config_.free_space.hits_before_misses);
-  soft_hits_.protectVoxels(config_.free_space.hits_before_misses);
-  hits_.protectEvidence(config_.free_space.evidence_before_misses);
-  soft_hits_.protectEvidence(config_.free_space.evidence_before_misses);
-  EvidenceLimits limits;
-  if (config_.scan_limit.hits > 0.0) limits.hits = static_cast<float>(config_.scan_limit.hits);
-  if (config_.scan_limit.free > 0.0) limits.free = static_cast<float>(config_.scan_limit.free);
-  updater_.setLimits(limits);
+SemanticMapper::~SemanticMapper() = default;
+
+void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
@@ -65,53 +105,134 @@ void SemanticMapper::reconfigure(const MapperConfig& config) {
                                   " cannot change while mapping; set it and start again");
     }
   }
-  std::unique_ptr<FreeSpaceModel> free_space = makeFreeSpaceModel(allowed);
+  pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry());
   config_ = allowed;
-  free_space_ = std::move(free_space);
-  observer_ = Observer(config_);
-  occlusion_ = Occlusion(config_.occlusion);
-  applySettings();
+  setGains();
 }
 
 void SemanticMapper::reset() {
   map_.clear();
+  recover();
+}
+
+void SemanticMapper::recover() noexcept {
+  pipeline_ = nullptr;
   block_bytes_ = 0;
+  for (const SemanticMap::Entry& entry : map_.entries()) block_bytes_ += entry.block->bytes();
+  returnMemory();
+}
+
+const std::vector<GridIndex>& SemanticMapper::touchedBlocks() const {
+  return pipeline_ ? pipeline_->updater.touched() : no_blocks_;
+}
+
+UpdateLimits SemanticMapper::limitsFor(const Scan& scan) const {
+  UpdateLimits limits;
+  if (config_.scan_limit.hits > 0.0) limits.evidence.hits = static_cast<float>(config_.scan_limit.hits);
+  if (config_.scan_limit.free > 0.0) limits.evidence.free = static_cast<float>(config_.scan_limit.free);
+  if (config_.scan_limit.blocks > 0) {
+    limits.blocks = static_cast<std::size_t>(config_.scan_limit.blocks);
+  } else {
+    // A cube about the sensor, and a block beside it for the kernel and for rounding.
+    const double reach = scan.sensor_model.value_or(config_.sensor_model).reach() +
+                         config_.kernel.lengthFor(config_.resolution);
+    const double edge = std::ceil(2.0 * reach / map_.geometry().blockSize()) + 2.0;
+    constexpr auto kMost = static_cast<double>(ScanLimitConfig::kMostBlocks);
+    limits.blocks = static_cast<std::size_t>(std::min(edge * edge * edge, kMost));
+  }
+  if (config_.memory_limit > 0.0) {
+    const double left = 1e6 * config_.memory_limit - static_cast<double>(mapBytes());
+    limits.bytes = static_cast<std::size_t>(std::clamp(left, 0.0, 1e18));
+  }
+  return limits;
+}
+
+ScanRefused SemanticMapper::refusalOf(const TooMuchWork& work) const {
+  const std::string resolution = numberText(config_.resolution) + " m";
+  switch (work.of()) {
+    case TooMuchWork::What::kBlocks: {
+      constexpr double kBlockBytes = sizeof(Block) + kBlockVoxels * sizeof(float);
+      return {ScanRefused::Reason::kTooLarge,
+              "the scan would touch about " + about(work.estimate()) + " blocks of 8 x 8 x 8 voxels of " +
+                  resolution + ", " + megabytes(kBlockBytes * work.estimate()) +
+                  ", more than scan_limit/blocks allows; take a coarser resolution, set "
+                  "sensor_model/max_range to what the sensor sees, or raise scan_limit/blocks"};
+    }
+    case TooMuchWork::What::kSamples:
+      return {ScanRefused::Reason::kTooLarge,
+              "the scan would take about " + about(work.estimate()) + " free-space samples, more than " +
+                  about(BeamSamples::kMost) + " in all or " + about(BeamSamples::kMostOfBeam) +
+                  " on one beam; raise free_space/gap, lower free_space/samples_per_beam, or set "
+                  "sensor_model/max_range "
+                  "to what the sensor sees"};
+    default:
+      return {ScanRefused::Reason::kMemory, "the map holds " + megabytes(static_cast<double>(mapBytes())) +
+                                                ", and the scan would make it larger than memory_limit, " +
+                                                megabytes(1e6 * config_.memory_limit) +
+                                                "; raise memory_limit, or take a coarser resolution"};
+  }
 }
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
   if (!map_.geometry().contains(scan.origin)) {
     throw std::invalid_argument("the sensor's origin is not finite, or too far from the map's origin");
   }
+  const auto memoryRanOut = [&] {
+    recover();
+    return ScanRefused(ScanRefused::Reason::kMemory,
+                       "the computer's memory does not hold a scan of " + std::to_string(scan.points.size()) +
+                           " points; set memory_limit to less than the computer has, or take a coarser "
+                           "resolution");
+  };
+  try {
+    return add(scan);
+  } catch (const TooMuchWork& work) {
+    recover();
+    throw refusalOf(work);
+  } catch (const std::bad_alloc&) {
+    throw memoryRanOut();
+  } catch (const std::length_error&) {  // more than a vector can ever hold
+    throw memoryRanOut();
+  }
+}
+
+/// A scan's hits and free space become evidence, and the evidence is added to the map.
+ScanStats SemanticMapper::add(const Scan& scan) {
+  if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry());
+  Pipeline& p = *pipeline_;
   ScanStats stats;
   Stopwatch watch;
   const bool occludes = config_.occlusion != OcclusionExtent::kNone;
   const Observation& seen =
-      observer_.observe(scan, *classes_, workers_, free_space_->needsBeams() || occludes);
+      p.observer.observe(scan, *classes_, workers_, p.free_space->needsBeams() || occludes);
   stats.counts = seen.counts;
-  stats.hits = observer_.hits().size();
+  stats.hits = p.observer.hits().size();
   stats.observe_ms = watch.lap();
 
   const bool soft = !seen.soft.empty();
   if (soft) {
-    soft_hits_.setPoints(scan.origin, seen.hits, seen.soft);
+    p.soft_hits.setPoints(scan.origin, seen.hits, seen.soft);
   } else {
-    hits_.setPoints(scan.origin, observer_.hits(), workers_);
+    p.hits.setPoints(scan.origin, p.observer.hits(), workers_);
   }
-  beams_.setBeams(seen.beams);
-  const FreeSpaceEvidence free = free_space_->observe(beams_, scan.stamp, workers_);
-  evidence_.assign(1, soft ? static_cast<Evidence*>(&soft_hits_) : &hits_);
-  if (free.evidence) evidence_.push_back(free.evidence);
+  p.beams.setBeams(seen.beams);
+  const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, workers_);
+  p.evidence.assign(1, soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits);
+  if (free.evidence) p.evidence.push_back(free.evidence);
   if (occludes) {
-    const double max_range = scan.sensor_model.value_or(config_.sensor_model).max_range;
-    const BeamField& field = beams_.field(workers_);
-    occlusion_.setField(field, max_range > 0.0 ? max_range : field.longest());
-    evidence_.push_back(&occlusion_);
+    const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
+    const BeamField& field = p.beams.field(workers_);
+    const double range = sensor.knowsRange() ? sensor.max_range : field.longest();
+    const auto edge = static_cast<double>(map_.geometry().safeRange(scan.origin));  // voxels end there
+    p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
+    p.evidence.push_back(&p.occlusion);
   }
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  const MapUpdateStats update = updater_.update(map_, evidence_, workers_);
+  const MapUpdateStats update = p.updater.update(map_, p.evidence, workers_, limitsFor(scan));
   stats.blocks = update.blocks;
+  stats.not_finite = update.not_finite;
   block_bytes_ += static_cast<std::size_t>(update.bytes);  // two's complement: may be negative
   stats.collect_ms = update.collect_ms;
   stats.update_ms = update.update_ms;

@@ -45,7 +45,7 @@ std::string loadAdvice(const MapperConfig& config, double integration_ms, double
                      milliseconds(1e3 / received_hz) + ": mapping is " +
                      numberText(std::round(10.0 * load) / 10.0) + " times too slow";
   text += "; resolution " + rounded(2.0 * config.resolution) + ", kernel/length " +
-          rounded(2.0 * config.kernel.length) + " and downsample_resolution " +
+          rounded(2.0 * config.kernel.lengthFor(config.resolution)) + " and downsample_resolution " +
           rounded(2.0 * config.downsample_resolution) + " would take about " +
           milliseconds(integration_ms * costOfCoarser(config.free_space.mode));
   FreeSpaceConfig mapped = config.free_space, linear = config.free_space;

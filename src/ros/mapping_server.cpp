@@ -1,7 +1,9 @@
 #include "bki_mapping/ros/mapping_server.h"
 
 #include <cstdio>
+#include <new>
 
+#include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/ros/pose_conversion.h"
 
@@ -22,6 +24,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   readParameters(private_node_, config_, mapper_config);
   mapper_ = std::make_unique<SemanticMapper>(
       mapper_config, std::make_shared<const ClassTable>(loadClassTable(config_.classes)));
+  for (const std::string& warning : settingWarnings(mapper_config)) ROS_WARN("%s", warning.c_str());
 
   poses_ = std::make_unique<PoseSource>(node_);
   publishing_ =
@@ -125,11 +128,6 @@ void MappingServer::map(const WaitingCloud& waiting) {
   if (cloud.width == 0 || cloud.height == 0) {
     return drop(cloud, DropReason::kEmpty, "it has no points; check the sensor");
   }
-  if (config_.memory_limit > 0.0 && static_cast<double>(mapper_->blockBytes()) > 1e6 * config_.memory_limit) {
-    return drop(cloud, DropReason::kMemory,
-                "the map holds " + std::to_string(mapper_->blockBytes() / 1000000) +
-                    " MB, more than memory_limit; raise it, set window, or call ~reset");
-  }
   try {
     const auto placed = readers_[waiting.input].read(cloud, *poses_);
     if (const auto* missing = std::get_if<MissingPose>(&placed)) {
@@ -137,6 +135,13 @@ void MappingServer::map(const WaitingCloud& waiting) {
                   missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
     }
     integrate(waiting, std::get<PlacedScan>(placed));
+  } catch (const ScanRefused& refused) {
+    const bool memory = refused.reason() == ScanRefused::Reason::kMemory;
+    drop(cloud, memory ? DropReason::kMemory : DropReason::kTooLarge,
+         refused.what() + std::string(memory ? "; or set window, or call ~reset" : ""));
+  } catch (const std::bad_alloc&) {
+    drop(cloud, DropReason::kMemory,
+         "the computer's memory does not hold it; set memory_limit, or send smaller clouds");
   } catch (const std::exception& fault) {
     drop(cloud, DropReason::kBadCloud,
          std::string(fault.what()) + "; check the cloud's source and the settings of the input");
@@ -224,7 +229,7 @@ MappingStatus MappingServer::status() {
   MappingStatus status = ledger_.status(Clock::now(), waiting_.size());
   status.paused = paused_;
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
-  status.map_bytes = mapper_->blockBytes();
+  status.map_bytes = mapper_->mapBytes();
   return status;
 }
 

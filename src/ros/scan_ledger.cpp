@@ -12,6 +12,7 @@ const std::vector<DropKind>& dropKinds() {
       {DropReason::kBadCloud, "bad cloud", &S::dropped_bad_cloud},
       {DropReason::kEmpty, "empty", &S::dropped_empty},
       {DropReason::kQueueFull, "queue full", &S::dropped_queue_full},
+      {DropReason::kTooLarge, "too large", &S::dropped_too_large},
       {DropReason::kMemory, "memory limit", &S::dropped_memory},
       {DropReason::kPaused, "paused", &S::dropped_paused},
       {DropReason::kTimeJump, "time jump", &S::dropped_time_jump},

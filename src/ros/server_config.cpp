@@ -73,10 +73,6 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "What becomes of the map when time jumps back, as it does when a bag starts again.",
           [](C & c) -> auto& { return c.on_time_jump; }),
       realParameter<C>(
-          "memory_limit", "a number >= 0", "MB",
-          "Clouds are dropped while the map's blocks hold more than this; 0: no limit.",
-          [](C & c) -> auto& { return c.memory_limit; }, notNegative),
-      realParameter<C>(
           "window", "a number >= 0", "m",
           "Edge of the cube about the sensor outside of which blocks are forgotten; 0: nothing is forgotten.",
           [](C & c) -> auto& { return c.window; }, notNegative),

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
@@ -42,19 +43,33 @@ int mapSequence(const po::variables_map& given) {
   const auto states = parseStates(given["include"].as<std::string>());
   if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
+  for (const std::string& warning : settingWarnings(mapper.config())) {
+    std::cerr << "map_sequence: " << warning << "\n";
+  }
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
 
   std::vector<ScanReport> scans;
+  std::size_t refused = 0;
   for (std::size_t i = first; i < last; ++i) {
-    scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
+    try {
+      scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
+    } catch (const ScanRefused& refusal) {
+      // The first says it all; the others mostly say the same.
+      if (refused++ == 0)
+        std::cerr << "map_sequence: scan " << sequence.name(i) << ": " << refusal.what() << "\n";
+      continue;
+    }
     tools::showProgress(scans.size(), last - first, progressText(scans.back()));
   }
   if (given.count("output"))
     exportMap(given["output"].as<std::string>(), mapper.map(), mapper.classes(), states);
   if (given.count("report")) writeTextFile(given["report"].as<std::string>(), reportJson(mapper, scans));
   std::cout << summaryText(mapper, scans);
-  return 0;
+  if (refused > 0) {
+    std::cerr << "map_sequence: " << refused << " of " << last - first << " scans were refused\n";
+  }
+  return refused > 0 ? 1 : 0;
 }
 
 }  // namespace

@@ -71,8 +71,8 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
       cut.push_back({p * (max_range / range), 255});
       continue;
     }
-    if (max_range > 0.0 && range > max_range) {
-      if (config.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
+    if (range > sensor.reach()) {
+      if (max_range > 0.0 && config.clear_beyond_max_range) cut.push_back({p * (max_range / range), 255});
       continue;
     }
     const LabelValues values = scan.labels_are_ids ? LabelValues::kId : config.label_values;
@@ -130,8 +130,8 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
     const double share = point.shareOf(label);
     if (share == 0.0) continue;
     if (config_.kernel.type == KernelType::kSparse) {
-      value.sum +=
-          share * sparseKernel((point.p - centre).norm(), config_.kernel.length, config_.kernel.scale);
+      value.sum += share * sparseKernel((point.p - centre).norm(),
+                                        config_.kernel.lengthFor(config_.resolution), config_.kernel.scale);
       continue;
     }
     // The voxel holds the point if the offset from its centre is in [-half, half) on each axis.
@@ -154,8 +154,8 @@ bool ScanReference::reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& 
   rho = centre.dot(u) / length;
   if (config_.kernel.type == KernelType::kSparse) {
     const double d = (centre - centre.dot(u) * u).norm();
-    k = sparseKernel(d, config_.kernel.length, config_.kernel.scale);
-    return d < config_.kernel.length;
+    k = sparseKernel(d, config_.kernel.lengthFor(config_.resolution), config_.kernel.scale);
+    return d < config_.kernel.lengthFor(config_.resolution);
   }
   // The half-line crosses the cube if some piece of it is inside all three slabs.
   double enter = 0.0, leave = 1e300;
@@ -178,8 +178,9 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
     const Eigen::Vector3d centre = relativeCentre(GridGeometry::voxelOf(block, offset));
     for (const Point& point : hits_) {
       const Eigen::Vector3d d = point.p - centre;
-      hit = config_.kernel.type == KernelType::kSparse ? d.norm() < config_.kernel.length
-                                                       : d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      hit = config_.kernel.type == KernelType::kSparse
+                ? d.norm() < config_.kernel.lengthFor(config_.resolution)
+                : d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
       // With hits_before_misses a block holds a hit even if the hit's kernel reaches no voxel centre.
       hit |= config_.free_space.hits_before_misses && d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
       if (hit) break;

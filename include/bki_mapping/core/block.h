@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "bki_mapping/core/types.h"
@@ -32,19 +34,40 @@ class Block {
     int begin = 0, end = kBlockEdge;
   };
 
-  /// Adds one value a voxel to the plane of a class, made of zeros where missing.
-  /// @param layers outside of which all values are 0.
-  void add(ClassId id, const float* values, Layers layers) {
+  /// Takes memory for the planes of further classes, so that adding to these takes none.
+  void reserve(std::size_t further_classes) {
+    if (further_classes == 0) return;
+    classes_.reserve(classes_.size() + further_classes);
+    planes_.reserve(planes_.size() + further_classes * kBlockVoxels);  // exactly: doubling would waste planes
+  }
+
+  /// Gives back what reserve() took and nobody used, if there is memory to move the planes to.
+  void shrink() noexcept {
+    if (planes_.capacity() > planes_.size()) planes_.shrink_to_fit();
+    if (classes_.capacity() > classes_.size()) classes_.shrink_to_fit();
+  }
+
+  /// Adds one value a voxel to the plane of a class, made of zeros where missing. The one way into a plane:
+  /// a voxel whose evidence would not be finite afterwards keeps what it has.
+  /// @param layers outside of which all values are 0. @return the number of such voxels.
+  std::size_t add(ClassId id, const float* values, Layers layers) {
     auto place = static_cast<std::size_t>(std::find(classes_.begin(), classes_.end(), id) - classes_.begin());
     if (place == classes_.size()) {
+      reserve(1);
       classes_.push_back(id);
-      planes_.reserve(planes_.size() + kBlockVoxels);  // exactly: doubling would waste a plane or two
       planes_.resize(planes_.size() + kBlockVoxels, 0.0f);
     }
     float* plane = planes_.data() + place * kBlockVoxels;
-    for (int v = layers.begin * kLayer; v < layers.end * kLayer; ++v) plane[v] += values[v];
+    std::uint32_t refused = 0;
+    for (int v = layers.begin * kLayer; v < layers.end * kLayer; ++v) {
+      const float sum = plane[v] + values[v];
+      const bool finite = std::abs(sum) <= std::numeric_limits<float>::max();
+      plane[v] = finite ? sum : plane[v];
+      refused += finite ? 0u : 1u;
+    }
+    return refused;
   }
-  void add(ClassId id, const float* values) { add(id, values, Layers()); }
+  std::size_t add(ClassId id, const float* values) { return add(id, values, Layers()); }
 
   /// Fetches the first cache lines of the planes, to be written; processors see to those that follow.
   void prefetch() const {

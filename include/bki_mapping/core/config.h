@@ -9,8 +9,11 @@ namespace bki_mapping {
 enum class KernelType { kSparse, kCounting };
 struct KernelConfig {
   KernelType type = KernelType::kSparse;
-  double length = 0.3;  ///< support radius l [m]
+  double length = 0.0;  ///< support radius l [m]; 0: as long as the resolution
   double scale = 0.1;   ///< sigma0, the kernel's value at distance 0
+
+  /// The support radius in force [m]. @param resolution edge of a voxel [m].
+  double lengthFor(double resolution) const { return length > 0.0 ? length : resolution; }
 };
 
 enum class BeamWeight { kUniform, kLinear, kBilinear };
@@ -41,11 +44,22 @@ struct FreeGainConfig {
 struct ScanLimitConfig {
   double hits = 0.0;  ///< to all classes together; they share it in proportion
   double free = 0.0;
+  /// Blocks that its hits, or its free space, may touch; 0: as many as lie within the sensor's reach, but no
+  /// more than kMostBlocks. A scan beyond the limit is refused whole.
+  std::int64_t blocks = 0;
+
+  static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< half a gigabyte for each class in all of them
 };
 
 struct SensorModelConfig {
   double min_range = 0.0;   ///< hits nearer than this are dropped [m]
-  double max_range = -1.0;  ///< hits farther than this are no hits [m]; -1: no limit
+  double max_range = -1.0;  ///< hits farther than this are no hits [m]; -1: not known
+
+  /// Where a range is not known, points farther than this count as faults of the driver [m]: they neither
+  /// occupy nor clear. Lidars see up to about 250 m; a corrupt point may lie anywhere.
+  static constexpr double kFarthest = 300.0;
+  bool knowsRange() const { return max_range > 0.0; }
+  double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< no hit is farther [m]
 };
 
 enum class OcclusionExtent { kNone, kMapped, kAll };
@@ -58,6 +72,7 @@ struct MapperConfig {
   double prior = 0.001;                ///< alpha0, concentration of each class before any scan
   double downsample_resolution = 0.1;  ///< edge of a down-sampling cell [m]; 0: off
   int threads = 0;                     ///< 0: all cores
+  double memory_limit = 0.0;           ///< of the map [MB]; 0: none. A scan that would exceed it is refused
   KernelConfig kernel;
   FreeSpaceConfig free_space;
   FreeGainConfig free_gain;

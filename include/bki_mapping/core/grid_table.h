@@ -69,8 +69,8 @@ class GridTable {
     return slot;
   }
   void grow() {
-    std::vector<Slot> old = std::move(slots_);
-    slots_.assign(old.empty() ? 64 : 2 * old.size(), Slot{});
+    std::vector<Slot> old(slots_.empty() ? 64 : 2 * slots_.size());
+    slots_.swap(old);
     for (const Slot& slot : old) {
       if (slot.number != kNone) slots_[slotOf(slot.index)] = slot;
     }

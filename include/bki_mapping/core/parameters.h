@@ -21,4 +21,7 @@ bool changesWhileMapping(const std::string& name);
 /// setNamedParameters with the mapper's parameters.
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values);
 
+/// What a user should know about settings that are allowed, but hardly meant: a sentence each.
+std::vector<std::string> settingWarnings(const MapperConfig& config);
+
 }  // namespace bki_mapping

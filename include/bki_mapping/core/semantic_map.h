@@ -58,9 +58,11 @@ class SemanticMap {
   const Block* find(const BlockIndex& index) const;
   Block& getOrAllocate(const BlockIndex& index) { return *entry(index).block; }
   /// The entry of a block, which is made where missing. It may move with the next one made or erased.
+  /// @throws std::bad_alloc; the map is then as it was.
   Entry& entry(const BlockIndex& index);
-  void erase(const BlockIndex& index);
-  void clear();
+  void erase(const BlockIndex& index) noexcept;
+  /// Erases all blocks, and gives back their memory and that of the index.
+  void clear() noexcept;
 
   /// Calls visit(index) for every block whose box comes within `radius` of a point, and for some around
   /// those. Costs as much as there are blocks near the point, however large the map.
@@ -92,6 +94,8 @@ class SemanticMap {
 
   /// Bytes of all blocks and of the index, as allocated.
   std::size_t bytes() const;
+  /// The part of bytes() that is not of the blocks in entries(). Costs as much as there are regions.
+  std::size_t indexBytes() const;
 
  private:
   /// Blocks are also listed by region, a cube of this many blocks a side.
@@ -104,9 +108,11 @@ class SemanticMap {
     std::vector<std::uint32_t> places;  ///< of its blocks in entries_
   };
 
+  /// Adds an entry that is not there yet. @throws std::bad_alloc; the map is then as it was.
+  void append(const BlockIndex& index);
   std::vector<std::uint32_t>& regionAt(const BlockIndex& block);
   /// Forgets the region of a block if it holds none.
-  void dropIfEmpty(const BlockIndex& block);
+  void dropIfEmpty(const BlockIndex& block) noexcept;
 
   GridGeometry geometry_;
   double prior_;
@@ -117,8 +123,10 @@ class SemanticMap {
   GridTable place_;  ///< of each block in entries_
   std::vector<Region> regions_;
   GridTable region_number_;
+  // Both have room for all blocks and regions there are, so that erasing takes no memory:
   std::vector<std::unique_ptr<Block>> spare_;             ///< empty blocks, for use again
   std::vector<std::vector<std::uint32_t>> spare_places_;  ///< of regions that are gone, for use again
+  std::size_t spare_bytes_ = 0;                           ///< of the blocks in spare_
 };
 
 }  // namespace bki_mapping

@@ -27,6 +27,15 @@ class BeamSamples {
       : downsampler_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
         evidence_(GridGeometry(config.resolution), config.kernel) {}
 
+  /// A scan may take this many samples; each takes some 50 bytes of working memory.
+  static constexpr double kMost = 1 << 25;
+  /// So may a beam: a hundred times what a beam of 300 m takes at a gap of 0.1 m.
+  static constexpr double kMostOfBeam = 1 << 18;
+  /// @param samples of a scan, and of its longest beam. @throws TooMuchWork if these are too many.
+  static void limit(double samples, double of_longest) {
+    if (samples > kMost || of_longest > kMostOfBeam) throw TooMuchWork(TooMuchWork::What::kSamples, samples);
+  }
+
   /// @param forEachDistance called as forEachDistance(beam number, length [m], add) shall call add(distance
   /// [m]) for each sample, 0 <= distance < length; from several threads at once.
   template <typename ForEachDistance>

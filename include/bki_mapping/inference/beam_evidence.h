@@ -20,7 +20,10 @@ class BeamEvidence : public Evidence {
   /// Replaces the beams. @param field must stay where it is until the scan is done.
   void setField(const BeamField& field, Workers& workers);
 
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                              Workers& workers) override;
+  void markClasses(std::size_t, ClassSet& classes) const override { classes.set(kFreeClass); }
+  void reserve(EvidenceScratch& scratch) const override;
   double effort(const BlockGroup& group) const override;
   void enter(const BlockGroup& group, EvidenceScratch& scratch) const override;
   void addTo(std::size_t number, const BlockIndex& index, Block& block,

@@ -34,6 +34,9 @@ class BeamField {
   double reachMetres() const { return reach_ * geometry_.resolution(); }
   double longest() const { return longest_; }  ///< length of the longest beam [m]
 
+  /// Takes the working memory that the finding of beams can need.
+  void reserve(EvidenceScratch& scratch) const;
+
   /// Names beams, among them all whose half-lines reach the block, as numbers in scratch.ranges: sorted, and
   /// none twice.
   void findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const;

@@ -39,6 +39,8 @@ class BeamTable : public BeamIndex {
   void build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order);
 
   void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const override;
+  /// A query names at most this many ranges: two in each row, where it crosses the seam.
+  static constexpr std::size_t kMostRanges = 2 * kBeamRows;
 
   /// Of each cell's beams in the order, row by row; one more than cells.
   const std::vector<std::uint32_t>& begin() const { return begin_; }

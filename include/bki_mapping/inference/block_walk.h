@@ -8,6 +8,7 @@
 #include "bki_mapping/inference/beams.h"
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/parallel_for.h"
+#include "bki_mapping/inference/work_limit.h"
 
 namespace bki_mapping {
 
@@ -22,8 +23,10 @@ struct BeamPiece {
 class BlockWalk {
  public:
   /// Inserts every block with a voxel centre within `reach` [m] of a beam's piece, and some around those.
+  /// @param most of them, those not counted that are in `blocks` before. @throws TooMuchWork if there are
+  /// more.
   void insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
-                         double reach, Workers& workers, IndexNumbering& blocks);
+                         double reach, std::size_t most, Workers& workers, IndexNumbering& blocks);
 
  private:
   /// A box of blocks, each marked or not: a hash table would be slower for the many blocks that beams share.

@@ -13,6 +13,7 @@
 #include "bki_mapping/inference/index_numbering.h"
 #include "bki_mapping/inference/local_point.h"
 #include "bki_mapping/inference/parallel_for.h"
+#include "bki_mapping/inference/work_limit.h"
 
 namespace bki_mapping {
 
@@ -22,6 +23,9 @@ struct EvidenceLimits {
   float free = std::numeric_limits<float>::infinity();
 };
 
+/// A set of classes, `free` among them.
+using ClassSet = std::bitset<256>;
+
 /// Working memory of one thread.
 struct alignas(kThreadsApart) EvidenceScratch {
   EvidenceLimits limits;
@@ -30,17 +34,11 @@ struct alignas(kThreadsApart) EvidenceScratch {
   std::vector<LocalPoint> points;
   std::vector<BeamRange> ranges;
   std::vector<std::uint32_t> beams;
-  GroupSums group;  ///< of the group at hand
+  GroupSums group;             ///< of the group at hand
+  std::size_t not_finite = 0;  ///< voxels that refused evidence (Block::add), since the update began
   /// Voxels of the block at hand that evidence for `free` leaves alone.
   std::bitset<kBlockVoxels> held;
 
-  /// Provides for as much as `other` does: who gets which block is chance.
-  void reserveAs(const EvidenceScratch& other) {
-    points.reserve(other.points.capacity());
-    ranges.reserve(other.ranges.capacity());
-    beams.reserve(other.beams.capacity());
-    group.reserveAs(other.group);
-  }
   void leaveHeldAlone() {
     if (held.none()) return;
     for (std::size_t v = 0; v < sums.size(); ++v) sums[v] = held[v] ? 0.0f : sums[v];
@@ -73,7 +71,10 @@ class Evidence {
 
   /// The blocks to which addTo may add, each once; too many are allowed. They stay until the next call.
   /// @param map has already the blocks of the evidence that stands before this one in the update.
-  virtual const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) = 0;
+  /// @param most blocks, those not counted that are named because they are in the map.
+  /// @throws TooMuchWork if there are more.
+  virtual const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                                      Workers& workers) = 0;
 
   /// A number that grows with the time that a group will take: what takes long is begun first.
   virtual double effort(const BlockGroup& /*group*/) const { return 0.0; }
@@ -84,6 +85,13 @@ class Evidence {
 
   /// Fetches what addTo will read for a block.
   virtual void prefetch(std::size_t /*number*/) const {}
+
+  /// Adds to `classes` those whose planes addTo may write to. @param number of a block.
+  virtual void markClasses(std::size_t number, ClassSet& classes) const = 0;
+
+  /// Takes all working memory that enter and addTo can need, once collectBlocks was called: a scan that runs
+  /// out of memory halfway would leave a map with half a scan in it.
+  virtual void reserve(EvidenceScratch& scratch) const = 0;
 
   /// Adds this evidence to one block. Called for each block at most once a scan, from any thread.
   /// @param number of the block in what collectBlocks gave.

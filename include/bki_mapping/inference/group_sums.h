@@ -37,10 +37,12 @@ class GroupSums {
   float* open(int row_axis);
   /// Sets `sums` to those of a block that matters. @param place in the group [blocks].
   void sumsOf(const std::array<int, 3>& place, float* sums) const;
-  /// Provides for as much as `other` does.
-  void reserveAs(const GroupSums& other);
+  /// Takes all memory that sums over so many beams can need.
+  void reserve(std::size_t beams);
 
-  /// Working memory of what adds: passes, and how many of them there are.
+  /// Inner loops may write this many passes past the last.
+  static constexpr std::size_t kPassPadding = 16;
+  /// Working memory of what adds: passes, and how many of them there are. There is room for one a beam.
   std::vector<BeamPass> passes;
   std::size_t pass_count = 0;
 

@@ -40,10 +40,11 @@ struct VoxelKernel {
   float scale = 1.0f;           ///< sigma0; 1 for the counting model
 
   VoxelKernel(const KernelConfig& config, double resolution)
-      : type(config.type),
-        reach(static_cast<float>(config.length / resolution)),
-        inverse_reach2(static_cast<float>(resolution * resolution / (config.length * config.length))),
-        scale(type == KernelType::kSparse ? static_cast<float>(config.scale) : 1.0f) {}
+      : type(config.type), scale(type == KernelType::kSparse ? static_cast<float>(config.scale) : 1.0f) {
+    const double length = config.lengthFor(resolution);
+    reach = static_cast<float>(length / resolution);
+    inverse_reach2 = static_cast<float>(resolution * resolution / (length * length));
+  }
 };
 
 }  // namespace bki_mapping

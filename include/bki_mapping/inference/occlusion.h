@@ -19,7 +19,10 @@ class Occlusion : public Evidence {
     range_ = range;
   }
 
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                              Workers& workers) override;
+  void markClasses(std::size_t, ClassSet&) const override {}
+  void reserve(EvidenceScratch& scratch) const override;
   void addTo(std::size_t number, const BlockIndex& index, Block& block,
              EvidenceScratch& scratch) const override;
 

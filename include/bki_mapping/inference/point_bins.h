@@ -19,12 +19,12 @@ namespace bki_mapping {
 /// the block that holds it. Keeps its memory from scan to scan.
 class PointBins {
  public:
-  /// @throws std::invalid_argument if the kernel is longer than 72 voxels.
+  /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
   PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops);
 
   /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
   /// @param home_always whether a point is sorted into the block that holds it even if it reaches none of its
-  /// centres.
+  /// centres. @throws TooMuchWork if they reach too many blocks to be kept in each.
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
                  Workers& workers);
 

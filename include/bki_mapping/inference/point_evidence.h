@@ -14,11 +14,12 @@ namespace bki_mapping {
 class PointEvidence : public Evidence {
  public:
   /// @param instruction_set one of instructionSets(); the best there is if empty.
-  /// @throws std::invalid_argument if the kernel is longer than 72 voxels.
+  /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
                 const std::string& instruction_set = "");
 
   /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
+  /// @throws TooMuchWork as PointBins.
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, Workers& workers);
   std::size_t size() const { return size_; }  ///< number of points
 
@@ -28,7 +29,10 @@ class PointEvidence : public Evidence {
   void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point.
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                              Workers& workers) override;
+  void markClasses(std::size_t number, ClassSet& classes) const override;
+  void reserve(EvidenceScratch& scratch) const override;
   void prefetch(std::size_t number) const override;
   void addTo(std::size_t number, const BlockIndex& index, Block& block,
              EvidenceScratch& scratch) const override;

@@ -25,7 +25,10 @@ class SoftPointEvidence : public Evidence {
   void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
   /// Exactly the blocks with a voxel centre within reach of a point, or, if protected, with a point.
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, Workers& workers) override;
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                              Workers& workers) override;
+  void markClasses(std::size_t number, ClassSet& classes) const override;
+  void reserve(EvidenceScratch&) const override {}
   void addTo(std::size_t number, const BlockIndex& index, Block& block,
              EvidenceScratch& scratch) const override;
 

@@ -1,6 +1,7 @@
 /// @file From a raw scan to hits and beams.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 #include "bki_mapping/core/class_table.h"
@@ -16,10 +17,10 @@ namespace bki_mapping {
 struct PointCounts {
   std::size_t points = 0;
   std::size_t used = 0;           ///< became hits
-  std::size_t not_finite = 0;     ///< NaN or infinite
+  std::size_t not_finite = 0;     ///< NaN or infinite: a coordinate, or a share of a class
   std::size_t at_sensor = 0;      ///< within 1 mm of the sensor
   std::size_t too_near = 0;       ///< nearer than sensor_model/min_range
-  std::size_t beyond_max = 0;     ///< farther than sensor_model/max_range
+  std::size_t beyond_max = 0;     ///< farther than SensorModelConfig::reach()
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
   std::size_t unknown_label = 0;  ///< not in the class table, and unknown_labels is ignore
   std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
@@ -43,6 +44,8 @@ class Observer {
  public:
   explicit Observer(const MapperConfig& config)
       : config_(config),
+        cells_(config.downsample_resolution > 0.0 ? std::min(config.downsample_resolution, config.resolution)
+                                                  : config.resolution),
         hits_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
         cut_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()) {}
 
@@ -67,11 +70,15 @@ class Observer {
   void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
                   const Sorted& into) const;
 
+  /// Adds a beam that is cut at the sensor's range, unless it ends where the map has no voxels.
+  void addCut(const Eigen::Vector3d& origin, const Eigen::Vector3f& end, Downsampler::Input& cut) const;
+
   /// Beams that met nothing, into the chunk of cut ones behind those of the points.
   void addNoReturns(const Scan& scan, Downsampler::Input& cut);
   void appendBeams(const std::vector<Eigen::Vector3f>& ends, Workers& workers);
 
   MapperConfig config_;
+  GridGeometry cells_;                        ///< the finer one of those that points are put into
   std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels
   std::vector<PointCounts> counts_;           ///< of each chunk
   Downsampler hits_, cut_;

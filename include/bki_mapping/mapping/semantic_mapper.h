@@ -6,6 +6,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/config.h"
 #include "bki_mapping/core/scan.h"
+#include "bki_mapping/core/scan_refused.h"
 #include "bki_mapping/core/semantic_map.h"
 #include "bki_mapping/free_space/free_space_model.h"
 #include "bki_mapping/inference/map_updater.h"
@@ -22,10 +23,12 @@ struct ScanStats {
   std::size_t hits = 0;        ///< after down-sampling
   std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
   std::size_t blocks = 0;      ///< blocks touched
-  double observe_ms = 0.0;     ///< filtering, down-sampling
-  double evidence_ms = 0.0;    ///< sampling, binning, indexing
-  double collect_ms = 0.0;     ///< naming and allocating blocks
-  double update_ms = 0.0;      ///< adding to the blocks
+  std::size_t not_finite =
+      0;                     ///< voxels and classes that refused evidence since it would not have been finite
+  double observe_ms = 0.0;   ///< filtering, down-sampling
+  double evidence_ms = 0.0;  ///< sampling, binning, indexing
+  double collect_ms = 0.0;   ///< naming and allocating blocks
+  double update_ms = 0.0;    ///< adding to the blocks
   double totalMs() const { return observe_ms + evidence_ms + collect_ms + update_ms; }
 };
 
@@ -36,10 +39,12 @@ class SemanticMapper {
   /// @throws std::invalid_argument if a setting is not allowed, or needs an unlabelled class that the table
   /// lacks.
   SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes);
+  ~SemanticMapper();
 
-  /// Adds one scan to the map. Bad points are left out and counted.
+  /// Adds one scan to the map, all of it or nothing. Bad points are left out and counted.
   /// @throws std::invalid_argument if the scan's labels are not as many as its points, or its origin is not a
-  /// point that the map can hold; the map is then as it was.
+  /// point that the map can hold; ScanRefused if it is larger than scan_limit/blocks, or memory does not hold
+  /// it. The map is then as it was.
   ScanStats integrate(const Scan& scan);
 
   /// Takes over other settings; the map stays, and its states follow the gains.
@@ -47,7 +52,7 @@ class SemanticMapper {
   /// (changesWhileMapping); the settings are then as they were.
   void reconfigure(const MapperConfig& config);
 
-  /// Forgets all scans.
+  /// Forgets all scans, and gives their memory back to the system.
   void reset();
 
   /// Forgets the blocks for which forget(index) is true. @return their indices.
@@ -64,31 +69,33 @@ class SemanticMapper {
   }
 
   /// The blocks that the last integrate() may have changed, made or erased; each once.
-  const std::vector<GridIndex>& touchedBlocks() const { return updater_.touched(); }
-  /// Memory of the map's blocks [bytes]; kept up from scan to scan, so asking costs nothing.
-  std::size_t blockBytes() const { return block_bytes_; }
+  const std::vector<GridIndex>& touchedBlocks() const;
+  /// Memory of the map, its index included [bytes]: map().bytes(), without a look at every block.
+  std::size_t mapBytes() const { return block_bytes_ + map_.indexBytes(); }
 
   const SemanticMap& map() const { return map_; }
   const ClassTable& classes() const { return *classes_; }
   const MapperConfig& config() const { return config_; }
 
  private:
-  /// What follows from settings that may change.
-  void applySettings();
+  /// What a scan goes through; holds all working memory.
+  struct Pipeline;
+
+  ScanStats add(const Scan& scan);
+  UpdateLimits limitsFor(const Scan& scan) const;
+  /// What a scan larger than its limits would take, and what to set.
+  ScanRefused refusalOf(const TooMuchWork& work) const;
+  /// After a failure: counts the map's bytes anew, and drops working memory, which may be large or half made.
+  void recover() noexcept;
+  void setGains();
 
   MapperConfig config_;
   std::shared_ptr<const ClassTable> classes_;
   SemanticMap map_;
   Workers workers_;
-  Observer observer_;
-  PointEvidence hits_;
-  SoftPointEvidence soft_hits_;
-  LazyBeamField beams_;
-  std::unique_ptr<FreeSpaceModel> free_space_;
-  Occlusion occlusion_;
-  MapUpdater updater_;
-  std::vector<Evidence*> evidence_;
-  std::size_t block_bytes_ = 0;
+  std::unique_ptr<Pipeline> pipeline_;  ///< none between a failure and the next scan
+  std::vector<GridIndex> no_blocks_;
+  std::size_t block_bytes_ = 0;  ///< of the blocks alone
 };
 
 }  // namespace bki_mapping

@@ -22,6 +22,7 @@ enum class DropReason {
   kBadCloud,
   kEmpty,
   kQueueFull,
+  kTooLarge,
   kMemory,
   kPaused,
   kTimeJump,

@@ -26,7 +26,6 @@ struct ServerConfig {
   int queue_size = 10;                     ///< clouds that may wait
   QueuePolicy queue_policy = QueuePolicy::kDropOldest;
   OnTimeJump on_time_jump = OnTimeJump::kKeep;
-  double memory_limit = 0.0;       ///< of the map's blocks [MB]; 0: none
   double window = 0.0;             ///< edge of the cube about the sensor that is kept [m]; 0: everything is
   double diagnostic_period = 1.0;  ///< [s]
   double publish_rate = 2.0;       ///< maps a second, at most [Hz]

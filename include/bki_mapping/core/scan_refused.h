@@ -1,0 +1,24 @@
+/// @file Scans that are not added to the map.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace bki_mapping {
+
+/// Why a scan was refused, in a sentence with the remedy. The map is as it was before the scan.
+class ScanRefused : public std::runtime_error {
+ public:
+  enum class Reason {
+    kTooLarge,  ///< it would touch more blocks, or take more samples, than the limits allow
+    kMemory,    ///< memory_limit, or the computer's memory, does not hold it
+  };
+
+  ScanRefused(Reason reason, const std::string& sentence) : std::runtime_error(sentence), reason_(reason) {}
+  Reason reason() const { return reason_; }
+
+ private:
+  Reason reason_;
+};
+
+}  // namespace bki_mapping
