@@ -91,6 +91,7 @@ int measure(const po::variables_map& given) {
   const std::size_t warm_up = given["warm-up"].as<std::size_t>();
   if (given["repeats"].as<int>() < 1) throw std::invalid_argument("--repeats must be at least 1");
   if (last - first <= warm_up) throw std::invalid_argument("there are no scans left after --warm-up");
+  if (given.count("csv")) checkWritable(given["csv"].as<std::string>());
   std::vector<SequenceFrame> frames;
   for (std::size_t i = first; i < last; ++i) frames.push_back(sequence.read(i));
   const auto classes = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));

@@ -26,7 +26,7 @@ foreach(name
     semantic_quality_test tile_grid_test)
   bki_mapping_unit_test(${name})
 endforeach()
-foreach(name class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
+foreach(name atomic_file_test class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
     truth_quality_test)
   bki_mapping_unit_test(${name} bki_mapping_io)
 endforeach()

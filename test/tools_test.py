@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import stat
 import subprocess
 import tempfile
 import unittest
@@ -210,6 +211,17 @@ class Tools(unittest.TestCase):
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)
         self.fails('beams must be', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
+
+    def test_what_is_no_file_is_refused_before_the_work(self):
+        pipe, good = self.path('pipe'), self.path('good.json')
+        os.mkfifo(pipe)
+        self.fails('pipe is a pipe, no regular file', 'map_sequence', '--sequence', self.drive, '--report', pipe)
+        self.fails('pipe is a pipe, no regular file', 'evaluate_map', '--sequence', self.drive, '--json', pipe)
+        self.fails('pipe is a pipe, no regular file', 'benchmark_sequence', '--sequence', self.drive, '--csv', pipe)
+        self.assertTrue(stat.S_ISFIFO(os.stat(pipe).st_mode))
+        self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--report', good, '--output',
+                   '/no/such/map.ply')
+        self.assertFalse(os.path.exists(good))
 
     def test_occupancy_table_maps_everything_as_one_class(self):
         report = self.path('one.json')

@@ -1,57 +1,181 @@
 #include "bki_mapping/io/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <stdexcept>
-#include <vector>
+#include <filesystem>
+#include <random>
 
 namespace bki_mapping {
 namespace {
 
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-  throw std::runtime_error(path + " cannot be written: " + what + "; check folder, rights and free space");
+namespace fs = std::filesystem;
+
+constexpr char kMark[] = ".bki_mapping-";
+constexpr char kSuffixLetters[] = "abcdefghijklmnopqrstuvwxyz0123456789";
+constexpr std::size_t kSuffixLength = 6;
+/// The mark, the longest process id, a dash and the suffix.
+constexpr std::size_t kLongestTail = sizeof(kMark) - 1 + 10 + 1 + kSuffixLength;
+
+fs::path folderOf(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+const char* kindOf(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+/// Where a path leads to, also if nothing is there yet. @param old what is there, if `exists`.
+fs::path followLinks(const std::string& path, bool& exists, struct stat& old) {
+  exists = stat(path.c_str(), &old) == 0;
+  if (exists && !S_ISREG(old.st_mode)) {
+    throw std::runtime_error(path + " is " + kindOf(old.st_mode) + ", no regular file; give another name");
+  }
+  if (exists) return fs::canonical(path);
+  if (errno == ELOOP) throw writeFailure(path, "it is in a loop of links");
+  if (errno != ENOENT) throw writeFailure(path, std::strerror(errno));
+  fs::path target = path;
+  while (fs::is_symlink(fs::symlink_status(target))) target = folderOf(target) / fs::read_symlink(target);
+  if (!target.has_filename()) throw writeFailure(path, "it does not name a file");
+  return target;
+}
+
+/// What the names of all temporaries of a file begin with; shortened where the names would be too long.
+std::string temporaryPrefix(const fs::path& target) {
+  const long limit = pathconf(folderOf(target).c_str(), _PC_NAME_MAX);
+  const std::size_t most = std::max<std::size_t>(limit > 0 ? static_cast<std::size_t>(limit) : 255, 64);
+  return "." + target.filename().string().substr(0, most - 1 - kLongestTail) + kMark;
+}
+
+std::string randomSuffix() {
+  std::random_device random;
+  std::uniform_int_distribution<std::size_t> letter(0, sizeof(kSuffixLetters) - 2);
+  std::string suffix;
+  while (suffix.size() < kSuffixLength) suffix += kSuffixLetters[letter(random)];
+  return suffix;
+}
+
+/// Whether this user's process has left a temporary file for good.
+bool isAbandoned(const fs::path& temporary, pid_t process) {
+  const int file = open(temporary.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return false;
+  struct stat status {};
+  const bool own = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid();
+  const bool taken = flock(file, LOCK_EX | LOCK_NB) == 0, locked = !taken && errno == EWOULDBLOCK;
+  close(file);
+  const bool gone = kill(process, 0) != 0 && errno == ESRCH;
+  // In a container each run may have the same id. This process locks its files before it writes to them.
+  const bool of_namesake = process == getpid() && taken && status.st_size > 0;
+  return own && !locked && (gone || of_namesake);
+}
+
+void removeAbandoned(const fs::path& folder, const std::string& prefix) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    pid_t process = 0;
+    const char* const end = name.data() + name.size();
+    const auto [dash, error] = std::from_chars(name.data() + prefix.size(), end, process);
+    if (error != std::errc() || process <= 0 || end - dash != 1 + kSuffixLength || *dash != '-') continue;
+    if (!std::all_of(dash + 1, end, [](unsigned char c) { return std::isalnum(c); })) continue;
+    if (isAbandoned(entry.path(), process)) unlink(entry.path().c_str());
+  }
+}
+
+/// As far as this user may.
+void keepOwner(int file, const struct stat& old) {
+  [[maybe_unused]] const int group = fchown(file, static_cast<uid_t>(-1), old.st_gid);
+  [[maybe_unused]] const int user = fchown(file, old.st_uid, static_cast<gid_t>(-1));
+}
+
+/// Makes a renaming last. Some file systems cannot, and some folders cannot be opened: the file is whole.
+void syncFolder(const std::string& path, const fs::path& folder) {
+  const int opened = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return;
+  const int reason = fsync(opened) == 0 ? 0 : errno;
+  close(opened);
+  if (reason == EIO || reason == ENOSPC || reason == EDQUOT) throw writeFailure(path, std::strerror(reason));
 }
 
 }  // namespace
 
+std::runtime_error writeFailure(const std::string& path, const std::string& reason) {
+  struct statvfs disk {};
+  std::string space;
+  if (statvfs(folderOf(path).c_str(), &disk) == 0) {
+    char text[64];
+    const double bytes = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
+    std::snprintf(text, sizeof(text), " (%.1f MB free there)", bytes / 1e6);
+    space = text;
+  }
+  return std::runtime_error(path + " cannot be written: " + reason + space +
+                            "; check folder, rights and free space");
+}
+
 AtomicFile::AtomicFile(const std::string& path) : path_(path) {
-  const std::string pattern = path + ".XXXXXX";
-  std::vector<char> name(pattern.begin(), pattern.end());
-  name.push_back('\0');
-  const int file = mkstemp(name.data());
-  if (file < 0) fail(path_, std::strerror(errno));
-  fchmod(file, 0644);
-  close(file);
-  temporary_ = name.data();
+  bool exists = false;
+  struct stat old {};
+  const fs::path target = followLinks(path, exists, old);
+  target_ = target.string();
+  const std::string prefix = temporaryPrefix(target);
+  removeAbandoned(folderOf(target), prefix);
+  do {
+    temporary_ = (folderOf(target) / (prefix + std::to_string(getpid()) + "-" + randomSuffix())).string();
+    // The kernel applies the umask; what an old file hides from others is hidden from the beginning.
+    file_ = open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, exists ? 0600 : 0666);
+  } while (file_ < 0 && errno == EEXIST);
+  if (file_ < 0) throw writeFailure(path_, std::strerror(errno));
+  flock(file_, LOCK_EX | LOCK_NB);  // where there are no locks, the process id alone says whose it is
+  struct stat made {};
+  fstat(file_, &made);
+  mode_ = (exists ? old : made).st_mode & 0777;
+  if (exists) keepOwner(file_, old);
 }
 
 AtomicFile::~AtomicFile() {
   if (!committed_) std::remove(temporary_.c_str());
+  close(file_);
+}
+
+void AtomicFile::write(const std::string& bytes) {
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t count = ::write(file_, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw writeFailure(path_, std::strerror(errno));
+    done += static_cast<std::size_t>(count);
+  }
 }
 
 void AtomicFile::commit() {
-  const int file = open(temporary_.c_str(), O_RDONLY);
-  const bool synced = file >= 0 && fsync(file) == 0;
-  const int reason = errno;
-  if (file >= 0) close(file);
-  if (!synced) fail(path_, std::strerror(reason));
-  if (std::rename(temporary_.c_str(), path_.c_str()) != 0) fail(path_, std::strerror(errno));
+  fchmod(file_, mode_);  // fails where a file system has no permissions
+  if (fsync(file_) != 0) throw writeFailure(path_, std::strerror(errno));
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
+    throw writeFailure(path_, std::strerror(errno));
+  }
   committed_ = true;
+  syncFolder(path_, folderOf(target_));
+}
+
+void checkWritable(const std::string& path) {
+  const AtomicFile file(path);
 }
 
 void writeTextFile(const std::string& path, const std::string& text) {
   AtomicFile file(path);
-  std::ofstream out(file.temporaryPath(), std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) fail(path, std::strerror(errno));
+  file.write(text);
   file.commit();
 }
 

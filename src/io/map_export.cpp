@@ -3,7 +3,6 @@
 #include <pcl/io/pcd_io.h>
 
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <stdexcept>
 
@@ -21,12 +20,12 @@ const char kPlyProperties[] =
     "property ushort label\nproperty uchar state\n"
     "property float probability\nproperty float variance\nproperty float entropy\nproperty float evidence\n";
 
-void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, double resolution) {
+std::string plyBytes(const std::vector<VoxelRecord>& voxels, double resolution) {
   std::ostringstream header;
   header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
          << " m, map frame\nelement vertex " << voxels.size() << "\n"
          << kPlyProperties << "end_header\n";
-  std::string bytes;
+  std::string bytes = header.str();
   for (const VoxelRecord& v : voxels) {
     for (const float c : {v.x, v.y, v.z}) appendBytes(bytes, c);
     for (const std::uint8_t c : {v.red, v.green, v.blue}) appendBytes(bytes, c);
@@ -34,17 +33,15 @@ void writePly(const std::string& path, const std::vector<VoxelRecord>& voxels, d
     appendBytes(bytes, v.state);
     for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) appendBytes(bytes, f);
   }
-  std::ofstream out(path, std::ios::binary);
-  out << header.str();
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw std::runtime_error(path + " cannot be written; check rights and free space");
+  return bytes;
 }
 
-void writePcd(const std::string& path, const std::vector<VoxelRecord>& voxels) {
-  if (pcl::PCDWriter().writeBinary(path, toPcl(voxels)) != 0) {
-    throw std::runtime_error(path + " cannot be written; check rights and free space");
-  }
+std::string pcdBytes(const std::vector<VoxelRecord>& voxels) {
+  const pcl::PCLPointCloud2 cloud = toPcl(voxels);
+  // PCL's own writer maps the file into memory: where the disk fills up meanwhile, the process dies.
+  return pcl::PCDWriter().generateHeaderBinary(cloud, Eigen::Vector4f::Zero(),
+                                               Eigen::Quaternionf::Identity()) +
+         "DATA binary\n" + std::string(cloud.data.begin(), cloud.data.end());
 }
 
 std::string endingOf(const std::string& path) {
@@ -106,11 +103,7 @@ void exportMap(const std::string& path, const SemanticMap& map, const ClassTable
   checkMapFileName(path);
   const std::vector<VoxelRecord> voxels = collectVoxels(map, classes, states);
   AtomicFile file(path);
-  if (endingOf(path) == ".ply") {
-    writePly(file.temporaryPath(), voxels, map.geometry().resolution());
-  } else {
-    writePcd(file.temporaryPath(), voxels);
-  }
+  file.write(endingOf(path) == ".ply" ? plyBytes(voxels, map.geometry().resolution()) : pcdBytes(voxels));
   file.commit();
 }
 

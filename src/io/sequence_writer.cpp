@@ -1,4 +1,6 @@
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -18,7 +20,7 @@ void writeBinary(const fs::path& path, const std::vector<T>& values) {
   out.write(reinterpret_cast<const char*>(values.data()),
             static_cast<std::streamsize>(values.size() * sizeof(T)));
   out.close();
-  if (!out) throw std::runtime_error(path.string() + " cannot be written; check rights and free space");
+  if (!out) throw writeFailure(path.string(), std::strerror(errno));
 }
 
 }  // namespace

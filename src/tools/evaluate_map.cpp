@@ -87,6 +87,9 @@ int evaluate(const po::variables_map& given) {
       std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
     throw std::invalid_argument("--errors must end in .png");
   }
+  for (const char* file : {"json", "errors"}) {
+    if (given.count(file)) checkWritable(given[file].as<std::string>());
+  }
   const GridGeometry& geometry = mapper.map().geometry();
   Evaluation evaluation{DynamicsEvaluation(geometry, DynamicsEvaluation::movingOfSemanticKitti(),
                                            last - first, given["late"].as<std::size_t>()),

@@ -42,6 +42,9 @@ int mapSequence(const po::variables_map& given) {
   }
   const auto states = parseStates(given["include"].as<std::string>());
   if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
+  for (const char* file : {"output", "report"}) {
+    if (given.count(file)) checkWritable(given[file].as<std::string>());
+  }
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   for (const std::string& warning : settingWarnings(mapper.config())) {
     std::cerr << "map_sequence: " << warning << "\n";

@@ -35,20 +35,25 @@ int writeBag(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const tools::FrameNames names{given["map-frame"].as<std::string>(), given["frame"].as<std::string>()};
-  AtomicFile file(given["output"].as<std::string>());
-  rosbag::Bag bag;
-  bag.open(file.temporaryPath(), rosbag::bagmode::Write);
-  bag.setCompression(compression(given["compression"].as<std::string>()));
-  for (std::size_t i = first; i < last; ++i) {
-    const SequenceFrame frame = sequence.read(i);
-    const ros::Time stamp = ros::Time().fromNSec(frame.stamp);
-    bag.write("/tf", stamp, tools::tfMessage(frame, names));
-    bag.write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
-    tools::showProgress(i + 1 - first, last - first, "scans");
+  const std::string output = given["output"].as<std::string>();
+  AtomicFile file(output);
+  try {
+    rosbag::Bag bag;
+    bag.open(file.temporaryPath(), rosbag::bagmode::Write);
+    bag.setCompression(compression(given["compression"].as<std::string>()));
+    for (std::size_t i = first; i < last; ++i) {
+      const SequenceFrame frame = sequence.read(i);
+      const ros::Time stamp = ros::Time().fromNSec(frame.stamp);
+      bag.write("/tf", stamp, tools::tfMessage(frame, names));
+      bag.write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
+      tools::showProgress(i + 1 - first, last - first, "scans");
+    }
+    bag.close();
+  } catch (const rosbag::BagException& fault) {
+    throw writeFailure(output, fault.what());
   }
-  bag.close();
   file.commit();
-  std::cout << last - first << " scans in " << given["output"].as<std::string>() << "\n";
+  std::cout << last - first << " scans in " << output << "\n";
   return 0;
 }
 
