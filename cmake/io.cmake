@@ -15,6 +15,7 @@ add_library(bki_mapping_io SHARED
   src/io/sequence_writer.cpp
   src/io/share_path.cpp
   src/io/voxel_pcl.cpp
+  src/io/yaml_file.cpp
   src/simulation/drive_file.cpp
   src/simulation/lidar.cpp
   src/simulation/scene.cpp

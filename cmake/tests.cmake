@@ -27,10 +27,11 @@ foreach(name
   bki_mapping_unit_test(${name})
 endforeach()
 foreach(name atomic_file_test class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
-    truth_quality_test)
+    truth_quality_test yaml_file_test)
   bki_mapping_unit_test(${name} bki_mapping_io)
 endforeach()
 target_link_libraries(map_export_test PRIVATE pcl_io)
+target_link_libraries(yaml_file_test PRIVATE yaml-cpp)
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
 function(bki_mapping_script_test name)

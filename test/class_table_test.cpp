@@ -119,6 +119,25 @@ TEST(ClassTable, NamesEveryFault) {
                "did you mean 'dynamic'?");
   EXPECT_NAMES(faultOf(head + "  - {id: two, name: b, color: [1, 2, 3]}\n"), "bad conversion");
   EXPECT_NAMES(faultOf(head + "  - {name: b, color: [1, 2, 3]}\n"), "no 'id'");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], flags: dynamic}\n"),
+               "the flags of class 'b' must be a list; write [dynamic]");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], flags: {dynamic: true}}\n"),
+               "the flags of class 'b' must be a list");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: '', color: [1, 2, 3]}\n"), "class 2 is empty");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: ~, color: [1, 2, 3]}\n"), "class 2 is empty");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: 9}\n"),
+               "raw of class 'b' must be a list of numbers, or any");
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [-1]}\n"), "bad conversion");
+  for (const char* gain : {".inf", ".nan", "-.inf", "-1", "0"}) {
+    EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], free_gain: " + gain + "}\n"),
+                 "free_gain of class 'b' must be a number > 0");
+  }
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], id: 3}\n"), "'id' is given twice");
+  EXPECT_NAMES(faultOf(head + "  - some text\n"), "class 2 of the list is no map");
+  EXPECT_NAMES(faultOf(head + "nmae: garden\n"), "'nmae' of the table is unknown; did you mean 'name'?");
+  EXPECT_NAMES(faultOf("name: ''\n" + head), "the name of the table is empty");
+  EXPECT_NAMES(faultOf("classs:\n  - {id: 1, name: a, color: [1, 2, 3]}\n"), "did you mean 'classes'?");
+  EXPECT_NAMES(faultOf(head + head), "'classes' is given twice");
   EXPECT_NAMES(faultOf("classes: []\n"), "no class");
   EXPECT_NAMES(faultOf("just text"), "list 'classes'");
   EXPECT_NAMES(faultOf("classes: [\n"), "class table");

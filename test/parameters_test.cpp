@@ -130,6 +130,15 @@ TEST(ParameterFile, NamesItsFaults) {
   EXPECT_EQ(faultOf(""), "");
   EXPECT_EQ(faultOf("kernel: {length: 0.2}\n"), "");
   EXPECT_NE(faultOf("prior: [1, 2]\n").find("'prior' must have one value"), std::string::npos);
+  EXPECT_NE(faultOf("just text\n").find("must be a map"), std::string::npos) << faultOf("just text\n");
+  const auto names = [&](const std::string& text, const std::string& words) {
+    EXPECT_NE(faultOf(text).find(words), std::string::npos) << text << "says '" << faultOf(text) << "'";
+  };
+  names("prior: 0.1\nprior: 0.2\n", "'prior' is given twice");
+  names("kernel: {length: 0.2, length: 0.2}\n", "'length' is given twice");
+  names("kernel/length: 0.3\nkernel: {length: 0.2}\n", "'kernel/length' is given twice");
+  names("kernel: {length: 0.2}\nkernel: {scale: 0.1}\n", "'kernel' is given twice");
+  EXPECT_EQ(faultOf("kernel: {length: 0.2}\nkernel/scale: 0.1\n"), "");
   EXPECT_NE(faultOf("prior: [1\n").find(file), std::string::npos);
   EXPECT_THROW(loadParameterFile("/no/such/file.yaml"), std::invalid_argument);
 }

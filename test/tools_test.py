@@ -207,6 +207,15 @@ class Tools(unittest.TestCase):
         self.fails("state 'busy' is unknown", 'map_sequence', '--sequence', self.drive, '--include', 'busy')
         self.fails('--first 9 is beyond', 'map_sequence', '--sequence', self.drive, '--first', '9')
         self.fails("no '='", 'map_sequence', '--sequence', self.drive, '--set', 'prior')
+        self.fails('--set prior is given twice', 'map_sequence', '--sequence', self.drive, '--set', 'prior=0.1', '--set',
+                   'prior=0.2')
+        self.fails('by --threads and by --set', 'map_sequence', '--sequence', self.drive, '--set', 'threads=1',
+                   '--threads', '2')
+        cycle = self.path('cycle.yaml')
+        with open(cycle, 'w') as file:
+            file.write('a: &a {b: *a}\n')
+        self.fails('alias', 'map_sequence', '--sequence', self.drive, '--config', cycle)
+        self.fails('alias', 'map_sequence', '--sequence', self.drive, '--classes', cycle)
         self.fails('cannot be read', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)

@@ -1,14 +1,14 @@
 #include "bki_mapping/io/class_table_yaml.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
 
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/share_path.h"
+#include "bki_mapping/io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {
@@ -63,34 +63,57 @@ std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::
   return static_cast<std::uint8_t>(value);
 }
 
-SemanticClass parseClass(const std::string& file, const YAML::Node& node) {
-  const std::vector<std::string> keys = {"id", "name", "color", "raw", "flags", "free_gain"};
-  for (const auto& entry : node) {
+/// @param owner of the keys, for the message.
+void checkKeys(const std::string& file, const YAML::Node& map, const std::string& owner,
+               const std::vector<std::string>& known) {
+  for (const auto& entry : map) {
     const auto key = entry.first.as<std::string>();
-    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      fail(file, "key '" + key + "' of a class is unknown" + nearestWord(key, keys));
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      fail(file, "key '" + key + "' of " + owner + " is unknown" + nearestWord(key, known));
     }
   }
+}
+
+/// @param owner of the name, for the message.
+std::string nameOf(const std::string& file, const YAML::Node& node, const std::string& owner) {
+  const std::string name = node.IsNull() ? "" : node.as<std::string>();
+  if (name.empty()) fail(file, "the name of " + owner + " is empty");
+  return name;
+}
+
+/// @param number of the class in the list, from 1 on.
+SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::size_t number) {
+  if (!node.IsMap()) fail(file, "class " + std::to_string(number) + " of the list is no map");
+  checkKeys(file, node, "a class", {"id", "name", "color", "raw", "flags", "free_gain"});
   for (const char* key : {"id", "name", "color"}) {
     if (!node[key]) fail(file, std::string("a class has no '") + key + "'");
   }
   SemanticClass c;
   c.id = byteOf(file, node["id"], "id");
-  c.name = node["name"].as<std::string>();
-  if (node["color"].size() != 3) fail(file, "the color of class '" + c.name + "' is not [red, green, blue]");
+  c.name = nameOf(file, node["name"], "class " + std::to_string(c.id));
+  if (!node["color"].IsSequence() || node["color"].size() != 3)
+    fail(file, "the color of class '" + c.name + "' is not [red, green, blue]");
   for (std::size_t i = 0; i < 3; ++i) c.color[i] = byteOf(file, node["color"][i], "color");
   if (!node["raw"]) {
     c.raw = {c.id};
   } else if (node["raw"].IsScalar() && node["raw"].as<std::string>() == "any") {
     c.any_raw = true;
+  } else if (!node["raw"].IsSequence()) {
+    fail(file, "raw of class '" + c.name + "' must be a list of numbers, or any");
   } else {
     c.raw = node["raw"].as<std::vector<std::uint32_t>>();
   }
-  for (const YAML::Node& flag : node["flags"]) setFlag(file, flag.as<std::string>(), c);
+  const YAML::Node flags = node["flags"];
+  if (flags && !flags.IsSequence()) {
+    fail(file, "the flags of class '" + c.name + "' must be a list; write [" +
+                   (flags.IsScalar() ? flags.as<std::string>() : "dynamic") + "]");
+  }
+  for (const YAML::Node& flag : flags) setFlag(file, flag.as<std::string>(), c);
   if (c.ground && c.ignored) fail(file, "class '" + c.name + "' is flagged both ground and ignored");
   if (node["free_gain"]) {
     c.free_gain = node["free_gain"].as<double>();
-    if (!(*c.free_gain > 0.0)) fail(file, "the free_gain of class '" + c.name + "' must be a number > 0");
+    if (!(*c.free_gain > 0.0 && std::isfinite(*c.free_gain)))
+      fail(file, "the free_gain of class '" + c.name + "' must be a number > 0");
   }
   return c;
 }
@@ -100,11 +123,15 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node) {
 ClassTable loadClassTable(const std::string& name_or_file) {
   const std::string file = findFile(name_or_file);
   try {
-    const YAML::Node root = YAML::LoadFile(file);
-    if (!root.IsMap() || !root["classes"].IsSequence()) fail(file, "it must be a map with a list 'classes'");
+    const YAML::Node root = loadYamlFile(file);
+    if (!root.IsMap()) fail(file, "it must be a map with a list 'classes'");
+    checkKeys(file, root, "the table", {"name", "classes"});
+    if (!root["classes"] || !root["classes"].IsSequence()) fail(file, "it has no list 'classes'");
     std::vector<SemanticClass> classes;
-    for (const YAML::Node& node : root["classes"]) classes.push_back(parseClass(file, node));
-    return ClassTable(root["name"] ? root["name"].as<std::string>() : fs::path(file).stem().string(),
+    for (const YAML::Node& node : root["classes"]) {
+      classes.push_back(parseClass(file, node, classes.size() + 1));
+    }
+    return ClassTable(root["name"] ? nameOf(file, root["name"], "the table") : fs::path(file).stem().string(),
                       classes);
   } catch (const YAML::Exception& error) {
     fail(file, error.what());

@@ -1,10 +1,9 @@
 #include "bki_mapping/io/config_yaml.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <stdexcept>
 
 #include "bki_mapping/core/parameters.h"
+#include "bki_mapping/io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {
@@ -14,8 +13,12 @@ void flatten(const YAML::Node& node, const std::string& name, std::map<std::stri
     for (const auto& entry : node) {
       flatten(entry.second, (name.empty() ? "" : name + "/") + entry.first.as<std::string>(), values);
     }
+  } else if (name.empty() && !node.IsNull()) {
+    throw std::invalid_argument("it must be a map of parameters, as 'resolution: 0.2' is");
   } else if (node.IsScalar()) {
-    values[name] = node.as<std::string>();
+    if (!values.emplace(name, node.as<std::string>()).second) {
+      throw std::invalid_argument("parameter '" + name + "' is given twice; keep one");
+    }
   } else if (!(node.IsNull() && name.empty())) {  // an empty file sets nothing
     throw std::invalid_argument("parameter '" + name + "' must have one value");
   }
@@ -26,9 +29,7 @@ void flatten(const YAML::Node& node, const std::string& name, std::map<std::stri
 std::map<std::string, std::string> loadParameterFile(const std::string& file) {
   std::map<std::string, std::string> values;
   try {
-    flatten(YAML::LoadFile(file), "", values);
-  } catch (const YAML::BadFile&) {
-    throw std::invalid_argument("parameter file " + file + " cannot be read; check the path");
+    flatten(loadYamlFile(file), "", values);
   } catch (const std::exception& error) {
     throw std::invalid_argument("parameter file " + file + ": " + error.what());
   }

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/atomic_file.h"
+#include "bki_mapping/io/yaml_file.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -47,7 +48,7 @@ std::optional<DriveConfig> readDriveFile(const std::string& folder) {
   const std::string path = pathIn(folder);
   if (!std::filesystem::exists(path)) return std::nullopt;
   try {
-    const YAML::Node file = YAML::LoadFile(path);
+    const YAML::Node file = loadYamlFile(path);
     DriveConfig config;
     forEachSetting(config, [&](const char* name, auto& value) {
       value = file[name].template as<std::decay_t<decltype(value)>>();

@@ -45,7 +45,7 @@ po::options_description mapperOptions() {
                         "class table: a name of config/classes, or a YAML file")(
       "config", po::value<std::string>()->value_name("FILE"), "YAML file of parameters")(
       "set", po::value<std::vector<std::string>>()->value_name("NAME=VALUE")->composing(),
-      "set a parameter (after --config); may be given often")(
+      "set a parameter, each once, after --config; may be given often")(
       "threads", po::value<std::string>()->value_name("N"), "threads of the update; 0 takes all cores");
   return options;
 }
@@ -60,10 +60,15 @@ MapperConfig mapperConfig(const po::variables_map& given) {
       if (equals == std::string::npos) {
         throw std::invalid_argument("--set " + setting + " has no '='; write --set name=value");
       }
-      values[setting.substr(0, equals)] = setting.substr(equals + 1);
+      const std::string name = setting.substr(0, equals);
+      if (!values.emplace(name, setting.substr(equals + 1)).second) {
+        throw std::invalid_argument("--set " + name + " is given twice; keep one");
+      }
     }
   }
-  if (given.count("threads")) values["threads"] = given["threads"].as<std::string>();
+  if (given.count("threads") && !values.emplace("threads", given["threads"].as<std::string>()).second) {
+    throw std::invalid_argument("parameter threads is given by --threads and by --set; keep one");
+  }
   setParameters(config, values);
   return config;
 }

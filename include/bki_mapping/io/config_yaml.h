@@ -9,7 +9,8 @@
 namespace bki_mapping {
 
 /// Reads a YAML file of nested maps as names with `/` between the parts, and values as text.
-/// @throws std::invalid_argument in one sentence: no such file, bad YAML, a value that is a list.
+/// @throws std::invalid_argument in one sentence: no such file, bad YAML (see yaml_file.h), a value that is a
+/// list, a name given twice.
 std::map<std::string, std::string> loadParameterFile(const std::string& file);
 
 /// The mapper's settings as such a file, each with a comment that tells values, unit and meaning.
