@@ -21,11 +21,13 @@ namespace po = tools::po;
 
 po::options_description options() {
   po::options_description options("Options");
-  options.add_options()("scans", po::value<int>()->value_name("N")->default_value(400),
-                        "length of the drive")("every", po::value<int>()->value_name("N")->default_value(5),
-                                               "scans between publishing")(
-      "csv", po::value<std::string>()->value_name("FILE"), "write every time, too")(
-      "view-range", po::value<double>()->value_name("M")->default_value(0.0), "parameter view_range [m]");
+  options.add_options()(
+      "scans", tools::countOption("--scans", 50, 1000000)->value_name("N")->default_value(400),
+      "length of the drive")("every", tools::countOption("--every", 1)->value_name("N")->default_value(5),
+                             "scans between publishing")("csv", po::value<std::string>()->value_name("FILE"),
+                                                         "write every time, too")(
+      "view-range", tools::realOption("--view-range", 0.0)->value_name("M")->default_value(0.0),
+      "parameter view_range [m]");
   return options;
 }
 
@@ -36,8 +38,8 @@ double median(std::vector<double> values) {
 }
 
 int measure(const po::variables_map& given) {
-  const auto scans = static_cast<std::size_t>(std::max(given["scans"].as<int>(), 50));
-  const auto every = static_cast<std::size_t>(std::max(given["every"].as<int>(), 1));
+  const auto scans = tools::count(given, "scans");
+  const auto every = tools::count(given, "every");
   ServerConfig config;
   config.view_range = given["view-range"].as<double>();
   SemanticMapper mapper(MapperConfig(), std::make_shared<const ClassTable>(loadClassTable(config.classes)));

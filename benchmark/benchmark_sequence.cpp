@@ -40,12 +40,13 @@ po::options_description options() {
   po::options_description options("Options");
   options.add(tools::sequenceOptions());
   options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "table to write")(
-      "warm-up", po::value<std::size_t>()->value_name("N")->default_value(3),
-      "first scans that are not timed")("repeats", po::value<int>()->value_name("N")->default_value(5),
+      "warm-up", tools::countOption("--warm-up", 0)->value_name("N")->default_value(3),
+      "first scans that are not timed")("repeats",
+                                        tools::countOption("--repeats", 1)->value_name("N")->default_value(5),
                                         "times that each mode maps the sequence anew")(
       "curves", po::value<std::string>()->value_name("DIR"),
       "measure simulated drives too, and write curves as CSV and PNG into this folder")(
-      "curve-scans", po::value<std::size_t>()->value_name("N")->default_value(2000),
+      "curve-scans", tools::countOption("--curve-scans", 2, 1000000)->value_name("N")->default_value(2000),
       "length of the drive over which the map grows");
   return options;
 }
@@ -88,8 +89,8 @@ void timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& fram
 int measure(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
-  const std::size_t warm_up = given["warm-up"].as<std::size_t>();
-  if (given["repeats"].as<int>() < 1) throw std::invalid_argument("--repeats must be at least 1");
+  const std::size_t warm_up = tools::count(given, "warm-up");
+  const std::size_t repeats = tools::count(given, "repeats");
   if (last - first <= warm_up) throw std::invalid_argument("there are no scans left after --warm-up");
   if (given.count("csv")) checkWritable(given["csv"].as<std::string>());
   std::vector<SequenceFrame> frames;
@@ -103,7 +104,7 @@ int measure(const po::variables_map& given) {
     const auto set = c.settings.find("resolution");
     const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
     Timing timings[2];  // with one thread, and with two
-    for (int repeat = 0; repeat < given["repeats"].as<int>(); ++repeat) {
+    for (std::size_t repeat = 0; repeat < repeats; ++repeat) {
       for (int threads = 1; threads <= 2; ++threads) {
         // The yardstick is taken each time, so that both sides of a ratio meet the same machine.
         timeYardstick(frames, warm_up, timings[threads - 1]);
@@ -125,7 +126,7 @@ int measure(const po::variables_map& given) {
   std::printf("peak memory of the whole run: %.0f MB\n", static_cast<double>(peakResidentBytes()) / 1e6);
   if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);
   if (given.count("curves")) {
-    benchmark::measureCurves(given["curves"].as<std::string>(), given["curve-scans"].as<std::size_t>());
+    benchmark::measureCurves(given["curves"].as<std::string>(), tools::count(given, "curve-scans"));
   }
   return 0;
 }

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The programs that need no ROS, called as a user calls them."""
+import array
 import csv
 import json
 import os
@@ -88,11 +89,12 @@ class Tools(unittest.TestCase):
             vertices = report['voxels']['free'] + report['voxels']['occupied']
             self.assertIn(f'element vertex {vertices}\n'.encode(), file.read(400))
 
-    def evaluation(self, *settings):
+    def evaluation(self, *settings, more=()):
         arguments = [word for setting in settings for word in ('--set', setting)]
         result = call('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
-                      *arguments)
+                      *arguments, *more)
         self.assertEqual(result.returncode, 0, result.stderr)
+        self.table = result.stdout
         with open(self.path('figures.json')) as file:
             return json.load(file)
 
@@ -117,6 +119,86 @@ class Tools(unittest.TestCase):
         self.assertGreater(hits_alone['truth']['occupied_recall'], lines['truth']['occupied_recall'])
         self.assertEqual(len(lines['truth']['by_distance']), 4)
         self.assertGreater(lines['voxels_by_class']['road'], 100)
+
+    def labels(self, name, change):
+        """A folder of labels beside the drive's own: each label as `change` makes it."""
+        folder = os.path.join(self.drive, name)
+        os.mkdir(folder)
+        self.addCleanup(shutil.rmtree, folder)
+        for file in os.listdir(os.path.join(self.drive, 'labels')):
+            labels = array.array('I')
+            with open(os.path.join(self.drive, 'labels', file), 'rb') as source:
+                labels.frombytes(source.read())
+            with open(os.path.join(folder, file), 'wb') as target:
+                target.write(array.array('I', [change(label) for label in labels]).tobytes())
+
+    def test_evaluation_of_class_ids(self):
+        table = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'classes', 'semantic_kitti.yaml')
+        ids = {}
+        with open(table) as file:
+            for number, raws in re.findall(r'id: (\d+),.*raw: \[([\d, ]+)\]', file.read()):
+                ids.update({int(raw): int(number) for raw in raws.split(',')})
+        self.labels('ids', lambda raw: ids[raw & 0xffff])
+        raw, by_id = self.evaluation(), self.evaluation('label_values=id', more=['--labels', 'ids'])
+        for figure in ('miou_map', 'accuracy_map', 'sa_ground', 'sa_other', 'floor_voxels', 'voxels_by_class', 'truth'):
+            self.assertEqual(raw[figure], by_id[figure], figure)
+        self.assertEqual(raw['labels_not_in_table'], 0)
+        self.assertEqual(by_id['labels_not_in_table'], 0)
+        self.assertEqual(by_id['static_points'], raw['static_points'] + self.count_moving())
+        self.assertIsNone(by_id['da'])
+        self.assertIn('ids do not tell what moves', self.table)
+        noisy = self.evaluation('label_values=id', more=['--labels', 'ids', '--label-noise', '0.3'])
+        self.assertAlmostEqual(noisy['accuracy_input'], 0.7, delta=0.02)
+        # Raw numbers taken for ids: most are none, and that is said.
+        wrong = self.evaluation('label_values=id')
+        self.assertGreater(wrong['labels_not_in_table'], 0.5 * raw['static_points'])
+        self.assertRegex(self.table, r'\d+ of \d+ labels are not in the class table semantic_kitti')
+
+    def count_moving(self):
+        count = 0
+        for file in os.listdir(os.path.join(self.drive, 'labels')):
+            labels = array.array('I')
+            with open(os.path.join(self.drive, 'labels', file), 'rb') as source:
+                labels.frombytes(source.read())
+            count += sum(252 <= label & 0xffff <= 259 for label in labels)
+        self.assertGreater(count, 0)
+        return count
+
+    def test_figures_of_nothing_are_no_numbers(self):
+        self.labels('unknown', lambda _: 7777)
+        nothing = self.evaluation(more=['--labels', 'unknown'])
+        self.assertIsNone(nothing['sa'])
+        self.assertNotIn('nan', self.table.lower())
+        self.assertRegex(self.table, r'SA +- % +of the points')
+        self.assertIn('7777', self.table)
+        first = self.evaluation(more=['--scans', '1'])
+        self.assertIsNone(first['da'])
+        self.assertNotIn('nan', self.table.lower())
+
+    def test_numbers_out_of_their_limits(self):
+        sequence = ('--sequence', self.drive)
+        for program in ('map_sequence', 'evaluate_map', 'benchmark_sequence'):
+            self.fails('--scans is 0, but must be at least 1', program, *sequence, '--scans', '0')
+            self.fails('--scans is -1, but must be at least 1', program, *sequence, '--scans', '-1')
+            self.fails('--first is -1, but must be at least 0', program, *sequence, '--first', '-1')
+            for word in ('1.5', 'nan', 'many', '', '99999999999999999999'):
+                self.fails('--scans', program, *sequence, '--scans', word)
+        self.fails('--late is -1', 'evaluate_map', *sequence, '--late', '-1')
+        self.fails('--noise-seed is -1', 'evaluate_map', *sequence, '--noise-seed', '-1')
+        for share in ('nan', '-0.1', '1.1', 'inf'):
+            self.fails('--label-noise is ', 'evaluate_map', *sequence, '--label-noise', share)
+        self.fails('--warm-up is -1', 'benchmark_sequence', *sequence, '--warm-up', '-1')
+        self.fails('--repeats is -1', 'benchmark_sequence', *sequence, '--repeats', '-1')
+        self.fails('--curve-scans is 1', 'benchmark_sequence', *sequence, '--curve-scans', '1')
+        output = self.path('never')
+        for option, values in {'scans': '-1 0 1000001', 'beams': '-1 0 1025', 'columns': '-1 0 100001',
+                               'rate': '-1 0 nan inf', 'max-range': '-1 0 nan inf', 'range-noise': '-1 nan inf',
+                               'label-noise': '-0.1 nan 2', 'speed': '-1 nan 101'}.items():
+            for value in values.split():
+                self.fails(f'{option} is {value}, but must be', 'simulate_drive', '--output', output, '--' + option,
+                           value)
+        self.fails('--seed is -1', 'simulate_drive', '--output', output, '--seed', '-1')
+        self.assertFalse(os.path.exists(output))
 
     def test_errors_are_drawn(self):
         picture = self.path('errors.png')
@@ -219,7 +301,7 @@ class Tools(unittest.TestCase):
         self.fails('cannot be read', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)
-        self.fails('beams must be', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
+        self.fails('beams is 0, but must be from 1 to 1024', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
 
     def test_what_is_no_file_is_refused_before_the_work(self):
         pipe, good = self.path('pipe'), self.path('good.json')

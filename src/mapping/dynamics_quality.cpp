@@ -12,14 +12,14 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
   const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
-    const auto id = classes.classOfRaw(scan.labels[i]);
+    const auto id = classes.classOf(scan.labels[i], labelValues(scan));
     if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
     const std::uint32_t number = number_.insert(index, fresh);
     if (number == fresh) voxels_.push_back({index});
     Voxel& voxel = voxels_[number];
-    const bool moving = moving_.count(scan.labels[i]) > 0;
+    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
     const SemanticClass& known = *classes.find(*id);
     voxel.ground_points += !moving && known.ground;
     voxel.standing_points += !moving && known.dynamic;

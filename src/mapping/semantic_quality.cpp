@@ -104,9 +104,9 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
                              const ClassTable& classes) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
-    const auto truth = classes.classOfRaw(scan.labels[i]);
+    const auto truth = classes.classOf(scan.labels[i], labelValues(scan));
     if (!truth || truth == classes.unlabelled() || !geometry_.contains(point)) continue;
-    input_.add(*truth, classes.classOfRaw(told[i]).value_or(kFreeClass));
+    input_.add(*truth, classes.classOf(told[i], labelValues(scan)).value_or(kFreeClass));
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
     const std::uint32_t number = number_.insert(index, fresh);
@@ -152,11 +152,11 @@ std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& cl
   std::vector<std::uint32_t> labels = scan.labels;
   std::vector<const SemanticClass*> others;
   for (const SemanticClass& c : classes.classes()) {
-    if (!c.unlabelled && !c.raw.empty()) others.push_back(&c);
+    if (!c.unlabelled && (scan.labels_are_ids || !c.raw.empty())) others.push_back(&c);
   }
   for (std::size_t i = 0; i < labels.size() && others.size() > 1; ++i) {
     if (counterRandom(seed, scan.stamp, i, 0) >= rate) continue;
-    const auto own = classes.classOfRaw(labels[i]);
+    const auto own = classes.classOf(labels[i], labelValues(scan));
     const double u = counterRandom(seed, scan.stamp, i, 1);
     // One of those that are not its own.
     const auto is_own = [&](const SemanticClass* c) { return own == c->id; };
@@ -164,7 +164,7 @@ std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& cl
     const std::size_t choices = others.size() - (mine == others.end() ? 0 : 1);
     auto chosen = static_cast<std::size_t>(u * static_cast<double>(choices));
     if (mine != others.end() && chosen >= static_cast<std::size_t>(mine - others.begin())) ++chosen;
-    labels[i] = others[chosen]->raw.front();
+    labels[i] = scan.labels_are_ids ? others[chosen]->id : others[chosen]->raw.front();
   }
   return labels;
 }

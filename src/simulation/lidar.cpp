@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/inference/counter_random.h"
 #include "bki_mapping/inference/parallel_for.h"
 
@@ -58,12 +59,23 @@ std::uint32_t randomLabel(const Scene& scene, double pick) {
 
 const DriveConfig& checked(const DriveConfig& config) {
   const LidarConfig& lidar = config.lidar;
-  if (config.scans < 1 || config.scans > 1000000 || !(config.speed >= 0.0 && config.speed <= 100.0)) {
-    throw std::invalid_argument("scans must be 1 to 1000000, speed 0 to 100 m/s");
-  }
-  if (lidar.beams < 1 || lidar.beams > 1024 || lidar.columns < 1 || lidar.columns > 100000 ||
-      !(lidar.rate > 0.0)) {
-    throw std::invalid_argument("beams must be 1 to 1024, columns 1 to 100000, rate above 0");
+  struct Limit {
+    const char* name;
+    double value, least, most;
+  };
+  for (const Limit& l : {Limit{"scans", static_cast<double>(config.scans), 1, 1e6},
+                         {"speed", config.speed, 0, 100},
+                         {"beams", static_cast<double>(lidar.beams), 1, 1024},
+                         {"columns", static_cast<double>(lidar.columns), 1, 100000},
+                         {"lowest", lidar.lowest, -kPi / 2, kPi / 2},
+                         {"highest", lidar.highest, -kPi / 2, kPi / 2},
+                         {"rate", lidar.rate, 1e-3, 1e6},
+                         {"max-range", lidar.max_range, 0.01, 1e4},
+                         {"range-noise", lidar.range_noise, 0, 100},
+                         {"label-noise", lidar.label_noise, 0, 1}}) {
+    if (l.value >= l.least && l.value <= l.most) continue;
+    throw std::invalid_argument(std::string(l.name) + " is " + numberText(l.value) + ", but must be from " +
+                                numberText(l.least) + " to " + numberText(l.most));
   }
   if (!(config.speed * config.scans / lidar.rate <= 1e6)) {  // before the street takes memory
     throw std::invalid_argument(

@@ -26,11 +26,11 @@ po::options_description options() {
   options.add_options()("json", po::value<std::string>()->value_name("FILE.json"), "figures to write")(
       "errors", po::value<std::string>()->value_name("FILE.png"),
       "picture of the errors from above to draw, with their FILE.csv beside it")(
-      "late", po::value<std::size_t>()->value_name("N")->default_value(3),
+      "late", tools::countOption("--late", 0)->value_name("N")->default_value(3),
       "voxels hit in the last N scans need not be cleared")(
-      "label-noise", po::value<double>()->value_name("SHARE")->default_value(0.0),
+      "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("SHARE")->default_value(0.0),
       "give the mapper this share of labels wrong")(
-      "noise-seed", po::value<std::uint64_t>()->value_name("N")->default_value(1),
+      "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
       "same seed, same wrong labels");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
@@ -43,11 +43,30 @@ struct Evaluation {
   std::optional<simulation::TruthEvaluation> truth;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
+  std::size_t labels = 0, unknown_labels = 0;
+  std::uint32_t unknown_label = 0;
+
+  /// @param told the labels that the mapper was given.
+  void add(const Scan& scan, const std::vector<std::uint32_t>& told, const ClassTable& classes) {
+    dynamics.add(scan, classes);
+    semantics.add(scan, told, classes);
+    if (truth) truth->add(scan);
+    labels += scan.labels.size();
+    for (const std::uint32_t label : scan.labels) {
+      if (classes.classOf(label, labelValues(scan))) continue;
+      ++unknown_labels;
+      unknown_label = label;
+    }
+  }
+
   tools::MapQuality compare(const SemanticMap& map) const {
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map);
     quality.semantics = semantics.compare(map);
     if (truth) quality.truth = truth->compare(map, end);
+    quality.labels = labels;
+    quality.unknown_labels = unknown_labels;
+    quality.unknown_label = unknown_label;
     forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
       if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
     });
@@ -82,7 +101,6 @@ int evaluate(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const double noise = given["label-noise"].as<double>();
-  if (!(noise >= 0.0 && noise <= 1.0)) throw std::invalid_argument("--label-noise must be a share, 0 to 1");
   if (given.count("errors") &&
       std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
     throw std::invalid_argument("--errors must end in .png");
@@ -92,7 +110,7 @@ int evaluate(const po::variables_map& given) {
   }
   const GridGeometry& geometry = mapper.map().geometry();
   Evaluation evaluation{DynamicsEvaluation(geometry, DynamicsEvaluation::movingOfSemanticKitti(),
-                                           last - first, given["late"].as<std::size_t>()),
+                                           last - first, tools::count(given, "late")),
                         SemanticEvaluation(geometry), std::nullopt};
   std::optional<simulation::Drive> drive;
   if (const auto config = simulation::readDriveFile(given["sequence"].as<std::string>())) {
@@ -101,16 +119,15 @@ int evaluate(const po::variables_map& given) {
   }
   std::vector<double> times;
   for (std::size_t i = first; i < last; ++i) {
-    const Scan scan = sequence.read(i).scan();
+    Scan scan = sequence.read(i).scan();
+    scan.labels_are_ids = mapper.config().label_values == LabelValues::kId;
     Scan told = scan;
     if (noise > 0.0) {
-      told.labels = withLabelNoise(scan, mapper.classes(), noise, given["noise-seed"].as<std::uint64_t>());
+      told.labels = withLabelNoise(scan, mapper.classes(), noise, tools::count(given, "noise-seed"));
     }
     times.push_back(mapper.integrate(told).totalMs());
-    evaluation.dynamics.add(scan, mapper.classes());
-    evaluation.semantics.add(scan, told.labels, mapper.classes());
+    evaluation.add(scan, told.labels, mapper.classes());
     if (drive) {
-      evaluation.truth->add(scan);
       evaluation.end = drive->timeOf(i);
       const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;
       if (count) evaluation.truth->countGhosts(mapper.map(), evaluation.end);
@@ -119,6 +136,7 @@ int evaluate(const po::variables_map& given) {
   }
   tools::MapQuality quality = evaluation.compare(mapper.map());
   quality.median_ms = quantile(times, 0.5);
+  quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
   std::cout << tools::qualityTable(quality, mapper.classes());
   if (given.count("json")) {
     writeTextFile(given["json"].as<std::string>(), tools::qualityJson(quality, mapper.classes()));

@@ -11,6 +11,32 @@
 #include "bki_mapping/io/config_yaml.h"
 
 namespace bki_mapping::tools {
+namespace {
+
+template <typename Number>
+po::typed_value<Number>* limited(const std::string& option, Number least, Number most) {
+  return po::value<Number>()->notifier([=](Number number) {
+    if (number >= least && number <= most) return;
+    const bool open = most == std::numeric_limits<Number>::max();
+    const auto text = [](Number n) { return numberText(static_cast<double>(n)); };
+    const std::string limits = open ? "at least " + text(least) : "from " + text(least) + " to " + text(most);
+    throw std::invalid_argument(option + " is " + text(number) + ", but must be " + limits);
+  });
+}
+
+}  // namespace
+
+po::typed_value<std::int64_t>* countOption(const std::string& option, std::int64_t least, std::int64_t most) {
+  return limited(option, least, most);
+}
+
+po::typed_value<double>* realOption(const std::string& option, double least, double most) {
+  return limited(option, least, most);
+}
+
+std::size_t count(const po::variables_map& given, const std::string& name) {
+  return static_cast<std::size_t>(given[name].as<std::int64_t>());
+}
 
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
                                          po::options_description options) {
@@ -79,12 +105,12 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given) {
 
 po::options_description sequenceOptions() {
   po::options_description options("Sequence");
-  const auto number = [](const char* name) { return po::value<std::size_t>()->value_name(name); };
   options.add_options()("sequence", po::value<std::string>()->value_name("DIR"),
                         "folder with velodyne/, labels/, poses.txt, calib.txt")(
       "labels", po::value<std::string>()->value_name("FOLDER")->default_value("labels"),
-      "name of the folder with labels")("first", number("N")->default_value(0), "first scan")(
-      "scans", number("N"), "how many; default all");
+      "name of the folder with labels")("first", countOption("--first", 0)->value_name("N")->default_value(0),
+                                        "first scan")("scans", countOption("--scans", 1)->value_name("N"),
+                                                      "how many; default all");
   return options;
 }
 
@@ -94,14 +120,14 @@ Sequence openSequence(const po::variables_map& given) {
 }
 
 std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence) {
-  const std::size_t first = given["first"].as<std::size_t>();
+  const std::size_t first = count(given, "first");
   if (first >= sequence.size()) {
     throw std::invalid_argument("--first " + std::to_string(first) + " is beyond the last of " +
                                 std::to_string(sequence.size()) + " scans");
   }
-  std::size_t count = sequence.size() - first;
-  if (given.count("scans")) count = std::min(count, given["scans"].as<std::size_t>());
-  return {first, first + count};
+  std::size_t scans = sequence.size() - first;
+  if (given.count("scans")) scans = std::min(scans, count(given, "scans"));
+  return {first, first + scans};
 }
 
 int run(const std::string& program, const std::function<int()>& body) {

@@ -23,7 +23,7 @@ po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   options.add_options()(
-      "rate", po::value<double>()->value_name("FACTOR")->default_value(1.0),
+      "rate", tools::realOption("--rate", 0.0)->value_name("FACTOR")->default_value(1.0),
       "1 is real time, 2 twice as fast; 0 waits until `mapping/status` acknowledges each scan")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
       "map-frame", text("FRAME")->default_value("map"), "frame of the map");
@@ -92,7 +92,6 @@ int play(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const double rate = given["rate"].as<double>();
-  if (!(rate >= 0.0)) throw std::invalid_argument("--rate must be 0 or more");
 
   Player player({given["map-frame"].as<std::string>(), given["frame"].as<std::string>()});
   player.waitForListener();

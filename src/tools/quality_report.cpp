@@ -1,5 +1,6 @@
 #include "bki_mapping/tools/quality_report.h"
 
+#include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -68,15 +69,22 @@ Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
   return figures;
 }
 
+/// With one decimal; "-" for figures of nothing.
+std::string figureText(double figure) {
+  if (!std::isfinite(figure)) return "-";
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << figure;
+  return text.str();
+}
+
 class Table {
  public:
   void share(const std::string& name, double share, const std::string& meaning) {
-    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << 100.0 * share << " %  "
-         << meaning << "\n";
+    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << figureText(100.0 * share)
+         << " %  " << meaning << "\n";
   }
   void text(const std::string& line) { out_ << line << "\n"; }
   std::string str() const { return out_.str(); }
-  Table() { out_ << std::fixed << std::setprecision(1); }
 
  private:
   std::ostringstream out_;
@@ -90,11 +98,9 @@ void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table
   table.share("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
   table.share("occupancy ECE", truth.occupancy.error(),
               "expected calibration error of the probability of occupancy");
-  std::ostringstream mean;
-  mean << std::fixed << std::setprecision(1) << truth.mean_ghosts;
   table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
-             " voxels of things that can move (none there for half a second); " + mean.str() +
-             " on average while mapping");
+             " voxels of things that can move (none there for half a second); " +
+             figureText(truth.mean_ghosts) + " on average while mapping");
 }
 
 }  // namespace
@@ -116,12 +122,19 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.share("ECE", s.reliability.error(), "expected calibration error of the class's probability");
   table.share("AUSE", s.sparsificationError, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
-  std::ostringstream end;
-  end << d.static_points << " points of standing and " << d.moving_points << " of moving things; median "
-      << quality.median_ms << " ms a scan";
-  table.text(end.str());
-  if (d.moving_points == 0) {
+  table.text(std::to_string(d.static_points) + " points of standing and " + std::to_string(d.moving_points) +
+             " of moving things; median " + figureText(quality.median_ms) + " ms a scan");
+  if (quality.labels_are_ids) {
+    table.text(
+        "class ids do not tell what moves, so DA and AA are not known, and all points count as standing");
+  } else if (d.moving_points == 0) {
     table.text("there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known");
+  }
+  if (quality.unknown_labels > 0) {
+    table.text(std::to_string(quality.unknown_labels) + " of " + std::to_string(quality.labels) +
+               " labels are not in the class table " + classes.name() + ", as " +
+               (quality.labels_are_ids ? "id " : "raw number ") + std::to_string(quality.unknown_label) +
+               ", and do not count; check --classes and --set label_values");
   }
   return table.str();
 }
@@ -148,7 +161,9 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"accuracy_input", s.input.accuracy()},
                   {"calibration_error", s.reliability.error()},
                   {"sparsification_error", s.sparsificationError},
-                  {"median_ms", quality.median_ms}};
+                  {"median_ms", quality.median_ms},
+                  {"labels_not_in_table", quality.unknown_labels},
+                  {"classes", Json::array()}};
   for (const SemanticClass& c : classes.classes()) {
     const auto voxels = quality.voxels_by_class.find(c.id);
     figures["voxels_by_class"][c.name] = voxels == quality.voxels_by_class.end() ? 0 : voxels->second;

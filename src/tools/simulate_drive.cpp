@@ -25,8 +25,9 @@ po::options_description options() {
                                                          "no return beyond this [m]")(
       "range-noise", value("M", lidar.range_noise), "standard deviation of ranges [m]")(
       "label-noise", value("SHARE", lidar.label_noise), "share of points with a wrong label")(
-      "speed", value("M/S", 8.0), "speed of the drive [m/s]")("seed", value<std::uint64_t>("N", 1),
-                                                              "same seed, same street and noise");
+      "speed", value("M/S", 8.0), "speed of the drive [m/s]")(
+      "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
+      "same seed, same street and noise");
   return options;
 }
 
@@ -34,7 +35,7 @@ simulation::DriveConfig driveConfig(const po::variables_map& given) {
   simulation::DriveConfig drive;
   drive.scans = given["scans"].as<int>();
   drive.speed = given["speed"].as<double>();
-  drive.seed = given["seed"].as<std::uint64_t>();
+  drive.seed = tools::count(given, "seed");
   drive.lidar.beams = given["beams"].as<int>();
   drive.lidar.columns = given["columns"].as<int>();
   drive.lidar.rate = given["rate"].as<double>();

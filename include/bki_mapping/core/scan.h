@@ -39,6 +39,11 @@ struct Scan {
   std::uint64_t stamp = 0;
 };
 
+/// What the labels of a scan are that is judged without a mapper's settings.
+inline LabelValues labelValues(const Scan& scan) {
+  return scan.labels_are_ids ? LabelValues::kId : LabelValues::kRaw;
+}
+
 /// A scan from points of the sensor's own frame. The rotation is rounded to 2^-30 (0.1 um at 100 m), so that
 /// a pose gives the same map to the bit whether it comes from a file or, interpolated, from tf.
 /// @param T_map_sensor pose of the sensor in the map frame. @param points in the sensor frame [m].

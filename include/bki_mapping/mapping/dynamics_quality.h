@@ -36,7 +36,8 @@ struct DynamicsQuality {
   double dynamicAccuracy() const { return share(moving_removed, moving_points); }      ///< DA
   double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
   double harmonicAccuracy() const {                                                    ///< HA
-    return 2.0 * staticAccuracy() * dynamicAccuracy() / (staticAccuracy() + dynamicAccuracy());
+    const double sum = staticAccuracy() + dynamicAccuracy();
+    return sum == 0.0 ? 0.0 : 2.0 * staticAccuracy() * dynamicAccuracy() / sum;
   }
 
  private:
@@ -66,7 +67,7 @@ class DynamicsEvaluation {
       : geometry_(geometry), moving_(std::move(moving)), scans_(scans), late_(late) {}
 
   /// Adds the next scan. Points that are not finite, or whose class is none or the unlabelled one, do not
-  /// count.
+  /// count. Ids of the class table do not tell what moves: points so labelled all count as standing.
   void add(const Scan& scan, const ClassTable& classes);
 
   DynamicsQuality compare(const SemanticMap& map) const;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <boost/program_options.hpp>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -22,6 +24,16 @@ namespace po = boost::program_options;
 /// @return nothing if help was asked for (and printed). @throws std::invalid_argument in one sentence.
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
                                          po::options_description options);
+
+/// An option that takes a whole number, read with count(). parse() refuses other words and numbers out of the
+/// limits, NaN and signs too, by the option's name.
+po::typed_value<std::int64_t>* countOption(const std::string& option, std::int64_t least,
+                                           std::int64_t most = std::numeric_limits<std::int64_t>::max());
+/// The same for a number.
+po::typed_value<double>* realOption(const std::string& option, double least,
+                                    double most = std::numeric_limits<double>::max());
+/// The value of a countOption.
+std::size_t count(const po::variables_map& given, const std::string& name);
 
 /// Options that tools with a mapper share: --classes, --config, --set, --threads.
 po::options_description mapperOptions();

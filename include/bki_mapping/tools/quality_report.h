@@ -16,9 +16,12 @@ struct MapQuality {
   std::optional<simulation::TruthQuality> truth;   ///< of simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< time of a scan
+  bool labels_are_ids = false;                     ///< which do not tell what moves
+  std::size_t labels = 0, unknown_labels = 0;      ///< of all points; of these, not in the class table
+  std::uint32_t unknown_label = 0;                 ///< one of these
 };
 
-/// A table, one figure a line, with what it means.
+/// A table, one figure a line, with what it means; "-" for shares of nothing.
 std::string qualityTable(const MapQuality& quality, const ClassTable& classes);
 
 /// JSON; docs/files.md describes it. Shares of nothing are null.
