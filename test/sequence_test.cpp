@@ -99,7 +99,7 @@ TEST_F(SequenceFolder, NamesFaultsOfLabelsAndScans) {
 
 TEST_F(SequenceFolder, NamesFaultsOfPoses) {
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
-  expectFault("has 1 poses for 2 scans; scan 000001 has none");
+  expectFault("poses.txt has no line 2 for scan 000001");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n");
   expectFault("has 11 numbers, but needs 12");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 nan 0 1 0 0 0 0 1 0\n");
@@ -110,13 +110,97 @@ TEST_F(SequenceFolder, NamesFaultsOfPoses) {
 
 TEST_F(SequenceFolder, NamesFaultsOfCalibrationAndTimes) {
   replace("times.txt", "0\n");
-  expectFault("has 1 times for 2 scans");
+  expectFault("times.txt has no line 2 for scan 000001");
   replace("times.txt", "0\n-1\n");
   expectFault("time must be from 0");
   replace("calib.txt", "Tr: 1 0 0 0 0 1 0 0 0 0 0 0\n");
   expectFault("determinant 0.0");
   replace("calib.txt", "P0: 1 0 0 0\n");
   expectFault("no line 'Tr:'");
+}
+
+/// Five scans, a metre and a tenth of a second apart.
+class LongerSequence : public SequenceFolder {
+ protected:
+  void SetUp() override {
+    SequenceWriter writer(folder_ / "drive");
+    for (int i = 0; i < 5; ++i) writer.write(frameAt(i, static_cast<std::uint64_t>(i) * 100000000));
+    writer.finish();
+  }
+  void remove(const std::string& number) {
+    std::filesystem::remove(folder_ / ("drive/velodyne/" + number + ".bin"));
+    std::filesystem::remove(folder_ / ("drive/labels/" + number + ".label"));
+  }
+  void rename(const std::string& from, const std::string& to) {
+    for (const auto& [kind, ending] : {std::pair("velodyne/", ".bin"), std::pair("labels/", ".label")}) {
+      const std::string start = folder_ / (std::string("drive/") + kind);
+      std::filesystem::rename(start + from + ending, start + to + ending);
+    }
+  }
+  /// Every scan has the pose and the time of its number.
+  void expectPairedByNumber(const std::vector<std::size_t>& numbers) {
+    const Sequence sequence(folder_ / "drive");
+    ASSERT_EQ(sequence.size(), numbers.size());
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto x = static_cast<double>(numbers[i]);
+      EXPECT_EQ(sequence.number(i), numbers[i]);
+      EXPECT_NEAR(sequence.read(i).T_map_sensor.translation().x(), x, 1e-9) << sequence.name(i);
+      EXPECT_EQ(sequence.read(i).stamp, Sequence::kFirstStamp + numbers[i] * 100000000u) << sequence.name(i);
+    }
+  }
+  std::string gaps() { return Sequence(folder_ / "drive").gaps(); }
+};
+
+TEST_F(LongerSequence, PosesAndTimesBelongToTheNumberOfAScan) {
+  expectPairedByNumber({0, 1, 2, 3, 4});
+  EXPECT_EQ(gaps(), "");
+  remove("000001");
+  expectPairedByNumber({0, 2, 3, 4});
+  EXPECT_EQ(gaps(), "scan 000001 is missing in " + (folder_ / "drive/velodyne"));
+  remove("000003");
+  expectPairedByNumber({0, 2, 4});
+  EXPECT_EQ(gaps(), "scans 000001, 000003 are missing in " + (folder_ / "drive/velodyne"));
+  std::filesystem::remove(folder_ / "drive/times.txt");
+  expectPairedByNumber({0, 2, 4});
+}
+
+TEST_F(LongerSequence, TheMapFrameIsThatOfTheFirstPoseThoughItsScanIsMissing) {
+  remove("000000");
+  expectPairedByNumber({1, 2, 3, 4});
+  EXPECT_EQ(gaps(), "") << "a part of a sequence has no gap before it";
+  remove("000002");
+  remove("000003");
+  expectPairedByNumber({1, 4});
+  EXPECT_EQ(gaps(), "scans 000002 to 000003 are missing in " + (folder_ / "drive/velodyne"));
+}
+
+TEST_F(LongerSequence, AnEmptyLineIsALineToo) {
+  replace("poses.txt",
+          "1 0 0 0 0 1 0 0 0 0 1 0\n\n1 0 0 2 0 1 0 0 0 0 1 0\n1 0 0 3 0 1 0 0 0 0 1 0\n"
+          "1 0 0 4 0 1 0 0 0 0 1 0\n\n");
+  expectFault("poses.txt line 2 has 0 numbers");
+  remove("000001");
+  expectPairedByNumber({0, 2, 3, 4});
+}
+
+TEST_F(LongerSequence, NumbersNeedNotBePadded) {
+  rename("000003", "3");
+  rename("000004", "0000000004");
+  expectPairedByNumber({0, 1, 2, 3, 4});
+}
+
+TEST_F(LongerSequence, NamesThatPairWithNothingAreRefused) {
+  rename("000004", "000009");
+  expectFault("poses.txt has no line 10 for scan 000009");
+  rename("000009", "99999999999999999999999");
+  expectFault("99999999999999999999999");
+  rename("99999999999999999999999", "3");
+  expectFault("scans 000003 and 3 have the same number");
+  for (const char* name : {"last", "-3", "3a", "0x3", "1.5"}) {
+    rename("3", name);
+    expectFault(std::string(name) + ".bin is not named by the number of its scan");
+    rename(name, "3");
+  }
 }
 
 TEST_F(SequenceFolder, TheWriterRefusesAFolderInUse) {

@@ -303,6 +303,27 @@ class Tools(unittest.TestCase):
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)
         self.fails('beams is 0, but must be from 1 to 1024', 'simulate_drive', '--output', self.path('x'), '--beams', '0')
 
+    def test_a_missing_scan_shifts_nothing(self):
+        gap = self.path('gap')
+        shutil.copytree(self.drive, gap)
+        os.remove(os.path.join(gap, 'velodyne', '000001.bin'))
+        said = f'scan 000001 is missing in {gap}/velodyne; the others keep their poses and times\n'
+        maps = []
+        for sequence, first in ((self.drive, '2'), (gap, '2'), (gap, '1')):
+            path = self.path('part.ply')
+            result = call('map_sequence', '--sequence', sequence, '--first', first, '--scans', '2', '--output', path)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(result.stderr, said if sequence == gap else '')
+            with open(path, 'rb') as file:
+                maps.append(file.read())
+        self.assertEqual(maps[0], maps[1], '--first is the number of a scan')
+        self.assertEqual(maps[0], maps[2], 'the first scan there is from --first on')
+        result = call('evaluate_map', '--sequence', gap, '--json', self.path('gap.json'))
+        self.assertEqual((result.returncode, result.stderr), (0, said))
+        with open(self.path('gap.json')) as file:
+            self.assertGreater(json.load(file)['truth']['occupied_near'], 0.98)
+        self.assertEqual(call('benchmark_sequence', '--sequence', gap, '--repeats', '1', '--warm-up', '0').stderr, said)
+
     def test_what_is_no_file_is_refused_before_the_work(self):
         pipe, good = self.path('pipe'), self.path('good.json')
         os.mkfifo(pipe)

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -23,7 +25,7 @@ std::ifstream openFile(const fs::path& path, const std::string& remedy) {
   return file;
 }
 
-/// The numbers of each line that is not empty.
+/// The numbers of each line; empty lines at the end are left out.
 std::vector<std::vector<double>> readNumberLines(const fs::path& path, const std::string& remedy) {
   std::ifstream file = openFile(path, remedy);
   std::vector<std::vector<double>> lines;
@@ -38,8 +40,9 @@ std::vector<std::vector<double>> readNumberLines(const fs::path& path, const std
              "' is no finite number");
       }
     }
-    if (!numbers.empty()) lines.push_back(numbers);
+    lines.push_back(numbers);
   }
+  while (!lines.empty() && lines.back().empty()) lines.pop_back();
   return lines;
 }
 
@@ -87,53 +90,96 @@ std::vector<T> readBinary(const fs::path& path, std::size_t record) {
   return values;
 }
 
-std::vector<std::string> scanNames(const fs::path& folder) {
+/// The names of scans, without their ending, by number.
+std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     fail(folder.string() + " is no folder; give the folder of a sequence, with velodyne/ inside");
   }
-  std::vector<std::string> names;
+  std::map<std::size_t, std::string> names;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == ".bin") names.push_back(entry.path().stem().string());
+    if (entry.path().extension() != ".bin") continue;
+    const std::string name = entry.path().stem().string();
+    std::size_t number = 0;
+    const char* const end = name.data() + name.size();
+    const auto [rest, error] = std::from_chars(name.data(), end, number);
+    if (error != std::errc() || rest != end) {
+      fail(entry.path().string() + " is not named by the number of its scan; rename it to NNNNNN.bin, line " +
+           "NNNNNN + 1 of poses.txt being its pose, or move it elsewhere");
+    }
+    const auto [place, is_new] = names.emplace(number, name);
+    if (!is_new) {
+      fail(folder.string() + ": scans " + std::min(place->second, name) + " and " +
+           std::max(place->second, name) + " have the same number; remove one");
+    }
   }
   if (names.empty()) fail(folder.string() + " holds no scans (*.bin)");
-  std::sort(names.begin(), names.end());
   return names;
+}
+
+/// The line of a scan, counted from 1.
+const std::vector<double>& lineOf(const std::vector<std::vector<double>>& lines, const fs::path& file,
+                                  std::size_t number, const std::string& scan) {
+  if (number < lines.size()) return lines[number];
+  fail(file.string() + " has no line " + std::to_string(number + 1) + " for scan " + scan + ", but " +
+       std::to_string(lines.size()) + " lines; line 1 belongs to scan 000000");
+}
+
+std::string sixDigits(std::size_t number) {
+  const std::string digits = std::to_string(number);
+  return std::string(6 - std::min<std::size_t>(digits.size(), 6), '0') + digits;
 }
 
 }  // namespace
 
-Sequence::Sequence(const std::string& folder, const std::string& labels)
-    : folder_(folder), labels_(labels), names_(scanNames(fs::path(folder) / "velodyne")) {
-  const fs::path root(folder);
+Sequence::Sequence(const std::string& folder, const std::string& labels) : folder_(folder), labels_(labels) {
+  const fs::path root(folder), poses_file = root / "poses.txt", times_file = root / "times.txt";
+  const auto names = scanNames(root / "velodyne");
   const Eigen::Isometry3d T_camera_sensor = readCalibration(root / "calib.txt");
-  const auto poses = readNumberLines(root / "poses.txt", "a sequence needs a pose a scan");
-  if (poses.size() < names_.size()) {
-    fail((root / "poses.txt").string() + " has " + std::to_string(poses.size()) + " poses for " +
-         std::to_string(names_.size()) + " scans; scan " + names_[poses.size()] + " has none");
-  }
-  Eigen::Isometry3d T_first = Eigen::Isometry3d::Identity();
-  for (std::size_t i = 0; i < names_.size(); ++i) {
-    const std::string what = (root / "poses.txt").string() + " line " + std::to_string(i + 1);
-    const Eigen::Isometry3d T = T_camera_sensor.inverse() * rigid(poses[i], what) * T_camera_sensor;
-    if (i == 0) T_first = T;
-    poses_.push_back(T_first.inverse() * T);
-  }
-  std::vector<std::vector<double>> times;
-  if (fs::exists(root / "times.txt")) {
-    times = readNumberLines(root / "times.txt", "check its rights");
-    if (times.size() < names_.size()) {
-      fail((root / "times.txt").string() + " has " + std::to_string(times.size()) + " times for " +
-           std::to_string(names_.size()) + " scans");
+  const auto poses = readNumberLines(poses_file, "a sequence needs a pose a scan");
+  const bool timed = fs::exists(times_file);
+  const auto times = timed ? readNumberLines(times_file, "check its rights") : poses;
+  const auto pose = [&](std::size_t number, const std::string& name) {
+    const auto& numbers = lineOf(poses, poses_file, number, name);
+    const std::string what = poses_file.string() + " line " + std::to_string(number + 1);
+    return Eigen::Isometry3d(T_camera_sensor.inverse() * rigid(numbers, what) * T_camera_sensor);
+  };
+  const Eigen::Isometry3d T_first = pose(0, sixDigits(0));
+  for (const auto& [number, name] : names) {
+    numbers_.push_back(number);
+    names_.push_back(name);
+    poses_.push_back(T_first.inverse() * pose(number, name));
+    double seconds = 0.1 * static_cast<double>(number);
+    if (timed) {
+      const auto& line = lineOf(times, times_file, number, name);
+      if (line.empty()) {
+        fail(times_file.string() + " line " + std::to_string(number + 1) + " is empty, but scan " + name +
+             " needs a time");
+      }
+      seconds = line.front();
     }
-  }
-  for (std::size_t i = 0; i < names_.size(); ++i) {
-    const double seconds = times.empty() ? 0.1 * static_cast<double>(i) : times[i].front();
     if (!(seconds >= 0.0 && seconds < 4e9)) {
-      fail((root / "times.txt").string() + " line " + std::to_string(i + 1) +
+      fail(times_file.string() + " line " + std::to_string(number + 1) +
            ": the time must be from 0 to 4e9 s, as ROS stamps are");
     }
     stamps_.push_back(kFirstStamp + static_cast<std::uint64_t>(std::llround(seconds * 1e9)));
   }
+}
+
+std::string Sequence::gaps() const {
+  constexpr std::size_t kMostNamed = 10;
+  std::string text;
+  std::size_t missing = 0, ranges = 0;
+  for (std::size_t i = 1; i < numbers_.size(); ++i) {
+    const std::size_t from = numbers_[i - 1] + 1, to = numbers_[i] - 1;
+    if (from > to) continue;
+    missing += to - from + 1;
+    if (++ranges > kMostNamed) continue;
+    text += (text.empty() ? "" : ", ") + sixDigits(from) + (from < to ? " to " + sixDigits(to) : "");
+  }
+  if (missing == 0) return "";
+  if (ranges > kMostNamed) text += " and others (" + std::to_string(missing) + " in all)";
+  return (missing == 1 ? "scan " + text + " is" : "scans " + text + " are") + " missing in " +
+         (fs::path(folder_) / "velodyne").string();
 }
 
 SequenceFrame Sequence::read(std::size_t i) const {

@@ -128,7 +128,7 @@ int evaluate(const po::variables_map& given) {
     times.push_back(mapper.integrate(told).totalMs());
     evaluation.add(scan, told.labels, mapper.classes());
     if (drive) {
-      evaluation.end = drive->timeOf(i);
+      evaluation.end = drive->timeOf(sequence.number(i));
       const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;
       if (count) evaluation.truth->countGhosts(mapper.map(), evaluation.end);
     }

@@ -109,22 +109,27 @@ po::options_description sequenceOptions() {
                         "folder with velodyne/, labels/, poses.txt, calib.txt")(
       "labels", po::value<std::string>()->value_name("FOLDER")->default_value("labels"),
       "name of the folder with labels")("first", countOption("--first", 0)->value_name("N")->default_value(0),
-                                        "first scan")("scans", countOption("--scans", 1)->value_name("N"),
-                                                      "how many; default all");
+                                        "number of the first scan, as in its file's name")(
+      "scans", countOption("--scans", 1)->value_name("N"), "how many of those there are; default all");
   return options;
 }
 
 Sequence openSequence(const po::variables_map& given) {
   if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
-  return Sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  const std::string gaps = sequence.gaps();
+  if (!gaps.empty()) std::cerr << gaps << "; the others keep their poses and times\n";
+  return sequence;
 }
 
 std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence) {
-  const std::size_t first = count(given, "first");
-  if (first >= sequence.size()) {
-    throw std::invalid_argument("--first " + std::to_string(first) + " is beyond the last of " +
-                                std::to_string(sequence.size()) + " scans");
+  const std::size_t number = count(given, "first"), last = sequence.size() - 1;
+  if (number > sequence.number(last)) {
+    throw std::invalid_argument("--first " + std::to_string(number) + " is beyond the last scan, " +
+                                sequence.name(last));
   }
+  std::size_t first = 0;
+  while (sequence.number(first) < number) ++first;
   std::size_t scans = sequence.size() - first;
   if (given.count("scans")) scans = std::min(scans, count(given, "scans"));
   return {first, first + scans};

@@ -43,10 +43,11 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 
 /// Options that tools with a sequence share: --sequence, --labels, --first, --scans.
 po::options_description sequenceOptions();
-/// The sequence asked for. @throws std::invalid_argument if --sequence is missing, std::runtime_error as
-/// Sequence.
+/// The sequence asked for; says on standard error which scans are missing. @throws std::invalid_argument if
+/// --sequence is missing, std::runtime_error as Sequence.
 Sequence openSequence(const po::variables_map& given);
-/// The frames asked for, from first to before last. @throws std::invalid_argument if there are none.
+/// The places of the frames asked for, from first to before last. @throws std::invalid_argument if there are
+/// none.
 std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence);
 
 /// Runs a program; an exception becomes one line on standard error and exit status 1.
