@@ -12,8 +12,6 @@ import rospy
 import rostest
 from bki_mapping.msg import MappingStatus
 from bki_mapping.srv import SaveMap
-from geometry_msgs.msg import TransformStamped
-from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import Listener, program, wait_until  # noqa: E402
@@ -71,37 +69,6 @@ class Replay(unittest.TestCase):
             run('sequence_to_bag', '--sequence', self.drive, '--output', bag, '--compression', compression)
             replayed = self.map_of_launch('line', 'replay.launch', f'bag:={bag}', 'rate:=0.5')
             self.assertTrue(replayed == self.expected_map('line'), 'the maps differ')
-
-    def luminar(self, bag, *launch, transform=True):
-        """The status after a real bag without labels and tf has been played."""
-        status = Listener('/mapping/status', MappingStatus)
-        if transform:
-            pose = TransformStamped()
-            pose.header.frame_id, pose.child_frame_id = 'map', 'luminar_lidar'
-            pose.transform.translation.z = 2.0
-            pose.transform.rotation.w = 1.0
-            publisher = rospy.Publisher('/tf_static', TFMessage, queue_size=1, latch=True)
-            publisher.publish(TFMessage([pose]))
-            self.addCleanup(publisher.unregister)
-        server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', 'replay.launch', f'bag:={bag}', 'rviz:=false',
-                                   'cloud_topic:=/luminar_pointcloud', *launch])
-        try:
-            return status.wait_for(lambda m: m.received == 5 and m.waiting == 0, 'dealing with five clouds')
-        finally:
-            server.terminate()
-            server.wait(30)
-            wait_until(lambda: status.subscriber.get_num_connections() == 0, 'the launch ending')
-
-    def test_a_real_bag_without_labels_and_tf(self):
-        bag = os.path.join(os.environ.get('BKI_MAPPING_TEST_DATA', ''), 'bags/luminar_no_label_no_tf.bag')
-        if not os.path.isfile(bag):
-            print(f'SKIPPED: no {bag}; set BKI_MAPPING_TEST_DATA to the folder with bags/', file=sys.stderr)
-            self.skipTest('no real bag')
-        self.assertEqual(self.luminar(bag, transform=False).dropped_unknown_frame, 5)
-        self.assertEqual(self.luminar(bag).dropped_bad_cloud, 5)
-        status = self.luminar(bag, 'labelled:=false', 'classes:=occupancy')
-        self.assertEqual((status.integrated, status.labels_not_in_table), (5, 0))
-        self.assertGreater(status.blocks, 100)
 
     def test_programs_refuse_what_they_do_not_know(self):
         for name in ('play_sequence', 'sequence_to_bag'):

@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""A test that has nothing to test on is shown by ctest as skipped, not as passed."""
+import json
+import os
+import re
+import subprocess
+import unittest
+
+ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
+
+
+class Skips(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        listed = subprocess.run(['ctest', '--test-dir', os.environ['BKI_MAPPING_BUILD'], '--show-only=json-v1'],
+                                capture_output=True, text=True, timeout=60, check=True)
+        cls.tests = {test['name']: test for test in json.loads(listed.stdout)['tests']}
+
+    def outcome(self, name, **data):
+        """What ctest makes of a test's exit status and output, with this data alone."""
+        properties = {p['name']: p['value'] for p in self.tests[name]['properties']}
+        environment = {key: value for key, value in os.environ.items() if key != 'BKI_MAPPING_TEST_DATA'}
+        run = subprocess.run(self.tests[name]['command'], capture_output=True, text=True, timeout=60, check=False,
+                             env={**environment, **data})
+        output = run.stdout + run.stderr
+        if run.returncode == properties.get('SKIP_RETURN_CODE', -1) or \
+                any(re.search(words, output) for words in properties.get('SKIP_REGULAR_EXPRESSION', [])):
+            return 'skipped'
+        return 'passed' if run.returncode == 0 else 'failed'
+
+    def test_without_real_data(self):
+        self.assertEqual(self.outcome('real_data_test'), 'skipped')
+        self.assertEqual(self.outcome('real_data_test', BKI_MAPPING_TEST_DATA='/no/such'), 'failed')
+        if 'real_bag_rostest' in self.tests:
+            self.assertEqual(self.outcome('real_bag_rostest'), 'skipped')
+
+    def test_what_tests_something_is_not_skipped(self):
+        self.assertEqual(self.outcome('grid_geometry_test'), 'passed')
+
+    def test_no_test_skips_a_part_of_itself(self):
+        """ctest would hide what skips among tests that do not: it has a program of its own, listed here."""
+        for folder, _, files in os.walk(os.path.join(ROOT, 'test')):
+            for name in files:
+                with open(os.path.join(folder, name)) as file:
+                    skips = re.search(r'GTEST_SKIP|skipTest|SkipTest|unittest\.skip', file.read())
+                if skips and name != os.path.basename(__file__):
+                    self.assertEqual(name, 'real_data_test.cpp')
+
+
+if __name__ == '__main__':
+    unittest.main()
