@@ -172,7 +172,8 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
   if (config.kernel.type == KernelType::kSparse &&
       config.kernel.lengthFor(config.resolution) < half_diagonal) {
     warnings.push_back("kernel/length " + numberText(config.kernel.length) +
-                       " m is below half a voxel's diagonal, " + numberText(half_diagonal) +
+                       " m is below half a voxel's diagonal, " +
+                       numberText(std::round(1e3 * half_diagonal) / 1e3) +
                        " m: hits that reach no voxel's centre are lost; leave kernel/length 0, or make "
                        "resolution finer");
   }

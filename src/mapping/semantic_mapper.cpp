@@ -117,6 +117,7 @@ void SemanticMapper::reset() {
 
 void SemanticMapper::recover() noexcept {
   pipeline_ = nullptr;
+  if (map_.size() == 0) map_.clear();  // what a refused scan has left of the index
   block_bytes_ = 0;
   for (const SemanticMap::Entry& entry : map_.entries()) block_bytes_ += entry.block->bytes();
   returnMemory();
