@@ -9,6 +9,7 @@
 #include "bki_mapping/ros/cloud_conversion.h"
 #include "bki_mapping/ros/no_returns.h"
 #include "bki_mapping/ros/pose_conversion.h"
+#include "cloud_maker.h"
 
 namespace bki_mapping::ros_shell {
 namespace {
@@ -234,6 +235,58 @@ TEST(Labels, TopKNamesTheLikeliest) {
   EXPECT_EQ(labels.unknown.at(12345), 1u);
   input.score_fields = "p1";
   EXPECT_THROW(readCloud(cloud, input, classes(), LabelValues::kRaw), std::invalid_argument);
+}
+
+/// The shares of the only point of a cloud with the scores of a car and a road.
+std::vector<ClassShare> sharesOf(double car, double road, ScoreType type, std::uint8_t datatype) {
+  CloudMaker maker({{1, 2, 3}});
+  maker.add("car", datatype, {car}).add("road", datatype, {road});
+  InputConfig input;
+  input.label_encoding = LabelEncoding::kScores;
+  input.score_fields = "car=car,road=road";
+  input.score_type = type;
+  const CloudLabels labels = readCloud(maker.message(), input, classes(), LabelValues::kRaw).labels;
+  return {labels.soft.begin(0), labels.soft.end(0)};
+}
+
+TEST(Labels, ScoresOfAnySizeBecomeSharesInProportion) {
+  const auto expect = [](const std::vector<ClassShare>& shares, float car, float road) {
+    ASSERT_EQ(shares.size(), static_cast<std::size_t>(car > 0.0f) + static_cast<std::size_t>(road > 0.0f));
+    for (const ClassShare& s : shares) EXPECT_FLOAT_EQ(s.share, s.id == idOf("car") ? car : road);
+  };
+  constexpr auto kProbability = ScoreType::kProbability, kLogit = ScoreType::kLogit;
+  constexpr std::uint8_t kFloat = PointField::FLOAT32, kDouble = PointField::FLOAT64;
+  const double inf = INFINITY, great = std::numeric_limits<double>::max();
+  expect(sharesOf(1e39, 3e39, kProbability, kDouble), 0.25f, 0.75f);  // beyond a float
+  expect(sharesOf(great, great, kProbability, kDouble), 0.5f, 0.5f);  // their sum is beyond a double
+  expect(sharesOf(3e38, 3e38, kProbability, kFloat), 0.5f, 0.5f);     // their sum is beyond a float
+  expect(sharesOf(1e-320, 3e-320, kProbability, kDouble), 1.0f / 4.0f, 3.0f / 4.0f);
+  expect(sharesOf(0.5, -1e300, kProbability, kDouble), 1.0f, 0.0f);
+  expect(sharesOf(-0.0, 2.0, kProbability, kDouble), 0.0f, 1.0f);
+  expect(sharesOf(-inf, 2.0, kProbability, kDouble), 0.0f, 1.0f);
+  expect(sharesOf(1e308, -1e308, kLogit, kDouble), 1.0f, 0.0f);
+  expect(sharesOf(3e7, 3e7 + std::log(3.0), kLogit, kDouble), 0.25f, 0.75f);  // a float has whole steps there
+  expect(sharesOf(-inf, -1e308, kLogit, kDouble), 0.0f, 1.0f);                // impossible, and certain
+  // Nothing can be made of these: to leave the score out would give the point to the other class.
+  for (const ScoreType type : {kProbability, kLogit}) {
+    for (const double bad : {inf, static_cast<double>(NAN)}) {
+      expect(sharesOf(bad, 2.0, type, kDouble), 0.0f, 0.0f);
+      expect(sharesOf(bad, bad, type, kFloat), 0.0f, 0.0f);
+    }
+  }
+  expect(sharesOf(-inf, -inf, kLogit, kFloat), 0.0f, 0.0f);
+  expect(sharesOf(0.0, -1.0, kProbability, kFloat), 0.0f, 0.0f);
+}
+
+TEST(Labels, ANumberThatIsNoColourIsNotWhite) {
+  InputConfig input;
+  input.label_encoding = LabelEncoding::kRgb;
+  input.color_match = ColorMatch::kNearest;
+  CloudMaker maker(std::vector<Eigen::Vector3f>(3, {1, 2, 3}));
+  maker.add("label", PointField::FLOAT64, {NAN, -1.0, 1e300});
+  const CloudLabels labels = readCloud(maker.message(), input, classes(), LabelValues::kRaw).labels;
+  EXPECT_EQ(labels.labels, (std::vector<std::uint32_t>(3, kNoLabel)));
+  EXPECT_EQ(labels.unknown.at(kNoLabel), 3u);
 }
 
 TEST(NoReturns, InfinityPointsTheWay) {

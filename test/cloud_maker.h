@@ -4,8 +4,12 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "bki_mapping/ros/point_field.h"
@@ -62,13 +66,21 @@ class CloudMaker {
     std::vector<double> values;
   };
 
+  /// Whole numbers take the nearest value that they can hold, and 0 for NaN.
   template <typename T>
   static void copy(double value, std::uint8_t* out) {
+    if constexpr (std::is_integral_v<T>) {
+      const double low = std::numeric_limits<T>::min(), high = std::numeric_limits<T>::max();
+      value = std::isnan(value) ? 0.0 : std::clamp(value, low, high);
+    }
     const T typed = static_cast<T>(value);
     std::memcpy(out, &typed, sizeof(T));
   }
   static void write(std::uint8_t datatype, double value, std::uint8_t* out) {
     using sensor_msgs::PointField;
+    if (datatype == PointField::INT8) copy<std::int8_t>(value, out);
+    if (datatype == PointField::INT16) copy<std::int16_t>(value, out);
+    if (datatype == PointField::INT32) copy<std::int32_t>(value, out);
     if (datatype == PointField::UINT8) copy<std::uint8_t>(value, out);
     if (datatype == PointField::UINT16) copy<std::uint16_t>(value, out);
     if (datatype == PointField::UINT32) copy<std::uint32_t>(value, out);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "bki_mapping/core/map_query.h"
 #include "bki_mapping/io/class_table_yaml.h"
@@ -171,6 +172,99 @@ TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {
   const ScanStats stats = mapper.integrate(placed(cloud(many).message()).scan);
   EXPECT_EQ(stats.counts.used, 2000000u);
   EXPECT_GT(stats.hits, 1000u);
+}
+
+/// Values that sensors and networks do not give, but broken ones do.
+std::vector<double> extremes() {
+  using F = std::numeric_limits<float>;
+  using D = std::numeric_limits<double>;
+  std::vector<double> values = {0.0, 0.1, 1.0, 10.0, 255.0, 4294967295.0, NAN, 1e39};
+  for (const double x : {static_cast<double>(F::denorm_min()), static_cast<double>(F::min()),
+                         static_cast<double>(F::max()), D::denorm_min(), D::max(), D::infinity()}) {
+    values.push_back(x);
+  }
+  for (std::size_t i = 0, n = values.size(); i < n; ++i) values.push_back(-values[i]);
+  return values;
+}
+
+/// Every share is positive and finite, and those of a point add up to 1, or it has none.
+void expectShares(const SoftLabels& soft) {
+  for (std::size_t i = 0; i < soft.size(); ++i) {
+    double sum = 0.0;
+    for (const ClassShare* s = soft.begin(i); s != soft.end(i); ++s) {
+      ASSERT_TRUE(std::isfinite(s->share) && s->share > 0.0f) << s->share;
+      sum += s->share;
+    }
+    if (soft.begin(i) != soft.end(i)) {
+      ASSERT_NEAR(sum, 1.0, 1e-6);
+    }
+  }
+}
+
+void expectSaneEvidence(const SemanticMap& map) {
+  for (const auto& entry : map.entries()) {
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelView view = judgeVoxel(map, *entry.block, v);
+      ASSERT_TRUE(std::isfinite(view.probability) && std::isfinite(view.variance));
+      for (const ClassId id : entry.block->classes()) {
+        const float evidence = entry.block->evidence(id)[v];
+        ASSERT_TRUE(std::isfinite(evidence) && evidence >= 0.0f) << evidence << " of class " << int{id};
+      }
+    }
+  }
+}
+
+TEST_F(Reader, NoLabelOrScoreBringsNonsenseIntoTheMap) {
+  pose("sensor", 100.0, {0, 0, 0});
+  // A point for each pair of extreme values, 1 m from one another.
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> a, b, car, road;
+  for (const double x : extremes()) {
+    for (const double y : extremes()) {
+      const auto n = static_cast<float>(points.size());
+      points.emplace_back(3.5f + std::fmod(n, 30.0f), 0.5f + std::floor(n / 30.0f), 0.5f);
+      a.push_back(x);
+      b.push_back(y);
+      car.push_back(10.0);
+      road.push_back(40.0);
+    }
+  }
+  for (const std::uint8_t type :
+       {PointField::INT8, PointField::UINT8, PointField::INT16, PointField::UINT16, PointField::INT32,
+        PointField::UINT32, PointField::FLOAT32, PointField::FLOAT64}) {
+    CloudMaker maker(points);
+    maker.add("a", type, a).add("b", type, b);
+    maker.add("car", PointField::UINT8, car).add("road", PointField::UINT8, road);
+    const sensor_msgs::PointCloud2 message = maker.message();
+    const auto flood = [&](LabelEncoding encoding, const std::string& labels, const std::string& scores) {
+      input_.label_encoding = encoding;
+      input_.label_field = labels;
+      input_.score_fields = scores;
+      for (const ScoreType score : {ScoreType::kProbability, ScoreType::kLogit}) {
+        for (const ColorMatch match : {ColorMatch::kExact, ColorMatch::kNearest}) {
+          input_.score_type = score;
+          input_.color_match = match;
+          SCOPED_TRACE("datatype " + std::to_string(type) + ", labels " + labels + ", scores " + scores);
+          const Scan scan = placed(message).scan;
+          expectShares(scan.soft);
+          SemanticMapper mapper(MapperConfig(), classes());
+          const PointCounts counts = mapper.integrate(scan).counts;
+          EXPECT_EQ(counts.points, counts.used + counts.unknown_label);
+          expectSaneEvidence(mapper.map());
+        }
+      }
+    };
+    flood(LabelEncoding::kNumber, "a", "");
+    for (const auto encoding : {LabelEncoding::kRgb, LabelEncoding::kBgr}) {
+      flood(encoding, "a", "");
+      flood(encoding, "a,b,a", "");
+    }
+    flood(LabelEncoding::kScores, "", "car=a,road=b");
+    flood(LabelEncoding::kTopK, "car,road", "a,b");  // scores at the edge
+    flood(LabelEncoding::kTopK, "a,b", "car,road");  // labels at the edge
+    flood(LabelEncoding::kTopK, "car,car", "a,b");   // the same label twice
+    if (HasFatalFailure()) return;
+  }
 }
 
 TEST_F(Reader, SureLabelsGiveTheSameMapInEveryEncoding) {

@@ -34,11 +34,13 @@ class ColorReader : public LabelReader {
   }
 
  private:
-  /// 0xRRGGBB, or kNoLabel for parts that are no bytes.
+  /// 0xRRGGBB, or kNoLabel for values that are no colour.
   std::uint32_t colorAt(const std::uint8_t* point) const {
     std::uint32_t color = 0;
     if (fields_.size() == 1) {
-      color = fields_[0].bits(point) & 0xffffffu;  // the highest byte may hold an alpha
+      const auto packed = fields_[0].bits(point);
+      if (!packed) return kNoLabel;
+      color = *packed & 0xffffffu;  // the highest byte may hold an alpha
     } else {
       for (const FieldReader& field : fields_) {
         const double part = std::round(field(point));

@@ -103,9 +103,10 @@ double FieldReader::operator()(const std::uint8_t* point) const {
   }
 }
 
-std::uint32_t FieldReader::bits(const std::uint8_t* point) const {
+std::optional<std::uint32_t> FieldReader::bits(const std::uint8_t* point) const {
   if (sizeOf(datatype_) == 4) return load<std::uint32_t>(point + offset_, swap_);
-  return label(point);
+  const std::uint32_t number = label(point);
+  return number == kNoLabel ? std::nullopt : std::optional(number);
 }
 
 std::uint32_t FieldReader::label(const std::uint8_t* point) const {

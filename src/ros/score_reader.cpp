@@ -15,56 +15,77 @@ class ShareReader : public LabelReader {
   explicit ShareReader(ScoreType type) : type_(type) {}
 
   void append(const std::uint8_t* point, CloudLabels& out) override {
-    shares_.clear();
-    collect(point, out);
+    scores_.clear();
+    usable_ = true;
+    const bool any_known = collect(point, out);
     out.are_ids = true;
     out.soft.startPoint();
-    std::sort(shares_.begin(), shares_.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
     if (type_ == ScoreType::kLogit) exponentiate();
-    mergeEqual();
-    float sum = 0.0f;
-    for (const ClassShare& s : shares_) sum += s.share;
-    const ClassShare* best = nullptr;
-    for (ClassShare& s : shares_) {
-      s.share /= sum;
-      out.soft.add(s);
-      if (!best || s.share > best->share) best = &s;
-    }
-    if (!best) out.countUnknown(kNoLabel);
+    const Score* best = nullptr;
+    if (usable_) best = appendShares(out.soft);
+    if (!best && any_known) out.countUnknown(kNoLabel);
     out.labels.push_back(best ? best->id : kNoLabel);
   }
 
  protected:
-  /// Appends the classes of a point with their scores to shares_.
-  virtual void collect(const std::uint8_t* point, CloudLabels& out) = 0;
+  /// Hands the classes of a point with their scores to add(). @return false if it has counted why there are
+  /// none.
+  virtual bool collect(const std::uint8_t* point, CloudLabels& out) = 0;
 
+  /// A score of minus infinity is that of an impossible class. Of NaN or infinity nothing can be made, and
+  /// without it the shares of the others would be too large.
   void add(ClassId id, double score) {
-    if (std::isfinite(score)) shares_.push_back({id, static_cast<float>(score)});
+    usable_ = usable_ && !std::isnan(score) && score != INFINITY;
+    if (std::isfinite(score)) scores_.push_back({id, score});
   }
 
  private:
+  struct Score {
+    ClassId id;
+    double value;
+  };
+
   void exponentiate() {
-    float most = -INFINITY;
-    for (const ClassShare& s : shares_) most = std::max(most, s.share);
-    for (ClassShare& s : shares_) s.share = std::exp(s.share - most);
+    double most = -INFINITY;
+    for (const Score& s : scores_) most = std::max(most, s.value);
+    for (Score& s : scores_) s.value = std::exp(s.value - most);
   }
 
-  /// Leaves out what is not positive, and adds up several labels of one class.
+  /// Leaves out what is not positive, and adds up several labels of one class. Scores are in units of the
+  /// largest then, since sums of others may be beyond the range of numbers.
   void mergeEqual() {
+    double most = 0.0;
+    for (const Score& s : scores_) most = std::max(most, s.value);
+    std::sort(scores_.begin(), scores_.end(), [](const Score& a, const Score& b) { return a.id < b.id; });
     std::size_t kept = 0;
-    for (const ClassShare& s : shares_) {
-      if (!(s.share > 0.0f)) continue;
-      if (kept > 0 && shares_[kept - 1].id == s.id) {
-        shares_[kept - 1].share += s.share;
+    for (const Score& s : scores_) {
+      if (!(s.value > 0.0)) continue;
+      if (kept > 0 && scores_[kept - 1].id == s.id) {
+        scores_[kept - 1].value += s.value / most;
       } else {
-        shares_[kept++] = s;
+        scores_[kept++] = {s.id, s.value / most};
       }
     }
-    shares_.resize(kept);
+    scores_.resize(kept);
+  }
+
+  /// @return the likeliest class, if there is any.
+  const Score* appendShares(SoftLabels& soft) {
+    mergeEqual();
+    double sum = 0.0;
+    for (const Score& s : scores_) sum += s.value;
+    const Score* best = nullptr;
+    for (const Score& s : scores_) {
+      const auto share = static_cast<float>(s.value / sum);
+      if (share > 0.0f) soft.add({s.id, share});  // it may be too small for a float
+      if (!best || s.value > best->value) best = &s;
+    }
+    return best;
   }
 
   ScoreType type_;
-  std::vector<ClassShare> shares_;
+  bool usable_ = true;
+  std::vector<Score> scores_;
 };
 
 /// One score a class.
@@ -101,8 +122,9 @@ class ScoresReader : public ShareReader {
   }
 
  private:
-  void collect(const std::uint8_t* point, CloudLabels&) override {
+  bool collect(const std::uint8_t* point, CloudLabels&) override {
     for (const auto& [id, field] : fields_) add(id, field(point));
+    return true;
   }
 
   std::vector<std::pair<ClassId, FieldReader>> fields_;
@@ -126,15 +148,19 @@ class TopKReader : public ShareReader {
   }
 
  private:
-  void collect(const std::uint8_t* point, CloudLabels& out) override {
+  bool collect(const std::uint8_t* point, CloudLabels& out) override {
+    bool any_known = false;
     for (std::size_t k = 0; k < labels_.size(); ++k) {
       const std::uint32_t label = labels_[k].label(point);
-      if (const auto id = classes_.classOf(label, values_)) {
+      const auto id = classes_.classOf(label, values_);
+      if (id) {
         add(*id, scores_[k](point));
       } else {
         out.countUnknown(label);
       }
+      any_known |= id.has_value();
     }
+    return any_known;
   }
 
   std::vector<FieldReader> labels_, scores_;

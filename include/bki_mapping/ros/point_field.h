@@ -4,6 +4,7 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,8 +25,9 @@ class FieldReader {
 
   /// The value. @param point first byte of a point.
   double operator()(const std::uint8_t* point) const;
-  /// The 32 bits of a FLOAT32, INT32 or UINT32 as they are; the rounded value of other datatypes.
-  std::uint32_t bits(const std::uint8_t* point) const;
+  /// The 32 bits of a FLOAT32, INT32 or UINT32 as they are; the rounded value of other datatypes, or none if
+  /// that is no number of 32 bits.
+  std::optional<std::uint32_t> bits(const std::uint8_t* point) const;
   /// The label number that the value names, rounded; kNoLabel if it names none.
   std::uint32_t label(const std::uint8_t* point) const;
   bool integer() const;  ///< whether the datatype is a whole number
