@@ -1,6 +1,10 @@
 // Every cloud is accounted for: the queue, the ledger, the judgement on them, and time jumps.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
 #include "bki_mapping/ros/load_advice.h"
 #include "bki_mapping/ros/map_publishing.h"
 #include "bki_mapping/ros/mapping_diagnostics.h"
@@ -135,13 +139,99 @@ TEST(LoadAdvice, SaysHowFarBehindAndWhatWouldHelp) {
   const std::string text = loadAdvice(config, 240.0, 10.0);
   for (const char* words :
        {"240 ms", "every 100 ms", "2.4 times too slow",
-        "resolution 0.6, kernel/length 0.6 and downsample_resolution 0.2 would take about 101 ms",
-        "free_space/extent mapped about 158 ms", "linear with one sample a beam about 58 ms",
+        "resolution 0.6, kernel/length 0.6 and downsample_resolution 0.2 would take about 96 ms",
+        "free_space/extent mapped about ", "linear with one sample a beam about ",
         "sensor_model/max_range"}) {
     EXPECT_NE(text.find(words), std::string::npos) << words << " is not in: " << text;
   }
   config.free_space.mode = "none";
   EXPECT_EQ(loadAdvice(config, 240.0, 10.0).find("free_space"), std::string::npos);
+}
+
+std::string document(const std::string& name) {
+  std::ifstream in(BKI_MAPPING_SOURCE_DIR "/docs/" + name);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// The cells of the table's row that begins with `first`, in the text behind `heading`.
+std::vector<std::string> rowOf(const std::string& text, const std::string& heading,
+                               const std::string& first) {
+  const std::size_t row = text.find("\n| " + first + " |", text.find(heading));
+  std::vector<std::string> cells;
+  if (row == std::string::npos) return cells;
+  std::istringstream line(text.substr(row + 3, text.find('\n', row + 1) - row - 3));
+  for (std::string cell; std::getline(line, cell, '|');) {
+    const std::size_t begin = cell.find_first_not_of(' ');
+    if (begin != std::string::npos)
+      cells.push_back(cell.substr(begin, cell.find_last_not_of(' ') + 1 - begin));
+  }
+  return cells;
+}
+
+/// The median of a mode on SemanticKITTI 04 with two threads [ms].
+double documentedMedian(const std::string& mode) {
+  const auto cells = rowOf(document("performance.md"), "## SemanticKITTI 04", mode + " | 0.3 | 2");
+  if (cells.size() < 4) throw std::runtime_error("docs/performance.md has no row of " + mode);
+  return std::stod(cells[3]);
+}
+
+FreeSpaceConfig freeSpace(const std::string& mode, int samples = 1,
+                          FreeSpaceExtent extent = FreeSpaceExtent::kObserved) {
+  FreeSpaceConfig config;
+  config.mode = mode;
+  config.samples_per_beam = samples;
+  config.extent = extent;
+  return config;
+}
+
+TEST(LoadAdvice, EstimatesWhatTheDocumentsSay) {
+  const std::string tuning = document("tuning.md");
+  const auto coarser = rowOf(tuning, "## It is slow",
+                             "`resolution`, `kernel/length` and "
+                             "`downsample_resolution` twice as coarse");
+  const auto nearer = rowOf(tuning, "## It is slow", "`sensor_model/max_range` 30");
+  ASSERT_EQ(coarser.size(), 5u);
+  ASSERT_EQ(nearer.size(), 5u);
+  const double linear = documentedMedian("linear, 1 sample"),
+               mapped = documentedMedian("line, bilinear, mapped");
+  struct Row {
+    std::string name;
+    FreeSpaceConfig free_space;
+    std::size_t column;  // in the table of docs/tuning.md
+  };
+  for (const Row& row :
+       std::vector<Row>{{"none", freeSpace("none"), 1},
+                        {"linear, 1 sample", freeSpace("linear"), 2},
+                        {"linear, 5 samples", freeSpace("linear", 5), 2},
+                        {"uniform, 1 sample", freeSpace("uniform"), 2},
+                        {"even, gap 1 m", freeSpace("even"), 2},
+                        {"line, bilinear, mapped", freeSpace("line", 1, FreeSpaceExtent::kMapped), 3},
+                        {"line, bilinear, observed", freeSpace("line"), 4}}) {
+    MapperConfig config;
+    config.free_space = row.free_space;
+    config.sensor_model.max_range = 60.0;
+    const double median = documentedMedian(row.name), now = 100.0 * median;
+    const std::string text = loadAdvice(config, now, 10.0);
+    // The time that the text gives behind some words [ms], or -1.
+    const auto estimate = [&](const std::string& words) {
+      const std::size_t at = text.find(words);
+      return at == std::string::npos ? -1.0 : std::stod(text.substr(at + words.size()));
+    };
+    const auto expectAbout = [&](double share, const std::string& cell) {
+      const std::size_t to = cell.find(" to ");
+      const double low = std::stod(cell),
+                   high = to == std::string::npos ? low : std::stod(cell.substr(to + 4));
+      EXPECT_GE(share, low - 0.006) << row.name << ", " << cell;
+      EXPECT_LE(share, high + 0.006) << row.name << ", " << cell;
+    };
+    EXPECT_NEAR(estimate("one sample a beam about "), median > linear ? 100.0 * linear : -1.0, 1.0) << text;
+    const bool observed = row.name.find("observed") != std::string::npos;
+    EXPECT_NEAR(estimate("extent mapped about "), observed ? 100.0 * mapped : -1.0, 1.0) << text;
+    expectAbout(estimate("would take about ") / now, coarser[row.column]);
+    expectAbout(estimate("max_range 30 about ") / now, nearer[row.column]);
+  }
 }
 
 TEST(TimeWatch, NoticesTimeGoingBack) {

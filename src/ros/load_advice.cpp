@@ -8,21 +8,42 @@
 namespace bki_mapping::ros_shell {
 namespace {
 
-/// Time of a mode in that of mode none: SemanticKITTI 04, two threads, from docs/performance.md.
-double costOf(const FreeSpaceConfig& free_space) {
-  if (free_space.mode == "none") return 1.0;
-  if (free_space.mode == "even") return 7.9 / free_space.gap;
-  if (free_space.mode == "line") return free_space.extent == FreeSpaceExtent::kObserved ? 8.5 : 5.6;
-  return 1.65 + 0.39 * free_space.samples_per_beam;
+/// Median times of a scan [ms], of SemanticKITTI 04 with two threads. A test compares them with
+/// docs/performance.md.
+struct Medians {
+  double none = 5.1;
+  double linear = 10.4;    ///< one sample a beam
+  double linear_5 = 22.9;  ///< five
+  double uniform = 11.5;   ///< one
+  double even = 45.9;      ///< gap 1 m
+  double line_mapped = 25.5;
+  double line_observed = 37.0;
+};
+
+/// The time of a mode on 04 [ms].
+double timeOf(const FreeSpaceConfig& free_space) {
+  const Medians measured;
+  if (free_space.mode == "none") return measured.none;
+  if (free_space.mode == "even") return measured.none + (measured.even - measured.none) / free_space.gap;
+  if (free_space.mode == "line") {
+    return free_space.extent == FreeSpaceExtent::kObserved ? measured.line_observed : measured.line_mapped;
+  }
+  const double one = free_space.mode == "uniform" ? measured.uniform : measured.linear;
+  return one + (measured.linear_5 - measured.linear) / 4.0 * (free_space.samples_per_beam - 1);
 }
 
-/// Time of a scan with resolution, kernel and down-sampling twice as coarse, and with half the range, in that
-/// of now: measured on SemanticKITTI 04 and 00, 0.39 to 0.45 for lines, 0.55 to 0.72 for the others; 0.64 to
-/// 1.
-double costOfCoarser(const std::string& mode) {
-  return mode == "line" ? 0.42 : 0.62;
+/// Times after a change, in that of now.
+struct Savings {
+  double coarser;  ///< resolution, kernel and down-sampling twice as coarse
+  double nearer;   ///< half the range
+};
+
+/// The middle of the ranges in docs/tuning.md, with which a test compares them.
+Savings savingsOf(const FreeSpaceConfig& free_space) {
+  if (free_space.mode == "none") return {0.68, 0.76};
+  if (free_space.mode != "line") return {0.63, 0.85};
+  return free_space.extent == FreeSpaceExtent::kObserved ? Savings{0.40, 0.71} : Savings{0.45, 0.72};
 }
-constexpr double kCostOfHalfTheRange = 0.8;
 
 std::string rounded(double length) {
   return numberText(std::round(1e3 * length) / 1e3);
@@ -44,26 +65,27 @@ std::string loadAdvice(const MapperConfig& config, double integration_ms, double
   std::string text = "an integration takes " + milliseconds(integration_ms) + ", but clouds come every " +
                      milliseconds(1e3 / received_hz) + ": mapping is " +
                      numberText(std::round(10.0 * load) / 10.0) + " times too slow";
+  const Savings savings = savingsOf(config.free_space);
   text += "; resolution " + rounded(2.0 * config.resolution) + ", kernel/length " +
           rounded(2.0 * config.kernel.lengthFor(config.resolution)) + " and downsample_resolution " +
           rounded(2.0 * config.downsample_resolution) + " would take about " +
-          milliseconds(integration_ms * costOfCoarser(config.free_space.mode));
+          milliseconds(integration_ms * savings.coarser);
   FreeSpaceConfig mapped = config.free_space, linear = config.free_space;
   mapped.extent = FreeSpaceExtent::kMapped;
   linear.mode = "linear";
   linear.samples_per_beam = 1;
-  const double now = costOf(config.free_space);
-  if (config.free_space.mode == "line" && costOf(mapped) < now) {
-    text += "; free_space/extent mapped about " + milliseconds(integration_ms * costOf(mapped) / now);
+  const double now = timeOf(config.free_space);
+  if (config.free_space.mode == "line" && timeOf(mapped) < now) {
+    text += "; free_space/extent mapped about " + milliseconds(integration_ms * timeOf(mapped) / now);
   }
-  if (costOf(linear) < now) {
+  if (timeOf(linear) < now) {
     text += "; free_space/mode linear with one sample a beam about " +
-            milliseconds(integration_ms * costOf(linear) / now);
+            milliseconds(integration_ms * timeOf(linear) / now);
   }
   const double range = config.sensor_model.max_range;
   if (range > 0.0) {
     text += "; sensor_model/max_range " + numberText(range / 2.0) + " about " +
-            milliseconds(integration_ms * kCostOfHalfTheRange);
+            milliseconds(integration_ms * savings.nearer);
   } else {
     text += "; sensor_model/max_range leaves out what is far";
   }
