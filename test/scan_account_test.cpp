@@ -255,5 +255,50 @@ TEST(TimeWatch, NoticesTimeGoingBack) {
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(1.0)));
 }
 
+/// The places in a row of stamps of one input [s] at which time is said to jump back; it then starts anew, as
+/// in the server.
+std::vector<std::size_t> jumpsIn(const std::vector<double>& stamps) {
+  TimeWatch watch;
+  std::vector<std::size_t> jumps;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (!watch.stampsWentBack(0, ros::Time(stamps[i]))) continue;
+    jumps.push_back(i);
+    watch.restart();
+  }
+  return jumps;
+}
+
+TEST(TimeWatch, AJumpTakesTwoCloudsThatAgree) {
+  using Places = std::vector<std::size_t>;
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 100.3, 100.4}), Places{}) << "one outlier far ahead";
+  EXPECT_EQ(jumpsIn({100, 100.1, 105, 100.2, 100.3, 100.4}), Places{}) << "one a little ahead";
+  EXPECT_EQ(jumpsIn({150, 100, 100.1, 100.2}), Places{}) << "the very first is one";
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 130, 100.2, 100.3}), Places{}) << "two ahead that do not agree";
+  EXPECT_EQ(jumpsIn({100, 100.1, 130, 150, 100.2, 100.3}), Places{}) << "the same, the nearer one first";
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 150.1, 100.3, 100.4}), Places{}) << "two ahead, one at a time";
+  EXPECT_EQ(jumpsIn({100, 100.1, 50, 100.2, 100.3}), Places{}) << "one outlier behind";
+  EXPECT_EQ(jumpsIn({100, 100.1, 50, 20, 100.2, 100.3}), Places{}) << "two behind that do not agree";
+  EXPECT_EQ(jumpsIn({100, 100.1, 99.5, 99.6, 100.2}), Places{}) << "out of order by less than a second";
+  EXPECT_EQ(jumpsIn({100, 100.1, 160, 160.1, 160.2}), Places{}) << "a pause";
+  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2}), Places{3}) << "a bag that starts again";
+  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2, 100, 100.1, 20, 20.1}), (Places{3, 8})) << "twice";
+  EXPECT_EQ(jumpsIn({100, 102, 104, 20, 22, 24}), Places{4}) << "the same with a slow sensor";
+  EXPECT_EQ(jumpsIn({100, 0, 100.1, 0, 20, 0, 20.1}), Places{6}) << "stamps of 0 in between say nothing";
+  EXPECT_EQ(jumpsIn({100, 100.1, 0, 150, 0, 100.2, 0, 100.3}), Places{}) << "nor do they confirm an outlier";
+}
+
+TEST(TimeWatch, EachInputHasItsOwnTime) {
+  TimeWatch watch;
+  for (int i = 0; i < 20; ++i) {
+    const double t = 0.1 * i;
+    EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(100.0 + t)));
+    EXPECT_FALSE(watch.stampsWentBack(1, ros::Time(50.0 + t))) << "its clock is 50 s behind";
+    EXPECT_FALSE(watch.stampsWentBack(2, ros::Time(i % 5 == 0 ? 500.0 + t : 100.0 + t))) << "strays";
+  }
+  EXPECT_FALSE(watch.stampsWentBack(1, ros::Time(20.0)));
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(102.0)));
+  EXPECT_TRUE(watch.stampsWentBack(1, ros::Time(20.1)));
+}
+
 }  // namespace
 }  // namespace bki_mapping::ros_shell
