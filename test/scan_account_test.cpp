@@ -10,6 +10,7 @@
 #include "bki_mapping/ros/mapping_diagnostics.h"
 #include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/scan_queue.h"
+#include "bki_mapping/ros/sentence_throttle.h"
 #include "bki_mapping/ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
@@ -63,7 +64,8 @@ TEST(ScanLedger, AddsUp) {
   stats.counts.used = 6;
   stats.counts.no_returns = 3;
   stats.update_ms = 20.0;
-  for (int i = 0; i < 14; ++i) ledger.received(now);
+  const std::size_t clouds = 1 + dropKinds().size() + 3;  // integrated, dropped, waiting
+  for (std::size_t i = 0; i < clouds; ++i) ledger.received(now);
   ledger.integrated(header, stats, 0.25, now);
   EXPECT_EQ(ledger.status(now, 3).points_dropped, 1u);
   EXPECT_EQ(ledger.status(now, 3).latency_median_ms, 250.0f);
@@ -71,16 +73,17 @@ TEST(ScanLedger, AddsUp) {
   for (const DropKind& kind : dropKinds()) {
     EXPECT_EQ(&kind - dropKinds().data(), static_cast<std::ptrdiff_t>(kind.reason));
     const std::uint64_t before = ledger.status(now, 3).*kind.count;
-    ledger.dropped(header, kind.reason);
+    ledger.dropped(header, kind.reason, "set this or that");
     EXPECT_EQ(ledger.status(now, 3).*kind.count, before + 1);
-    EXPECT_EQ(ledger.status(now, 3).last_drop, kind.name);
+    EXPECT_EQ(ledger.status(now, 3).last_drop, "set this or that");
+    EXPECT_EQ(ledger.status(now, 3).last_drop_reason, kind.name);
     EXPECT_FALSE(ledger.status(now, 3).integrated_last);
   }
   EXPECT_EQ(ledger.droppedClouds(), dropKinds().size());
   EXPECT_EQ(ledger.status(now, 3).waiting, 3u);
-  EXPECT_EQ(ledger.status(now, 3).received, 1 + dropKinds().size() + 3);
+  EXPECT_EQ(ledger.status(now, 3).received, clouds);
   const std::string text = ledger.summary(3);
-  EXPECT_NE(text.find("Mapped 1 of 14 clouds"), std::string::npos) << text;
+  EXPECT_NE(text.find("Mapped 1 of " + std::to_string(clouds) + " clouds"), std::string::npos) << text;
   EXPECT_NE(text.find("1 queue full"), std::string::npos) << text;
   EXPECT_NE(text.find("3 were still waiting"), std::string::npos) << text;
 }
@@ -96,6 +99,33 @@ TEST(ScanLedger, TellsUnknownLabelsApart) {
   for (std::uint32_t label = 1000; label < 2000; ++label) many[label] = 1;
   ledger.unknownLabels(many);
   EXPECT_EQ(ledger.status(Clock::time_point(), 0).unknown_labels.size(), 64u);
+}
+
+TEST(SentenceThrottle, RepeatsNoSentenceWhateverItsNumbers) {
+  SentenceThrottle throttle;
+  const Clock::time_point start;
+  EXPECT_TRUE(throttle.allow("/front: the cloud has no field 'label'", start));
+  EXPECT_TRUE(throttle.allow("/rear: the cloud has no field 'class'", start)) << "another fault";
+  EXPECT_FALSE(throttle.allow("/front: the cloud has no field 'label'", start + milliseconds(4900)));
+  EXPECT_TRUE(throttle.allow("/front: the cloud has no field 'label'", start + milliseconds(5000)));
+  EXPECT_TRUE(throttle.allow("the latest transform is 35 ms older", start));
+  EXPECT_FALSE(throttle.allow("the latest transform is -1.5 ms older", start));
+}
+
+TEST(SentenceThrottle, IsBounded) {
+  SentenceThrottle throttle;
+  const Clock::time_point start;
+  std::size_t allowed = 0;
+  for (int second = 0; second < 100; ++second) {
+    for (char a = 'a'; a <= 'z'; ++a) {
+      for (char b = 'a'; b <= 'z'; ++b) {
+        allowed +=
+            throttle.allow(std::string("no frame '") + a + b + "'", start + std::chrono::seconds(second));
+      }
+    }
+  }
+  EXPECT_LE(allowed, 100 / 5 * SentenceThrottle::kMost);
+  EXPECT_GE(allowed, 100 / 5 * SentenceThrottle::kMost / 2);
 }
 
 TEST(Diagnostics, JudgeWhatHappened) {

@@ -10,7 +10,6 @@
 namespace bki_mapping::ros_shell {
 namespace {
 
-constexpr auto kSayAgainAfter = std::chrono::seconds(5);
 /// How long the thread sleeps while nothing, or while a transform, is waited for [s].
 constexpr double kIdleWait = 0.1, kTransformWait = 0.005;
 
@@ -99,14 +98,15 @@ void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
   const ros::Time& stamp = cloud->header.stamp;
   if (time_watch_.stampsWentBack(input, stamp)) onTimeJump(stamp, "the stamps of clouds went back");
   ledger_.received(now);
-  if (paused_) return drop(*cloud, DropReason::kPaused, "mapping is paused; call ~resume to go on");
+  if (paused_)
+    return drop({cloud, input, now}, DropReason::kPaused, "mapping is paused; call ~resume to go on");
   // It has waited for this call while the last scan was mapped.
   const double since = std::max(0.0, ros::Time::now().toSec() - event.getReceiptTime().toSec());
   const auto received =
       now - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::min(since, 60.0)));
   const auto most = static_cast<std::size_t>(config_.queue_size);
   if (const auto given_up = waiting_.push({cloud, input, received}, most, config_.queue_policy)) {
-    drop(*given_up->cloud, DropReason::kQueueFull,
+    drop(*given_up, DropReason::kQueueFull,
          "queue_size " + std::to_string(config_.queue_size) +
              " is reached: clouds come faster than they are mapped, or wait for transforms; use a faster "
              "free_space/mode, a coarser resolution or fewer clouds, or check tf");
@@ -126,24 +126,24 @@ void MappingServer::processQueue() {
 void MappingServer::map(const WaitingCloud& waiting) {
   const sensor_msgs::PointCloud2& cloud = *waiting.cloud;
   if (cloud.width == 0 || cloud.height == 0) {
-    return drop(cloud, DropReason::kEmpty, "it has no points; check the sensor");
+    return drop(waiting, DropReason::kEmpty, "it has no points; check the sensor");
   }
   try {
     const auto placed = readers_[waiting.input].read(cloud, *poses_);
     if (const auto* missing = std::get_if<MissingPose>(&placed)) {
-      return drop(cloud, missing->reason,
+      return drop(waiting, missing->reason,
                   missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
     }
     integrate(waiting, std::get<PlacedScan>(placed));
   } catch (const ScanRefused& refused) {
     const bool memory = refused.reason() == ScanRefused::Reason::kMemory;
-    drop(cloud, memory ? DropReason::kMemory : DropReason::kTooLarge,
+    drop(waiting, memory ? DropReason::kMemory : DropReason::kTooLarge,
          refused.what() + std::string(memory ? "; or set window, or call ~reset" : ""));
   } catch (const std::bad_alloc&) {
-    drop(cloud, DropReason::kMemory,
+    drop(waiting, DropReason::kMemory,
          "the computer's memory does not hold it; set memory_limit, or send smaller clouds");
   } catch (const std::exception& fault) {
-    drop(cloud, DropReason::kBadCloud,
+    drop(waiting, DropReason::kBadCloud,
          std::string(fault.what()) + "; check the cloud's source and the settings of the input");
   }
 }
@@ -205,7 +205,7 @@ void MappingServer::onTimeJump(const ros::Time& new_time, const std::string& wha
   };
   std::size_t waited = 0;
   for (; const auto waiting = waiting_.takeIf(of_old_time); ++waited) {
-    drop(*waiting->cloud, DropReason::kTimeJump, "time jumped back while it waited");
+    drop(*waiting, DropReason::kTimeJump, "time jumped back while it waited");
   }
   const bool forget = config_.on_time_jump == OnTimeJump::kReset;
   if (forget) reset();
@@ -215,12 +215,12 @@ void MappingServer::onTimeJump(const ros::Time& new_time, const std::string& wha
       what.c_str(), waited, forget ? "reset" : "kept");
 }
 
-void MappingServer::drop(const sensor_msgs::PointCloud2& cloud, DropReason reason, const std::string& why) {
-  ledger_.dropped(cloud.header, reason);
-  const auto said = last_said_.find(reason);
-  if (said == last_said_.end() || Clock::now() - said->second >= kSayAgainAfter) {
-    last_said_[reason] = Clock::now();
-    ROS_WARN("Dropped the cloud of time %.3f: %s", cloud.header.stamp.toSec(), why.c_str());
+void MappingServer::drop(const WaitingCloud& cloud, DropReason reason, const std::string& why) {
+  const std_msgs::Header& header = cloud.cloud->header;
+  ledger_.dropped(header, reason, why);
+  const std::string topic = cloud_subscribers_[cloud.input].getTopic();
+  if (throttle_.allow(topic + why, Clock::now())) {
+    ROS_WARN("Dropped the cloud of %s of time %.3f: %s", topic.c_str(), header.stamp.toSec(), why.c_str());
   }
   status_publisher_.publish(status());
 }

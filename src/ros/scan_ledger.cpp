@@ -31,6 +31,7 @@ void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& sta
   status_.header = header;
   status_.integrated_last = true;
   status_.last_drop.clear();
+  status_.last_drop_reason.clear();
   status_.points_dropped += stats.counts.points - stats.counts.used - stats.counts.no_returns;
   status_.labels_not_in_table += stats.counts.labels_not_in_table;
   status_.integration_ms = static_cast<float>(stats.totalMs());
@@ -39,12 +40,13 @@ void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& sta
   integrated_rate_.tick(now);
 }
 
-void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason) {
+void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason, const std::string& why) {
   const DropKind& kind = dropKinds()[static_cast<std::size_t>(reason)];
   ++(status_.*kind.count);
   status_.header = header;
   status_.integrated_last = false;
-  status_.last_drop = kind.name;
+  status_.last_drop = why;
+  status_.last_drop_reason = kind.name;
 }
 
 void ScanLedger::unknownLabels(const std::map<std::uint32_t, std::size_t>& counts) {

@@ -108,6 +108,19 @@ class Live(MapperTest):
         self.assertIn('latency, 99th percentile [ms]', values)
         report(DiagnosticStatus.WARN, 'no clouds come')
 
+    def test_each_input_hears_of_its_own_fault(self):
+        before = self.status.find(lambda m: True)
+        stamp = self.robot.scan([(2.0, 0.0, 0.0)], [CAR], label_name='class')
+        status = self.deal_with(stamp)
+        self.assertEqual((status.dropped_bad_cloud, status.last_drop_reason), (before.dropped_bad_cloud + 1, 'bad cloud'))
+        self.assertIn("no field 'label'", status.last_drop)
+        stamp = self.stamp_for(self.merged)
+        self.robot.publish_pose(stamp)
+        self.merged.clouds.publish(make_cloud([(2.0, 0.0, 0.0)], [CAR], stamp, label_name='color'))
+        self.assertIn("no field 'rgb'", self.deal_with(stamp).last_drop)
+        for topic, words in (('/front_cloud', "no field 'label'"), ('/merged_cloud', "no field 'rgb'")):
+            self.log.wait_for(lambda m: topic in m.msg and words in m.msg, f'a warning of {topic}')
+
     def test_settings_change_while_mapping(self):
         stamp = self.integrate([(4.5, 0.5, 0.5)], [CAR])
         self.assertEqual(self.map_of_server(stamp)[(0, 0, 0)][0][2], OccupancyMap.FREE)
@@ -174,7 +187,7 @@ class Live(MapperTest):
         jumps = self.status.find(lambda m: True).time_jumps
         waiting = self.robot.next_stamp()
         self.robot.clouds.publish(make_cloud([(2.0, 0.0, 0.0)], [CAR], waiting))  # waits for its pose
-        self.robot.seconds -= 50
+        self.robot.seconds -= 49.5  # to stamps that no other test has
         self.addCleanup(setattr, self.robot, 'seconds', int(waiting.to_sec()) + 10)
         first = self.robot.scan([(0.5, 3.5, 0.5)], [ROAD])  # one old cloud alone might be a stray
         self.assertEqual(self.status.find(lambda m: True).time_jumps, jumps)
@@ -183,7 +196,7 @@ class Live(MapperTest):
         self.assertTrue(status.integrated_last, status)
         self.assertEqual(status.time_jumps, jumps + 1)
         self.assertTrue(self.deal_with(first).integrated_last, 'it waited, and is of the new time')
-        self.assertEqual(self.status.find(lambda m: m.header.stamp == waiting).last_drop, 'time jump')
+        self.assertEqual(self.status.find(lambda m: m.header.stamp == waiting).last_drop_reason, 'time jump')
         self.assertTrue(adds_up(status), status)
         return again
 

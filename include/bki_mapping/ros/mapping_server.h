@@ -9,7 +9,6 @@
 #include <std_srvs/Trigger.h>
 
 #include <atomic>
-#include <map>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -21,6 +20,7 @@
 #include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/scan_queue.h"
 #include "bki_mapping/ros/scan_reader.h"
+#include "bki_mapping/ros/sentence_throttle.h"
 #include "bki_mapping/ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
@@ -61,8 +61,8 @@ class MappingServer {
   void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
   /// Forgets blocks outside of the window about the sensor.
   void moveWindow();
-  /// Counts a cloud as dropped and says so, at most once in 5 s for each reason.
-  void drop(const sensor_msgs::PointCloud2& cloud, DropReason reason, const std::string& why);
+  /// Counts a cloud as dropped and says so, but repeats no sentence within 5 s.
+  void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
   MappingStatus status();
   MapSnapshot snapshot() const;
 
@@ -79,7 +79,7 @@ class MappingServer {
   ros::Time map_stamp_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
   std::vector<geometry_msgs::PoseStamped> trajectory_;
-  std::map<DropReason, Clock::time_point> last_said_;
+  SentenceThrottle throttle_;
   std::vector<bool> warned_of_origin_;  ///< of each input
 
   std::unique_ptr<PoseSource> poses_;

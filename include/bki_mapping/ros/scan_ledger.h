@@ -46,7 +46,8 @@ class ScanLedger {
   /// @param latency from the reception to the map [s].
   void integrated(const std_msgs::Header& header, const ScanStats& stats, double latency,
                   Clock::time_point now);
-  void dropped(const std_msgs::Header& header, DropReason reason);
+  /// @param why with the remedy.
+  void dropped(const std_msgs::Header& header, DropReason reason, const std::string& why);
   /// Labels that are not in the class table.
   void unknownLabels(const std::map<std::uint32_t, std::size_t>& counts);
   void timeJumped() { ++status_.time_jumps; }
