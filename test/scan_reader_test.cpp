@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 #include "bki_mapping/core/map_query.h"
 #include "bki_mapping/io/class_table_yaml.h"
@@ -90,6 +91,79 @@ TEST_F(Reader, NonsenseFromTfIsNoPose) {
   t.transform.rotation.w = 2.0;  // not a rotation
   poses_.add(t);
   EXPECT_FALSE(ready(scan));
+}
+
+geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, double seconds,
+                                          double x, double w) {
+  geometry_msgs::TransformStamped t;
+  t.header.frame_id = parent;
+  t.header.stamp = ros::Time(seconds);
+  t.child_frame_id = child;
+  t.transform.translation.x = x;
+  t.transform.rotation.w = w;
+  return t;
+}
+
+TEST_F(Reader, ATransformThatIsNoPoseIsNamed) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  const auto expectNamed = [&](const std::string& words) {
+    EXPECT_FALSE(ready(scan));
+    const auto placed = read(scan);
+    ASSERT_TRUE(std::holds_alternative<MissingPose>(placed)) << words;
+    const MissingPose missing = std::get<MissingPose>(placed);
+    EXPECT_EQ(missing.reason, DropReason::kBadTransform) << missing.why;
+    EXPECT_NE(missing.why.find(words), std::string::npos) << missing.why;
+  };
+  for (const auto& [x, w, words] : std::vector<std::tuple<double, double, std::string>>{
+           {0.0, 5.0, "the norm of its quaternion is 5, not 1"},
+           {0.0, 0.0, "the norm of its quaternion is 0, not 1"},
+           {0.0, NAN, "its quaternion is not finite"},
+           {NAN, 1.0, "its translation is not finite"},
+           {INFINITY, 1.0, "its translation is not finite"}}) {
+    poses_.add(transform("/map", "/sensor", 100.0, x, w));
+    expectNamed(words);
+    expectNamed("the transform from 'map' to 'sensor' of time 100 is no pose");
+  }
+  pose("sensor", 100.0, {1, 2, 3});  // a good one, at last
+  EXPECT_TRUE(ready(scan));
+}
+
+TEST_F(Reader, ARefusedTransformIsBlamedForWhatItCaused) {
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  poses_.add(transform("base", "sensor", 0.0, 1.0, 1.0), true);
+  for (const double t : {96.0, 98.0}) poses_.add(transform("map", "base", t, t, 1.0));
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  poses_.add(transform("map", "base", 100.0, 100.0, 2.0));
+  EXPECT_EQ(reason(scan), DropReason::kBadTransform) << "also in the middle of the way";
+  scan.header.stamp = ros::Time(90.0);
+  EXPECT_EQ(reason(scan), DropReason::kTooOld) << "whatever came later";
+  scan.header.stamp = ros::Time(100.5);
+  poses_.add(transform("map", "base", 100.2, 100.2, 1.0));
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate) << "a good one came since";
+  // Nonsense of many frames is not kept for ever, but what is wrong now is known.
+  for (int i = 0; i < 100000; ++i) {
+    poses_.add(transform("map", "frame_" + std::to_string(i), 100.0, 0.0, 2.0));
+  }
+  poses_.add(transform("map", "base", 100.3, 0.0, 2.0));
+  EXPECT_EQ(reason(scan), DropReason::kBadTransform);
+}
+
+TEST_F(Reader, BothPosesOfAStampOfZeroAreOfOneTime) {
+  for (const double t : {98.0, 99.0, 100.0}) pose("sensor", t, {t, 0, 0});
+  for (const double t : {98.0, 99.5}) pose("merger", t, {0, t, 0});
+  CloudMaker maker = cloud({{1, 0, 0}});
+  maker.frame = "merger";
+  maker.stamp = 0.0;
+  input_.sensor_frame_id = "sensor";
+  EXPECT_TRUE(ready(maker.message()));
+  const Scan scan = placed(maker.message()).scan;
+  EXPECT_TRUE(scan.origin.isApprox(Eigen::Vector3d(99.5, 0, 0), 1e-9)) << scan.origin;
+  EXPECT_TRUE(scan.points[0].isApprox(Eigen::Vector3f(1.0f - 99.5f, 99.5f, 0.0f), 1e-5f));
+  EXPECT_EQ(scan.stamp, 99500000000u);
+  poses_.add(transform("map", "still", 0.0, 7.0, 1.0), true);
+  input_.sensor_frame_id = "still";
+  EXPECT_EQ(placed(maker.message()).scan.origin.x(), 7.0);
+  EXPECT_EQ(placed(maker.message()).scan.points[0].y(), 99.5f);
 }
 
 TEST_F(Reader, WhenTimeJumpsBackTransformsOfTheNewTimeAreKept) {

@@ -134,7 +134,15 @@ void MappingServer::map(const WaitingCloud& waiting) {
       return drop(waiting, missing->reason,
                   missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
     }
-    integrate(waiting, std::get<PlacedScan>(placed));
+    const auto& scan = std::get<PlacedScan>(placed);
+    if (!mapper_->map().geometry().contains(scan.scan.origin)) {
+      return drop(waiting, DropReason::kBadTransform,
+                  "tf puts the sensor so far from the origin of '" + config_.frame_id + "' (" +
+                      numberText(scan.scan.origin.norm()) + " m) that the map cannot hold it; mend what " +
+                      "publishes the transforms from '" + config_.frame_id + "' to '" +
+                      cloud.header.frame_id + "'");
+    }
+    integrate(waiting, scan);
   } catch (const ScanRefused& refused) {
     const bool memory = refused.reason() == ScanRefused::Reason::kMemory;
     drop(waiting, memory ? DropReason::kMemory : DropReason::kTooLarge,

@@ -1,12 +1,38 @@
 #include "bki_mapping/ros/pose_source.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/ros/pose_conversion.h"
 #include "bki_mapping/ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
+
+namespace {
+
+/// tf2's tolerance on the square of a quaternion's norm.
+constexpr double kNormTolerance = 1e-2;
+
+/// tf2 takes frames with a leading slash for those without.
+std::string withoutSlash(const std::string& frame) {
+  return frame.empty() || frame.front() != '/' ? frame : frame.substr(1);
+}
+
+/// Why a transform is no pose; "" if it is one.
+std::string faultOf(const geometry_msgs::Transform& transform) {
+  const Eigen::Vector3d t(transform.translation.x, transform.translation.y, transform.translation.z);
+  const Eigen::Vector4d q(transform.rotation.x, transform.rotation.y, transform.rotation.z,
+                          transform.rotation.w);
+  if (!t.allFinite()) return "its translation is not finite";
+  if (!q.allFinite()) return "its quaternion is not finite";
+  if (!(std::abs(q.squaredNorm() - 1.0) < kNormTolerance)) {
+    return "the norm of its quaternion is " + numberText(q.norm()) + ", not 1";
+  }
+  return "";
+}
+
+}  // namespace
 
 PoseSource::PoseSource(ros::NodeHandle node) {
   using Message = tf2_msgs::TFMessageConstPtr;
@@ -21,15 +47,45 @@ void PoseSource::onTransforms(const tf2_msgs::TFMessage& message, bool is_static
 }
 
 void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_static) {
+  const std::string child = withoutSlash(transform.child_frame_id);
+  if (const std::string fault = faultOf(transform.transform); !fault.empty()) {
+    const std::string why = "the transform from '" + withoutSlash(transform.header.frame_id) + "' to '" +
+                            child + "' of time " + numberText(transform.header.stamp.toSec()) +
+                            " is no pose: " + fault + "; mend what publishes it";
+    if (const auto before = findRefused(child); before != refused_.end()) refused_.erase(before);
+    refused_.push_back({child, transform.header.stamp, why});
+    if (refused_.size() > kMostRefused) refused_.pop_front();
+    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("Refused %s", why.c_str());
+    return;
+  }
+  const auto refused = findRefused(child);
+  if (refused != refused_.end() && (is_static || transform.header.stamp >= refused->stamp)) {
+    refused_.erase(refused);
+  }
   if (!is_static) {
     latest_.push_back(transform);
     if (latest_.size() > kKept) latest_.pop_front();
   }
-  try {
-    buffer_.setTransform(transform, "bki_mapping", is_static);
-  } catch (const tf2::TransformException& fault) {
-    ROS_WARN_THROTTLE(5.0, "Ignored a transform of '%s': %s", transform.child_frame_id.c_str(), fault.what());
+  buffer_.setTransform(transform, "bki_mapping", is_static);
+}
+
+std::deque<PoseSource::Refused>::const_iterator PoseSource::findRefused(const std::string& child) const {
+  return std::find_if(refused_.begin(), refused_.end(), [&](const Refused& r) { return r.child == child; });
+}
+
+const PoseSource::Refused* PoseSource::refusedBetween(const std::string& target,
+                                                      const std::string& source) const {
+  for (std::string frame : {withoutSlash(source), withoutSlash(target)}) {
+    // As many steps as tf2 takes: frames may lead in a circle.
+    for (std::uint32_t step = 0; step < tf2::BufferCore::MAX_GRAPH_DEPTH; ++step) {
+      const auto refused = findRefused(frame);
+      if (refused != refused_.end()) return &*refused;
+      std::string parent;
+      if (!buffer_._getParent(frame, ros::Time(0), parent)) break;
+      frame = parent;
+    }
   }
+  return nullptr;
 }
 
 void PoseSource::restart(const ros::Time& new_time) {
@@ -39,6 +95,7 @@ void PoseSource::restart(const ros::Time& new_time) {
   });
   latest_.erase(latest_.begin(), of_old_time.base());
   for (const auto& transform : latest_) buffer_.setTransform(transform, "bki_mapping");
+  refused_.clear();
 }
 
 std::optional<StampedPose> PoseSource::find(const std::string& target, const std::string& source,
@@ -52,12 +109,27 @@ std::optional<StampedPose> PoseSource::find(const std::string& target, const std
   }
 }
 
+std::optional<ros::Time> PoseSource::latestCommon(const std::string& target, const std::string& a,
+                                                  const std::string& b) const {
+  ros::Time common;
+  for (const std::string& source : {a, b}) {
+    const auto latest = find(target, source, ros::Time());
+    if (!latest) return std::nullopt;
+    const bool changes = !latest->stamp.isZero();
+    if (changes && (common.isZero() || latest->stamp < common)) common = latest->stamp;
+  }
+  return common;
+}
+
 MissingPose PoseSource::explain(const std::string& target, const std::string& source,
                                 const ros::Time& stamp) const {
   if (source.empty()) {
     return {DropReason::kUnknownFrame,
             "its header has no frame_id; let the driver set one, or set sensor_frame_id"};
   }
+  const auto newest = find(target, source, ros::Time());
+  const Refused* refused = refusedBetween(target, source);
+  if (refused && (!newest || stamp > newest->stamp)) return {DropReason::kBadTransform, refused->why};
   for (const std::string& frame : {source, target}) {
     if (!buffer_._frameExists(frame)) {
       return {DropReason::kUnknownFrame, "tf has never heard of frame '" + frame +

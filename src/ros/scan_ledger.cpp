@@ -9,6 +9,7 @@ const std::vector<DropKind>& dropKinds() {
       {DropReason::kTransformLate, "transform late", &S::dropped_transform_late},
       {DropReason::kTooOld, "too old", &S::dropped_too_old},
       {DropReason::kUnknownFrame, "unknown frame", &S::dropped_unknown_frame},
+      {DropReason::kBadTransform, "bad transform", &S::dropped_bad_transform},
       {DropReason::kBadCloud, "bad cloud", &S::dropped_bad_cloud},
       {DropReason::kEmpty, "empty", &S::dropped_empty},
       {DropReason::kQueueFull, "queue full", &S::dropped_queue_full},

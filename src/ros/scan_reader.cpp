@@ -54,7 +54,8 @@ bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& 
   const auto known = [&](const std::string& frame, const ros::Time& stamp) {
     return poses.canFind(map_frame_, frame, stamp);
   };
-  if (!known(header.frame_id, header.stamp) || !known(sensorFrame(cloud), header.stamp)) return false;
+  const auto stamp = timeOf(cloud, poses);
+  if (!stamp || !known(header.frame_id, *stamp) || !known(sensorFrame(cloud), *stamp)) return false;
   if (input_.time_field.empty() || cloud.width == 0 || cloud.height == 0) return true;
   try {
     checkSizes(cloud);
@@ -62,7 +63,7 @@ bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& 
     const std::uint8_t* last = cloud.data.data() + std::size_t{cloud.height - 1} * cloud.row_step +
                                std::size_t{cloud.width - 1} * cloud.point_step;
     const double end = pointTime(time, last) + kTimeSlice;
-    return !(end > 0.0 && end < kLongestScan) || known(header.frame_id, later(header.stamp, end));
+    return !(end > 0.0 && end < kLongestScan) || known(header.frame_id, later(*stamp, end));
   } catch (const std::invalid_argument&) {
     return true;  // read() says what is wrong
   }
@@ -72,10 +73,11 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
                                                        const PoseSource& poses) const {
   const std_msgs::Header& header = cloud.header;
   const std::string sensor_frame = sensorFrame(cloud);
-  const auto sensor = poses.find(map_frame_, sensor_frame, header.stamp);
-  if (!sensor) return poses.explain(map_frame_, sensor_frame, header.stamp);
-  const auto frame = poses.find(map_frame_, header.frame_id, header.stamp);
-  if (!frame) return poses.explain(map_frame_, header.frame_id, header.stamp);
+  const ros::Time stamp = timeOf(cloud, poses).value_or(header.stamp);
+  const auto sensor = poses.find(map_frame_, sensor_frame, stamp);
+  if (!sensor) return poses.explain(map_frame_, sensor_frame, stamp);
+  const auto frame = poses.find(map_frame_, header.frame_id, stamp);
+  if (!frame) return poses.explain(map_frame_, header.frame_id, stamp);
 
   CloudContent content = readCloud(cloud, input_, classes_, label_values_);
   PlacedScan placed;

@@ -108,6 +108,16 @@ class Live(MapperTest):
         self.assertIn('latency, 99th percentile [ms]', values)
         report(DiagnosticStatus.WARN, 'no clouds come')
 
+    def test_a_place_beyond_the_map_is_said(self):
+        before = self.integrate([(2.0, 0.0, 0.0)], [CAR]) and self.status.find(lambda m: True)
+        for far in (1e300, 1e12):
+            status = self.deal_with(self.robot.scan([(2.0, 0.0, 0.0)], [CAR], position=(far, 0.0, 0.0)))
+            self.assertEqual(status.last_drop_reason, 'bad transform')
+            self.assertIn("the transforms from 'map' to 'sensor'", status.last_drop)
+            self.assertEqual((status.blocks, status.dropped_bad_cloud), (before.blocks, before.dropped_bad_cloud))
+        self.assertTrue(adds_up(status), status)
+        self.integrate([(2.0, 0.0, 0.0)], [CAR])
+
     def test_each_input_hears_of_its_own_fault(self):
         before = self.status.find(lambda m: True)
         stamp = self.robot.scan([(2.0, 0.0, 0.0)], [CAR], label_name='class')

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "bki_mapping/ros/scan_ledger.h"
+#include "bki_mapping/ros/sentence_throttle.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -36,7 +37,7 @@ class PoseSource {
   /// Listens to /tf and /tf_static on the node handle's callback queue.
   explicit PoseSource(ros::NodeHandle node);
 
-  /// Takes a transform over. Those that are not numbers or no rotation are ignored, and tf2 says so.
+  /// Takes a transform over. One that is not finite or no rotation is refused, and explain() remembers it.
   void add(const geometry_msgs::TransformStamped& transform, bool is_static = false);
 
   /// The pose of `source` in `target`, interpolated at a time; the latest one if the stamp is 0.
@@ -49,6 +50,11 @@ class PoseSource {
     return !source.empty() && buffer_.canTransform(target, source, stamp);
   }
 
+  /// The latest time at which `a` and `b` both have a pose in `target`; 0 if these never change. None while
+  /// one of them has no pose.
+  std::optional<ros::Time> latestCommon(const std::string& target, const std::string& a,
+                                        const std::string& b) const;
+
   /// Explains why find returns none.
   MissingPose explain(const std::string& target, const std::string& source, const ros::Time& stamp) const;
 
@@ -58,11 +64,24 @@ class PoseSource {
 
  private:
   static constexpr std::size_t kKept = 1000;
+  static constexpr std::size_t kMostRefused = 100;
+
+  /// A transform that is no pose.
+  struct Refused {
+    std::string child;
+    ros::Time stamp;
+    std::string why;
+  };
 
   void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
+  std::deque<Refused>::const_iterator findRefused(const std::string& child) const;
+  /// The refused transform that find lacks, if there is one between the frames.
+  const Refused* refusedBetween(const std::string& target, const std::string& source) const;
 
   tf2_ros::Buffer buffer_;
   std::deque<geometry_msgs::TransformStamped> latest_;  ///< of /tf, in the order in which they came
+  std::deque<Refused> refused_;  ///< the last one of each child frame, until a newer one is good
+  SentenceThrottle throttle_;
   ros::Subscriber subscriber_, static_subscriber_;
 };
 

@@ -19,6 +19,7 @@ enum class DropReason {
   kTransformLate,
   kTooOld,
   kUnknownFrame,
+  kBadTransform,
   kBadCloud,
   kEmpty,
   kQueueFull,

@@ -47,6 +47,13 @@ class ScanReader {
     return input_.sensor_frame_id.empty() ? cloud.header.frame_id : input_.sensor_frame_id;
   }
 
+  /// When the poses of a cloud are looked up: at its stamp, or, for a stamp of 0, at the latest time at which
+  /// both frames have one, so that both are of the same time. None while there is no such time.
+  std::optional<ros::Time> timeOf(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const {
+    if (!cloud.header.stamp.isZero()) return cloud.header.stamp;
+    return poses.latestCommon(map_frame_, sensorFrame(cloud), cloud.header.frame_id);
+  }
+
   InputConfig input_;
   std::string map_frame_;
   const ClassTable& classes_;
