@@ -12,6 +12,7 @@ add_library(bki_mapping_ros SHARED
   src/ros/mapping_server.cpp
   src/ros/mapping_services.cpp
   src/ros/no_returns.cpp
+  src/ros/point_account.cpp
   src/ros/point_field.cpp
   src/ros/pose_source.cpp
   src/ros/publishers/cell_markers.cpp

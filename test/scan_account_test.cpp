@@ -8,6 +8,8 @@
 #include "bki_mapping/ros/load_advice.h"
 #include "bki_mapping/ros/map_publishing.h"
 #include "bki_mapping/ros/mapping_diagnostics.h"
+#include "bki_mapping/ros/point_account.h"
+#include "bki_mapping/ros/point_field.h"
 #include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/scan_queue.h"
 #include "bki_mapping/ros/sentence_throttle.h"
@@ -67,7 +69,9 @@ TEST(ScanLedger, AddsUp) {
   const std::size_t clouds = 1 + dropKinds().size() + 3;  // integrated, dropped, waiting
   for (std::size_t i = 0; i < clouds; ++i) ledger.received(now);
   ledger.integrated(header, stats, 0.25, now);
-  EXPECT_EQ(ledger.status(now, 3).points_dropped, 1u);
+  EXPECT_EQ(ledger.status(now, 3).points_received, 10u);
+  EXPECT_EQ(ledger.status(now, 3).points_used, 6u);
+  EXPECT_EQ(ledger.status(now, 3).points_no_returns, 3u);
   EXPECT_EQ(ledger.status(now, 3).latency_median_ms, 250.0f);
   EXPECT_EQ(ledger.status(now, 3).integration_p99_ms, 20.0f);
   for (const DropKind& kind : dropKinds()) {
@@ -86,6 +90,28 @@ TEST(ScanLedger, AddsUp) {
   EXPECT_NE(text.find("Mapped 1 of " + std::to_string(clouds) + " clouds"), std::string::npos) << text;
   EXPECT_NE(text.find("1 queue full"), std::string::npos) << text;
   EXPECT_NE(text.find("3 were still waiting"), std::string::npos) << text;
+  EXPECT_NE(text.find("used 6 of 10 points"), std::string::npos) << text;
+}
+
+TEST(ScanLedger, CountsEveryKindOfPoint) {
+  ScanStats stats;
+  PointCounts& counts = stats.counts;
+  counts.used = 1;
+  counts.no_returns = 2;
+  counts.points = 3;
+  std::size_t n = 3;
+  for (const PointKind& kind : pointKinds()) counts.points += counts.*kind.in_scan = n++;
+  // All of them: a kind that the table lacks would be missing from the sum.
+  EXPECT_EQ(counts.points, counts.used + counts.not_finite + counts.at_sensor + counts.too_near +
+                               counts.beyond_max + counts.outside_map + counts.unknown_label +
+                               counts.unlabelled + counts.no_returns);
+  ScanLedger ledger;
+  for (int i = 0; i < 2; ++i) ledger.integrated({}, stats, 0.0, {});
+  const MappingStatus status = ledger.status({}, 0);
+  EXPECT_EQ(status.points_received, 2 * counts.points);
+  for (const PointKind& kind : pointKinds()) {
+    EXPECT_EQ(status.*kind.in_status, 2 * counts.*kind.in_scan) << kind.name;
+  }
 }
 
 TEST(ScanLedger, TellsUnknownLabelsApart) {
@@ -152,6 +178,99 @@ TEST(Diagnostics, JudgeWhatHappened) {
   EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);
   now.paused = true;
   EXPECT_NE(judge(before, now, config).message.find("~resume"), std::string::npos);
+}
+
+/// The verdict on 40 clouds of 1000 points with some of each kind; the others are used.
+Health verdict(const std::vector<std::pair<std::size_t PointCounts::*, std::size_t>>& kinds,
+               const std::map<std::uint32_t, std::size_t>& labels = {}, const InputConfig& input = {}) {
+  PointCounts counts;
+  counts.points = counts.used = 1000;
+  for (const auto& [kind, count] : kinds) {
+    counts.*kind += count;
+    counts.used -= count;
+  }
+  PointAccount account;
+  for (int i = 0; i < 40; ++i) account.add(counts, labels);
+  return judgePoints(account, "/points", input, MapperConfig(), "semantic_kitti");
+}
+
+TEST(Points, ThatAreOfNoUseAreNamedWithTheRemedy) {
+  using C = PointCounts;
+  const auto expect = [](const Health& health, std::uint8_t level, const std::vector<std::string>& all) {
+    EXPECT_EQ(health.level, level) << health.message;
+    for (const std::string& words : all) {
+      EXPECT_NE(health.message.find(words), std::string::npos) << words << " is not in: " << health.message;
+    }
+  };
+  constexpr auto kWarn = DiagnosticStatus::WARN, kError = DiagnosticStatus::ERROR;
+  expect(verdict({{&C::unknown_label, 1000}}, {{3, 10}, {7777, 990}}), kError,
+         {"none of the points of the last 40 clouds of /points is used", "100 % have labels",
+          "class table 'semantic_kitti' does not list (7777 most often)", "set classes or label_values"});
+  expect(verdict({{&C::unknown_label, 950}}, {{7777, 950}}), kWarn, {"only 5 %", "95 % have labels"});
+  expect(verdict({{&C::unknown_label, 1000}}, {{kNoLabel, 1000}}), kError, {"have no label", "label_field"});
+  InputConfig colors;
+  colors.label_encoding = LabelEncoding::kRgb;
+  expect(verdict({{&C::unknown_label, 1000}}, {{0x0100ff, 1000}}, colors), kError,
+         {"0x0100ff", "color_match"});
+  expect(verdict({{&C::not_finite, 1000}}), kWarn, {"100 % are NaN or infinite", "clear_no_returns"});
+  expect(verdict({{&C::at_sensor, 1000}}), kWarn, {"within 1 mm of the sensor"});
+  InputConfig ranges;
+  ranges.sensor_model = {2.0, 5.0};
+  MapperConfig mapper;
+  mapper.sensor_model = ranges.sensor_model;
+  PointAccount near;
+  near.add({1000, 0, 0, 0, 1000}, {});
+  expect(judgePoints(near, "/points", ranges, mapper, ""), kError,
+         {"of the last cloud of", "nearer than sensor_model/min_range 2 m"});
+  expect(judgePoints(near, "/points", ranges, MapperConfig(), ""), kError, {"the input's min_range 2 m"});
+  expect(verdict({{&C::too_near, 950}}), kWarn, {"95 % are nearer than"});
+  expect(verdict({{&C::beyond_max, 1000}}), kWarn, {"are beyond", "in metres"});
+  expect(verdict({{&C::outside_map, 1000}}), kError, {"too far from the map's origin"});
+  expect(verdict({{&C::unlabelled, 1000}}), kWarn, {"unlabelled_points"});
+  // What is wrong is behind what is usual.
+  expect(verdict({{&C::not_finite, 600}, {&C::unknown_label, 400}}, {{7777, 400}}), kError,
+         {"40 % have labels"});
+}
+
+TEST(Points, OfHealthySensorsAreNotWarnedOf) {
+  using C = PointCounts;
+  const auto expectHealthy = [](const Health& health) {
+    EXPECT_EQ(health.level, DiagnosticStatus::OK) << health.message;
+    EXPECT_EQ(health.message, "");
+  };
+  expectHealthy(verdict({}));
+  expectHealthy(verdict({{&C::not_finite, 600}}));                       // an organised cloud out of doors
+  expectHealthy(verdict({{&C::not_finite, 990}}));                       // a drone that sees a mast
+  expectHealthy(verdict({{&C::no_returns, 1000}}));                      // nothing but sky, which is cleared
+  expectHealthy(verdict({{&C::no_returns, 997}, {&C::not_finite, 3}}));  // and columns without any return
+  expectHealthy(verdict({{&C::no_returns, 999}, {&C::unknown_label, 1}}));
+  expectHealthy(verdict({{&C::at_sensor, 950}}));
+  expectHealthy(verdict({{&C::beyond_max, 990}}));  // a short max_range out of doors
+  expectHealthy(verdict({{&C::unlabelled, 950}}));  // who maps nothing but cars
+  expectHealthy(verdict({{&C::too_near, 500}, {&C::unknown_label, 300}}));
+  expectHealthy(judgePoints({}, "/points", {}, {}, ""));
+}
+
+TEST(Diagnostics, TellOfPointsBesideTheRest) {
+  MappingStatus before, now;
+  now.received = now.integrated = 10;
+  now.blocks = 5;
+  const Health points{DiagnosticStatus::ERROR, "none of the points is used"};
+  EXPECT_EQ(judge(before, now, {}, points).level, DiagnosticStatus::ERROR);
+  now.dropped_empty = 3;
+  const Health both = judge(before, now, {}, points);
+  EXPECT_EQ(both.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(both.message, "none of the points is used; dropped: 3 empty");
+  // Points are used, but the map stays empty.
+  now.dropped_empty = 0;
+  now.blocks = 0;
+  now.points_used = 7;
+  EXPECT_EQ(judge(before, now, {}).level, DiagnosticStatus::OK) << "it may have been reset";
+  before = now;
+  now.received = now.integrated = 20;
+  now.points_used = 20;
+  EXPECT_EQ(judge(before, now, {}).level, DiagnosticStatus::WARN);
+  EXPECT_NE(judge(before, now, {}).message.find("the map is empty, though 13 points"), std::string::npos);
 }
 
 TEST(MapPublishing, ATopicTakesATenthOfTheTimeAtMost) {

@@ -9,6 +9,8 @@
 
 #include "bki_mapping/core/parameters.h"
 #include "bki_mapping/ros/live_settings.h"
+#include "bki_mapping/ros/point_account.h"
+#include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/server_config.h"
 
 namespace bki_mapping::ros_shell {
@@ -117,6 +119,7 @@ TEST(LiveSettings, HaveTheNamesDefaultsAndDescriptionsOfTheParameters) {
   collect(mapperParameters());
   EXPECT_GT(MappingConfig::__getParamDescriptions__().size(), 20u);
   for (const auto& p : MappingConfig::__getParamDescriptions__()) {
+    if (p->name == "last_refusal") continue;  // an answer, no parameter
     EXPECT_EQ(p->description, descriptions[p->name]) << p->name;
   }
 }
@@ -172,6 +175,20 @@ TEST(Documents, NameEveryTopicAndService) {
                        document.find("| `~" + name + "` |") != std::string::npos;
     EXPECT_TRUE(known) << "docs/ros.md lacks " << name;
   }
+}
+
+TEST(Documents, HaveARowForEachReasonOfTheStatus) {
+  const std::string document = textOf(kRoot / "docs/ros.md"),
+                    message = textOf(kRoot / "msg/MappingStatus.msg");
+  const std::regex field("uint64 ((dropped|points)_\\w+)");
+  std::map<std::string, std::size_t> counts;
+  for (std::sregex_iterator i(message.begin(), message.end(), field), end; i != end; ++i) {
+    EXPECT_NE(document.find("\n| `" + (*i)[1].str() + "` |"), std::string::npos)
+        << "docs/ros.md lacks " << (*i)[1];
+    ++counts[(*i)[2]];
+  }
+  EXPECT_EQ(counts["dropped"], dropKinds().size());
+  EXPECT_EQ(counts["points"], pointKinds().size() + 3);  // and received, used, no_returns
 }
 
 TEST(Documents, EveryMessageFieldIsExplained) {

@@ -37,13 +37,16 @@ std::map<std::string, std::string> valuesOf(const ServerConfig& server, const Ma
   return values;
 }
 
+/// The protocol has no place for a refusal but the configuration that it returns.
+const char* const kLastRefusal = "last_refusal";
+
 const char* const kFixed[] = {"resolution", "frame_id", "classes"};
 
 }  // namespace
 
 LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server,
-                           const MapperConfig& mapper, Apply apply)
-    : server_(server), mapper_(mapper), apply_(std::move(apply)) {
+                           const MapperConfig& mapper, Apply apply, std::function<void()> answered)
+    : server_(server), mapper_(mapper), apply_(std::move(apply)), answered_(std::move(answered)) {
   ros::NodeHandle node(private_node, "reconfigure");
   ros::param::del(node.getNamespace());  // what an earlier run left there is not what this one was told
   offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(mutex_, node);
@@ -57,6 +60,7 @@ MappingConfig LiveSettings::show(const ServerConfig& server, const MapperConfig&
   config.__toMessage__(message);
   std::map<std::string, std::string> values;
   for (const auto& [name, value] : valuesOf(server, mapper)) values[identifierOf(name)] = value;
+  values[kLastRefusal] = "";
   for (auto& p : message.bools) p.value = values.at(p.name) == "true";
   for (auto& p : message.ints) p.value = std::stoi(values.at(p.name));
   for (auto& p : message.doubles) p.value = parseNumber(values.at(p.name));
@@ -88,10 +92,14 @@ void LiveSettings::onChange(MappingConfig& config) {
     if (valuesOf(server, mapper) != valuesOf(server_, mapper_)) apply_(server, mapper);
     server_ = server;
     mapper_ = mapper;
+    last_refusal_.clear();
   } catch (const std::invalid_argument& fault) {
+    last_refusal_ = fault.what();
     ROS_WARN("Settings stay as they were: %s", fault.what());
   }
+  answered_();
   config = show(server_, mapper_);
+  config.last_refusal = last_refusal_;
 }
 
 }  // namespace bki_mapping::ros_shell

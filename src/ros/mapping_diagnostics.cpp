@@ -1,6 +1,9 @@
 #include "bki_mapping/ros/mapping_diagnostics.h"
 
+#include <algorithm>
+
 #include "bki_mapping/ros/load_advice.h"
+#include "bki_mapping/ros/point_account.h"
 
 namespace bki_mapping::ros_shell {
 namespace {
@@ -19,20 +22,32 @@ std::string newDrops(const MappingStatus& before, const MappingStatus& now) {
 
 }  // namespace
 
-Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config) {
+Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config,
+             const Health& points) {
   const std::string drops = newDrops(before, now);
   if (now.paused) return {DiagnosticStatus::WARN, "paused; call ~resume to go on"};
   if (now.received == 0) return {DiagnosticStatus::WARN, "no cloud has come yet; check the topic"};
   if (!drops.empty() && now.integrated == before.integrated) {
     return {DiagnosticStatus::ERROR, "nothing is being mapped; dropped: " + drops};
   }
-  const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
-  if (!drops.empty()) {
-    return {DiagnosticStatus::WARN, "dropped: " + drops + (advice.empty() ? "" : "; " + advice)};
+  Health health = points;
+  const auto warn = [&](const std::string& text) {
+    health.level = std::max<std::uint8_t>(health.level, DiagnosticStatus::WARN);
+    health.message += (health.message.empty() ? "" : "; ") + text;
+  };
+  if (!drops.empty()) warn("dropped: " + drops);
+  if (const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
+      !advice.empty()) {
+    warn(advice);
   }
-  if (!advice.empty()) return {DiagnosticStatus::WARN, advice};
-  if (now.received == before.received && now.waiting == 0) return {DiagnosticStatus::WARN, "no clouds come"};
-  return {DiagnosticStatus::OK, "mapping"};
+  // A map that was reset is empty at one report, perhaps.
+  if (now.blocks == 0 && before.blocks == 0 && before.integrated > 0 &&
+      now.points_used > before.points_used) {
+    warn("the map is empty, though " + std::to_string(now.points_used - before.points_used) +
+         " points were used since the last report; check resolution, kernel/length and window");
+  }
+  if (health.message.empty() && now.received == before.received && now.waiting == 0) warn("no clouds come");
+  return health.message.empty() ? Health{DiagnosticStatus::OK, "mapping"} : health;
 }
 
 MappingDiagnostics::MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
@@ -42,9 +57,10 @@ MappingDiagnostics::MappingDiagnostics(const ros::NodeHandle& node, const ros::N
   updater_.add("mapping", [this](diagnostic_updater::DiagnosticStatusWrapper& out) { fill(out); });
 }
 
-void MappingDiagnostics::report(const MappingStatus& status, const MapperConfig& config) {
+void MappingDiagnostics::report(const MappingStatus& status, const MapperConfig& config,
+                                const Health& points) {
   now_ = status;
-  health_ = judge(before_, now_, config);
+  health_ = judge(before_, now_, config, points);
   before_ = now_;
   updater_.force_update();
 }
@@ -62,8 +78,13 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("integration, median [ms]", now_.integration_median_ms);
   out.add("integration, 99th percentile [ms]", now_.integration_p99_ms);
   out.add("load", loadOf(now_.integration_median_ms, now_.received_hz));
-  out.add("points dropped", now_.points_dropped);
+  out.add("points received", now_.points_received);
+  out.add("points used", now_.points_used);
+  out.add("points: beams without a return", now_.points_no_returns);
+  for (const PointKind& kind : pointKinds())
+    out.add(std::string("points: ") + kind.name, now_.*kind.in_status);
   out.add("labels not in the class table", now_.labels_not_in_table);
+  out.add("last refused change of settings", now_.last_refusal);
   out.add("time jumps", now_.time_jumps);
   out.add("blocks", now_.blocks);
   out.add("map [bytes]", now_.map_bytes);

@@ -1,5 +1,6 @@
 #include "bki_mapping/ros/mapping_server.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <new>
 
@@ -34,7 +35,8 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   subscribe();
   live_settings_ = std::make_unique<LiveSettings>(
       private_node_, config_, mapper_->config(),
-      [this](const ServerConfig& server, const MapperConfig& mapper) { applySettings(server, mapper); });
+      [this](const ServerConfig& server, const MapperConfig& mapper) { applySettings(server, mapper); },
+      [this] { status_publisher_.publish(status()); });
   status_publisher_.publish(status());
   thread_ = std::thread(&MappingServer::work, this);
 }
@@ -65,6 +67,7 @@ void MappingServer::subscribe() {
              mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
   }
   warned_of_origin_.assign(readers_.size(), false);
+  points_.resize(readers_.size());
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
@@ -87,7 +90,7 @@ void MappingServer::work() {
     checkClock();
     processQueue();
     publishing_->publishDue(snapshot());
-    diagnostics_->update([this] { return status(); }, mapper_->config());
+    diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
   }
 }
 
@@ -162,6 +165,7 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   const auto now = Clock::now();
   ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
   ledger_.unknownLabels(placed.unknown_labels);
+  points_[waiting.input].add(stats.counts, placed.unknown_labels);
   if (readers_[waiting.input].originDoubtful(*waiting.cloud) && !warned_of_origin_[waiting.input]) {
     warned_of_origin_[waiting.input] = true;
     ROS_WARN(
@@ -233,9 +237,24 @@ void MappingServer::drop(const WaitingCloud& cloud, DropReason reason, const std
   status_publisher_.publish(status());
 }
 
+Health MappingServer::judgeAllPoints() {
+  Health all;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Health one = judgePoints(points_[i], cloud_subscribers_[i].getTopic(), readers_[i].input(),
+                                   mapper_->config(), mapper_->classes().name());
+    points_[i] = {};
+    if (one.message.empty()) continue;
+    all.level = std::max(all.level, one.level);
+    all.message += (all.message.empty() ? "" : "; ") + one.message;
+    if (throttle_.allow(one.message, Clock::now())) ROS_WARN("%s", one.message.c_str());
+  }
+  return all;
+}
+
 MappingStatus MappingServer::status() {
   MappingStatus status = ledger_.status(Clock::now(), waiting_.size());
   status.paused = paused_;
+  if (live_settings_) status.last_refusal = live_settings_->lastRefusal();
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
   status.map_bytes = mapper_->mapBytes();
   return status;

@@ -1,5 +1,7 @@
 #include "bki_mapping/ros/scan_ledger.h"
 
+#include "bki_mapping/ros/point_account.h"
+
 namespace bki_mapping::ros_shell {
 
 const std::vector<DropKind>& dropKinds() {
@@ -33,7 +35,10 @@ void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& sta
   status_.integrated_last = true;
   status_.last_drop.clear();
   status_.last_drop_reason.clear();
-  status_.points_dropped += stats.counts.points - stats.counts.used - stats.counts.no_returns;
+  status_.points_received += stats.counts.points;
+  status_.points_used += stats.counts.used;
+  status_.points_no_returns += stats.counts.no_returns;
+  for (const PointKind& kind : pointKinds()) status_.*kind.in_status += stats.counts.*kind.in_scan;
   status_.labels_not_in_table += stats.counts.labels_not_in_table;
   status_.integration_ms = static_cast<float>(stats.totalMs());
   integration_.add(stats.totalMs());
@@ -89,6 +94,8 @@ std::string ScanLedger::summary(std::size_t waiting) const {
     separator = ", ";
   }
   if (droppedClouds() == 0) text += " none";
+  text += "; used " + std::to_string(status_.points_used) + " of " + std::to_string(status_.points_received) +
+          " points";
   if (waiting > 0) text += "; " + std::to_string(waiting) + " were still waiting";
   return text;
 }

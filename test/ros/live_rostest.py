@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointField
 from std_srvs.srv import Trigger
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import CAR, ROAD, Listener, MapperTest, Robot, adds_up, make_cloud, random_scan  # noqa: E402
+from harness import CAR, ROAD, Listener, MapperTest, Robot, adds_up, make_cloud, random_scan, wait_until  # noqa: E402
 
 QUEUE = 3  # queue_size in live.test
 CAR_COLOR = 0x6496f5  # of config/classes/semantic_kitti.yaml
@@ -90,19 +90,39 @@ class Live(MapperTest):
         self.call('resume', Trigger)
         self.integrate([(2.0, 0.0, 0.0)], [CAR])
 
-    def test_diagnostics_tell_how_it_goes(self):
+    def reports(self):
+        """Listens to /diagnostics; returns a function that waits for a report of a level with words, while scanning."""
         reports = Listener('/diagnostics', DiagnosticArray)
         self.addCleanup(reports.close)
 
-        def report(level, words):
+        def report(level, words, scan=lambda: None):
             def fits(message):
                 return any(s.level == level and words in s.message and 'mapping' in s.name for s in message.status)
-            return reports.wait_for(fits, f'a report of level {level} with "{words}"')
+            return wait_until(lambda: scan() or reports.find(fits), f'a report of level {level} with "{words}"')
+        return report
 
-        self.integrate([(2.0, 0.0, 0.0)], [CAR])
-        report(DiagnosticStatus.OK, 'mapping')
-        self.deal_with(self.robot.scan([], []))
-        bad = report(DiagnosticStatus.ERROR, 'empty')
+    def test_points_that_are_of_no_use_are_told(self):
+        report = self.reports()
+        nan = float('nan')
+        for points, labels, level, words in (
+                ([(2.0, 0.0, 0.0), (3.0, 0.0, 0.0)], [7777, 7777], DiagnosticStatus.ERROR,
+                 "class table 'semantic_kitti' does not list (7777 most often); set classes or label_values"),
+                ([(nan, nan, nan)], [CAR], DiagnosticStatus.WARN, 'are NaN or infinite')):
+            def scan():
+                self.integrate(points, labels)
+            report(level, words, scan)
+            self.log.wait_for(lambda m: words in m.msg and '/front_cloud' in m.msg, 'a warning in the log')
+            self.assertEqual(self.status.find(lambda m: True).blocks, 0)
+        self.reconfigure(sensor_model_min_range=5.0)
+        report(DiagnosticStatus.ERROR, 'nearer than sensor_model/min_range 5 m',
+               lambda: self.integrate([(2.0, 0.0, 0.0)], [CAR]) and None)
+        # Half of the returns missing is nothing to be warned of.
+        report(DiagnosticStatus.OK, 'mapping', lambda: self.integrate([(nan, nan, nan), (6.0, 0.0, 0.0)], [0, CAR]) and None)
+
+    def test_diagnostics_tell_how_it_goes(self):
+        report = self.reports()
+        report(DiagnosticStatus.OK, 'mapping', lambda: self.integrate([(2.0, 0.0, 0.0)], [CAR]) and None)
+        bad = report(DiagnosticStatus.ERROR, 'empty', lambda: self.deal_with(self.robot.scan([], [])) and None)
         values = {v.key: v.value for v in bad.status[0].values}
         self.assertGreaterEqual(int(values['dropped: empty']), 1)
         self.assertIn('latency, 99th percentile [ms]', values)
@@ -143,7 +163,11 @@ class Live(MapperTest):
         self.assertNotIn((0, 3, 0), blocks, 'hits beyond the range are not mapped')
         answer = self.reconfigure(resolution=0.5, view_range=3.0)
         self.assertEqual((answer.resolution, answer.view_range), (1.0, 0.0), 'refused as a whole')
+        self.assertIn('resolution cannot change while mapping', answer.last_refusal)
+        self.status.wait_for(lambda m: m.last_refusal == answer.last_refusal, 'the refusal in the status')
         self.log.wait_for(lambda m: 'resolution cannot change while mapping' in m.msg, 'the reason in the log')
+        self.assertEqual(self.reconfigure(view_range=3.0).last_refusal, '', 'taken over')
+        wait_until(lambda: self.status.messages[-1].last_refusal == '', 'the status without a refusal')
 
     def test_window_and_memory_are_bounded(self):
         self.reconfigure(window=40.0)

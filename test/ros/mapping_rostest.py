@@ -185,7 +185,11 @@ class MappingTest(unittest.TestCase):
         vertices = self.saved_vertices()
         bad = [(float('nan'), 0.0, 0.0), (0.0, float('inf'), 0.0), (0.0, 0.0, 0.0), (2.0, 2.0, 2.0)]
         status = self.integrate(bad, [CAR, CAR, CAR, 12345])
-        self.assertEqual(status.points_dropped, before.points_dropped + 4)
+        new = {name: getattr(status, name) - getattr(before, name) for name in status.__slots__
+               if name.startswith('points_')}
+        expected = dict.fromkeys(new, 0)
+        expected.update(points_received=4, points_not_finite=2, points_at_sensor=1, points_unknown_label=1)
+        self.assertEqual(new, expected)
         self.assertEqual(status.labels_not_in_table, before.labels_not_in_table + 1)
         self.assertIn(12345, status.unknown_labels)
         self.assertEqual(self.saved_vertices(), vertices)

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "bki_mapping/ros/server_config.h"
 
@@ -18,8 +19,12 @@ class LiveSettings {
   /// Takes over new settings. @throws std::invalid_argument if it cannot.
   using Apply = std::function<void(const ServerConfig&, const MapperConfig&)>;
 
+  /// @param answered called when a change was taken over or refused.
   LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server, const MapperConfig& mapper,
-               Apply apply);
+               Apply apply, std::function<void()> answered);
+
+  /// Why the last change was refused; "" if it was not.
+  const std::string& lastRefusal() const { return last_refusal_; }
 
   /// A configuration with the given settings.
   static MappingConfig show(const ServerConfig& server, const MapperConfig& mapper);
@@ -33,6 +38,8 @@ class LiveSettings {
   ServerConfig server_;
   MapperConfig mapper_;
   Apply apply_;
+  std::function<void()> answered_;
+  std::string last_refusal_;
   boost::recursive_mutex mutex_;  ///< of offered_
   std::unique_ptr<dynamic_reconfigure::Server<MappingConfig>> offered_;
 };

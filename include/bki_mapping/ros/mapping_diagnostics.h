@@ -7,20 +7,18 @@
 #include <string>
 
 #include "bki_mapping/core/config.h"
+#include "bki_mapping/ros/health.h"
 #include "bki_mapping/ros/scan_ledger.h"
 
 namespace bki_mapping::ros_shell {
 
-/// Level and message of a status: the level is one of diagnostic_msgs/DiagnosticStatus.
-struct Health {
-  std::uint8_t level = 0;
-  std::string message;
-};
-
 /// Judges the time between two reports.
 /// - ERROR: clouds came and none was integrated.
-/// - WARN: clouds were dropped, mapping is slower than clouds come, is paused, or no cloud has come.
-Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config);
+/// - WARN: clouds were dropped, mapping is slower than clouds come, is paused, no cloud has come, or the map
+///   stays empty though points are used.
+/// - What judgePoints says of the points of integrated clouds.
+Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config,
+             const Health& points = {});
 
 /// Reports every `period`.
 class MappingDiagnostics {
@@ -29,17 +27,17 @@ class MappingDiagnostics {
   MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, double period);
 
   /// Reports if it is time to.
-  /// @param status asked for only then.
-  template <typename Status>
-  void update(Status&& status, const MapperConfig& config) {
+  /// @param status, points asked for only then: the status, and what is to be said of points since last time.
+  template <typename Status, typename Points>
+  void update(Status&& status, Points&& points, const MapperConfig& config) {
     const auto now = std::chrono::steady_clock::now();
     if (std::chrono::duration<double>(now - last_).count() < period_) return;
     last_ = now;
-    report(status(), config);
+    report(status(), config, points());
   }
 
  private:
-  void report(const MappingStatus& status, const MapperConfig& config);
+  void report(const MappingStatus& status, const MapperConfig& config, const Health& points);
   void fill(diagnostic_updater::DiagnosticStatusWrapper& out) const;
 
   diagnostic_updater::Updater updater_;

@@ -16,6 +16,7 @@
 #include "bki_mapping/ros/live_settings.h"
 #include "bki_mapping/ros/map_publishing.h"
 #include "bki_mapping/ros/mapping_diagnostics.h"
+#include "bki_mapping/ros/point_account.h"
 #include "bki_mapping/ros/pose_source.h"
 #include "bki_mapping/ros/scan_ledger.h"
 #include "bki_mapping/ros/scan_queue.h"
@@ -63,6 +64,8 @@ class MappingServer {
   void moveWindow();
   /// Counts a cloud as dropped and says so, but repeats no sentence within 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
+  /// Judges the points since the last call, input by input, and says what is wrong with them.
+  Health judgeAllPoints();
   MappingStatus status();
   MapSnapshot snapshot() const;
 
@@ -70,7 +73,8 @@ class MappingServer {
   ros::NodeHandle node_, private_node_;
   ServerConfig config_;
   std::unique_ptr<SemanticMapper> mapper_;
-  std::vector<ScanReader> readers_;  ///< one an input
+  std::vector<ScanReader> readers_;   ///< one an input
+  std::vector<PointAccount> points_;  ///< of each input, since the last report
   ScanLedger ledger_;
   ScanQueue waiting_;
   TimeWatch time_watch_;

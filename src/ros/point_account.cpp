@@ -1,0 +1,137 @@
+#include "bki_mapping/ros/point_account.h"
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/ros/point_field.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+/// Shares of points used below which there is a fault.
+constexpr double kFew = 0.1, kHardlyAny = 0.001;
+/// Points that are used or left out for a fault tell something if they are this share of all.
+constexpr double kTelling = 0.01;
+/// Labels of an account are told apart up to this many values.
+constexpr std::size_t kMostUnknown = 64;
+
+/// "12 %", with as many digits as tell it from 0 and 100.
+std::string percent(double share) {
+  const double rounded =
+      share > 0.99 || share < 0.01 ? std::round(1e5 * share) / 1e3 : std::round(100.0 * share);
+  return numberText(rounded) + " %";
+}
+
+/// "have labels that ...; remedy".
+std::string unknownLabels(const PointAccount& account, const InputConfig& input, const std::string& classes) {
+  const auto most = std::max_element(account.unknown_labels.begin(), account.unknown_labels.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  const bool colors =
+      input.label_encoding == LabelEncoding::kRgb || input.label_encoding == LabelEncoding::kBgr;
+  if (most == account.unknown_labels.end() || most->first == kNoLabel) {
+    return "have no label (their field holds no number, no colour or no positive score); check label_field, "
+           "label_encoding and score_fields";
+  }
+  char text[16];
+  std::snprintf(text, sizeof text, colors ? "0x%06x" : "%u", most->first);
+  return std::string("have ") + (colors ? "colours" : "labels") + " that class table '" + classes +
+         "' does not list (" + text + " most often); set classes or " +
+         (colors ? "color_match" : "label_values");
+}
+
+/// "sensor_model/min_range 2 m", or the input's own.
+std::string limit(const std::string& name, double value, double common) {
+  return (value == common ? "sensor_model/" : "the input's ") + name + " " + numberText(value) + " m";
+}
+
+std::string sentenceOf(const PointKind& kind, const PointAccount& account, const InputConfig& input,
+                       const MapperConfig& mapper, const std::string& classes) {
+  const auto count = kind.in_scan;
+  const SensorModelConfig& sensor = input.sensor_model;
+  if (count == &PointCounts::unknown_label) return unknownLabels(account, input, classes);
+  if (count == &PointCounts::not_finite) {
+    return "are NaN or infinite; check the sensor, or set clear_no_returns if it sees open space";
+  }
+  if (count == &PointCounts::at_sensor) {
+    return "are within 1 mm of the sensor, where drivers put beams without a return; check the sensor";
+  }
+  if (count == &PointCounts::too_near) {
+    return "are nearer than " + limit("min_range", sensor.min_range, mapper.sensor_model.min_range) +
+           "; lower it, or check that clouds are in metres";
+  }
+  if (count == &PointCounts::beyond_max) {
+    return "are beyond " + limit("max_range", sensor.max_range, mapper.sensor_model.max_range) +
+           "; raise it, or check that clouds are in metres";
+  }
+  if (count == &PointCounts::unlabelled) {
+    return "are of the unlabelled class; check the labels, or set unlabelled_points to occupied";
+  }
+  return "are too far from the map's origin; check that clouds are in metres, and tf";
+}
+
+}  // namespace
+
+const std::vector<PointKind>& pointKinds() {
+  using C = PointCounts;
+  using S = MappingStatus;
+  static const std::vector<PointKind> kinds = {
+      {"NaN or infinite", &C::not_finite, &S::points_not_finite, true},
+      {"at the sensor", &C::at_sensor, &S::points_at_sensor, true},
+      {"nearer than min_range", &C::too_near, &S::points_too_near, false},
+      {"beyond max_range", &C::beyond_max, &S::points_beyond_max, true},
+      {"outside the map", &C::outside_map, &S::points_outside_map, false},
+      {"unknown label", &C::unknown_label, &S::points_unknown_label, false},
+      {"unlabelled", &C::unlabelled, &S::points_unlabelled, true},
+  };
+  return kinds;
+}
+
+void PointAccount::add(const PointCounts& of_scan, const std::map<std::uint32_t, std::size_t>& labels) {
+  ++clouds;
+  counts += of_scan;
+  for (const auto& [label, count] : labels) {
+    if (unknown_labels.size() < kMostUnknown || unknown_labels.count(label) > 0)
+      unknown_labels[label] += count;
+  }
+}
+
+Health judgePoints(const PointAccount& account, const std::string& topic, const InputConfig& input,
+                   const MapperConfig& mapper, const std::string& classes) {
+  const PointCounts& counts = account.counts;
+  const auto all = static_cast<double>(counts.points), used = static_cast<double>(counts.used);
+  std::size_t faults = 0;
+  const PointKind *worst = nullptr, *worst_fault = nullptr;
+  const auto more = [&](const PointKind& kind, const PointKind* than) {
+    return counts.*kind.in_scan > (than ? counts.*than->in_scan : 0);
+  };
+  for (const PointKind& kind : pointKinds()) {
+    if (more(kind, worst)) worst = &kind;
+    if (kind.may_be_many) continue;
+    faults += counts.*kind.in_scan;
+    if (more(kind, worst_fault)) worst_fault = &kind;
+  }
+  const double sound = used + static_cast<double>(faults);
+  Health health;
+  if (worst_fault && sound >= kTelling * all && used < kFew * sound) {
+    health.level = used < kHardlyAny * sound ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN;
+    worst = worst_fault;
+  } else if (worst && used + static_cast<double>(counts.no_returns) < kHardlyAny * all) {
+    health.level = DiagnosticStatus::WARN;
+  } else {
+    return health;
+  }
+  health.message = (used > 0.0 ? "only " + percent(used / all) : std::string("none")) +
+                   " of the points of the last " +
+                   (account.clouds == 1 ? "cloud" : std::to_string(account.clouds) + " clouds") + " of " +
+                   topic + " is used: " + percent(static_cast<double>(counts.*worst->in_scan) / all) + " " +
+                   sentenceOf(*worst, account, input, mapper, classes);
+  return health;
+}
+
+}  // namespace bki_mapping::ros_shell
