@@ -199,9 +199,16 @@ void MappingServer::moveWindow() {
   if (config_.window <= 0.0) return;
   const GridGeometry& geometry = mapper_->map().geometry();
   const double reach = 0.5 * (config_.window + geometry.blockSize());
-  publishing_->changed(mapper_->eraseBlocks([&](const BlockIndex& block) {
-    return (geometry.blockCentre(block) - sensor_).cwiseAbs().maxCoeff() > reach;
-  }));
+  const auto outside = [&](const Eigen::Vector3d& point) {
+    return (point - sensor_).cwiseAbs().maxCoeff() > reach;
+  };
+  publishing_->changed(
+      mapper_->eraseBlocks([&](const BlockIndex& block) { return outside(geometry.blockCentre(block)); }));
+  const auto left = [&](const geometry_msgs::PoseStamped& pose) {
+    const auto& p = pose.pose.position;
+    return outside({p.x, p.y, p.z});
+  };
+  trajectory_.erase(std::remove_if(trajectory_.begin(), trajectory_.end(), left), trajectory_.end());
 }
 
 void MappingServer::checkClock() {

@@ -74,7 +74,8 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           [](C & c) -> auto& { return c.on_time_jump; }),
       realParameter<C>(
           "window", "a number >= 0", "m",
-          "Edge of the cube about the sensor outside of which blocks are forgotten; 0: nothing is forgotten.",
+          "Edge of the cube about the sensor outside of which blocks and poses of the trajectory are "
+          "forgotten; 0: nothing is forgotten.",
           [](C & c) -> auto& { return c.window; }, notNegative),
       realParameter<C>(
           "diagnostic_period", "a number > 0", "s", "Time between reports on /diagnostics.",

@@ -116,8 +116,8 @@ class Live(MapperTest):
         self.reconfigure(sensor_model_min_range=5.0)
         report(DiagnosticStatus.ERROR, 'nearer than sensor_model/min_range 5 m',
                lambda: self.integrate([(2.0, 0.0, 0.0)], [CAR]) and None)
-        # Half of the returns missing is nothing to be warned of.
-        report(DiagnosticStatus.OK, 'mapping', lambda: self.integrate([(nan, nan, nan), (6.0, 0.0, 0.0)], [0, CAR]) and None)
+        half = [(nan, nan, nan), (6.0, 0.0, 0.0)]  # nothing to be warned of
+        report(DiagnosticStatus.OK, 'mapping', lambda: self.integrate(half, [0, CAR]) and None)
 
     def test_diagnostics_tell_how_it_goes(self):
         report = self.reports()
@@ -142,7 +142,8 @@ class Live(MapperTest):
         before = self.status.find(lambda m: True)
         stamp = self.robot.scan([(2.0, 0.0, 0.0)], [CAR], label_name='class')
         status = self.deal_with(stamp)
-        self.assertEqual((status.dropped_bad_cloud, status.last_drop_reason), (before.dropped_bad_cloud + 1, 'bad cloud'))
+        self.assertEqual(status.dropped_bad_cloud, before.dropped_bad_cloud + 1)
+        self.assertEqual(status.last_drop_reason, 'bad cloud')
         self.assertIn("no field 'label'", status.last_drop)
         stamp = self.stamp_for(self.merged)
         self.robot.publish_pose(stamp)

@@ -25,10 +25,7 @@ HITS = [(4.2, 0.3, 0.4), (4.6, 0.2, 0.1), (0.5, 3.5, -1.5)]  # two in voxel (4, 
 
 
 def cubes(array, namespace):
-    for marker in array.markers:
-        if marker.ns == namespace:
-            return [] if marker.action == Marker.DELETE else [(p.x, p.y, p.z) for p in marker.points]
-    return []
+    return [(p.x, p.y, p.z) for marker in array.markers if marker.ns == namespace for p in marker.points]
 
 
 class MappingTest(unittest.TestCase):

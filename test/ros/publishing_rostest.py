@@ -10,7 +10,7 @@ import rospy
 import rostest
 from bki_mapping.msg import ElevationMap, OccupancyUpdate
 from map_msgs.msg import OccupancyGridUpdate
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Path
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import CAR, ROAD, Listener, MapperTest, random_scan, wait_until  # noqa: E402
@@ -126,6 +126,36 @@ class Publishing(MapperTest):
         shows((3.5, 0.5, 0.5))
         self.integrate([(3.5, 0.2, 0.2)], [CAR], position=(110.0, 0.5, 0.5))  # the view moves on, chunk by chunk
         shows((100.5, 0.5, 0.5), (113.5, 0.5, 0.5))
+
+    def test_on_a_long_drive_topics_stay_within_the_window(self):
+        self.reconfigure(window=40.0)
+        reach = 0.5 * (40.0 + 8.0)  # as far as centres of kept blocks and poses are from the sensor
+        markers, path, grid = MarkerClient(), Listener('trajectory', Path), Listener('projected_map', OccupancyGrid)
+        for listener in (markers.listener, path, grid):
+            self.addCleanup(listener.close)
+            wait_until(listener.subscriber.get_num_connections, 'the connection')
+        for seed in range(80):
+            position = (20.0 * seed, 0.0, 0.0)
+            stamp = self.integrate(*random_scan(seed), position=position)
+        truth = self.map_of_server(stamp)
+        expected = sorted((8 * x + v % 8 + 0.5, 8 * y + v // 8 % 8 + 0.5, 8 * z + v // 64 + 0.5)
+                          for (x, y, z), (states, _, _) in truth.items() for v in range(512) if states[v] == 2)
+        self.assertGreater(len(expected), 20)
+        wait_until(lambda: markers.update() or sorted(p for _, p in markers.cubes()) == expected, 'the same markers')
+        numbers = {m.id for array in markers.listener.messages for m in array.markers}
+        self.assertLess(max(numbers), 32, 'numbers of chunks that are gone are used again')
+        last = path.wait_for(lambda m: m.header.stamp == stamp, 'the last trajectory')
+        self.assertEqual([p.pose.position.x for p in last.poses], [position[0] - 20.0, position[0]])
+        whole = grid.find(lambda m: True)
+        self.assertLessEqual(whole.info.width, 2 * reach + 2 * 128 + 16, 'of the window and the margins')
+
+    def test_a_window_below_a_block_keeps_the_block_of_the_sensor(self):
+        self.reconfigure(window=0.1)
+        for x in (0.0, 3.9, 8.0, 1004.0):  # also at the face between two blocks
+            stamp = self.integrate([(2.5, 0.5, 0.5), (20.5, 0.5, 0.5)], [CAR] * 2, position=(x, 0.5, 0.5))
+            block = (int(x // 8), 0, 0)
+            self.assertIn(block, self.map_of_server(stamp))
+            self.assertTrue(all(abs(b[0] - block[0]) <= 1 for b in self.map_of_server(stamp)))
 
     def test_nothing_is_built_while_nobody_listens(self):
         def connections():

@@ -60,7 +60,7 @@ class MappingServer {
   void checkClock();
   void onTimeJump(const ros::Time& new_time, const std::string& what);
   void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
-  /// Forgets blocks outside of the window about the sensor.
+  /// Forgets blocks and poses outside of the window about the sensor.
   void moveWindow();
   /// Counts a cloud as dropped and says so, but repeats no sentence within 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);

@@ -72,11 +72,20 @@ class CellMarkers : public MapPublisher {
 
   void rest() override {
     MapPublisher::rest();
-    shown_.clear();
+    chunks_.clear();
+    free_ids_.clear();
   }
 
  private:
   using Markers = std::map<ClassId, Marker>;
+
+  /// A chunk of which the map holds a block.
+  struct Chunk {
+    std::int32_t id;
+    bool in_view = false;
+    std::set<ClassId> shown;  ///< the classes of which listeners hold a marker
+  };
+  using Chunks = std::map<GridIndex, Chunk>;
 
   void publishNew(const MapSnapshot& snapshot) override {
     if (changed.all()) {
@@ -85,11 +94,12 @@ class CellMarkers : public MapPublisher {
     }
     IndexNumbering chunks;
     for (const GridIndex& block : changed.blocks()) chunks.insert(chunkOf(block));
-    for (const GridIndex& chunk : chunks_.members()) {  // the sensor's view moves on
-      if (inView(chunk, snapshot) == (shown_.count(chunk) == 0)) chunks.insert(chunk);
+    for (const auto& [index, chunk] : chunks_) {  // the sensor's view moves on
+      if (inView(index, snapshot) != chunk.in_view) chunks.insert(index);
     }
     MarkerArray message;
-    for (const GridIndex& chunk : chunks.members()) appendChunk(chunk, snapshot, message);
+    for (const GridIndex& index : chunks.members()) appendChunk(chunkAt(index), snapshot, message);
+    forgetEmpty(chunks.members(), snapshot);
     if (!message.markers.empty()) publisher_.publish(message);
   }
 
@@ -99,10 +109,41 @@ class CellMarkers : public MapPublisher {
     message.markers.back().header = snapshot.header;
     message.markers.back().action = Marker::DELETEALL;
     message.markers.back().pose.orientation.w = 1.0;
-    shown_.clear();
-    for (const auto& entry : snapshot.mapper.map().entries()) chunks_.insert(chunkOf(entry.index));
-    for (const GridIndex& chunk : chunks_.members()) appendChunk(chunk, snapshot, message);
+    for (const auto& entry : snapshot.mapper.map().entries()) chunkAt(chunkOf(entry.index));
+    std::vector<GridIndex> indices;
+    for (auto place = chunks_.begin(); place != chunks_.end(); ++place) {
+      place->second.shown.clear();
+      appendChunk(place, snapshot, message);
+      indices.push_back(place->first);
+    }
+    forgetEmpty(indices, snapshot);
     return message;
+  }
+
+  /// Finds a chunk, or makes it with an id that no marker of listeners has.
+  Chunks::iterator chunkAt(const GridIndex& index) {
+    const auto place = chunks_.find(index);
+    if (place != chunks_.end()) return place;
+    auto id = static_cast<std::int32_t>(chunks_.size());  // as many are in use where none is free
+    if (!free_ids_.empty()) {
+      id = free_ids_.back();
+      free_ids_.pop_back();
+    }
+    return chunks_.emplace(index, Chunk{id, false, {}}).first;
+  }
+
+  /// Forgets chunks without a block. Called last, since their ids are free only for the next message: this
+  /// one deletes their markers.
+  void forgetEmpty(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot) {
+    for (const GridIndex& index : indices) {
+      bool any = false;
+      for (int n = 0; n < kChunkEdge * kChunkEdge * kChunkEdge && !any; ++n) {
+        any = snapshot.mapper.map().find({GridGeometry::voxelOf({index}, n)});
+      }
+      if (any) continue;
+      free_ids_.push_back(chunks_.at(index).id);
+      chunks_.erase(index);
+    }
   }
 
   bool inView(const GridIndex& chunk, const MapSnapshot& snapshot) const {
@@ -110,23 +151,22 @@ class CellMarkers : public MapPublisher {
     return snapshot.inView(Eigen::Vector3d(chunk.x + 0.5, chunk.y + 0.5, chunk.z + 0.5) * edge, edge);
   }
 
-  void appendChunk(const GridIndex& chunk, const MapSnapshot& snapshot, MarkerArray& message) {
-    const auto id = static_cast<std::int32_t>(chunks_.insert(chunk));
+  void appendChunk(Chunks::iterator place, const MapSnapshot& snapshot, MarkerArray& message) {
+    Chunk& chunk = place->second;
     Markers markers;
-    const bool visible = inView(chunk, snapshot);
-    if (visible) fill(chunk, snapshot, markers);
-    const std::set<ClassId> before = std::move(shown_[chunk]);
-    shown_.erase(chunk);
+    chunk.in_view = inView(place->first, snapshot);
+    if (chunk.in_view) fill(place->first, snapshot, markers);
+    const std::set<ClassId> before = std::move(chunk.shown);
+    chunk.shown.clear();
     for (const ClassId gone : before) {
       if (markers.count(gone) > 0) continue;
       message.markers.push_back(emptyMarker(snapshot, gone));
       message.markers.back().action = Marker::DELETE;
-      message.markers.back().id = id;
+      message.markers.back().id = chunk.id;
     }
-    if (visible) shown_[chunk];  // shown, if only as nothing
     for (auto& [label, marker] : markers) {
-      marker.id = id;
-      shown_[chunk].insert(label);
+      marker.id = chunk.id;
+      chunk.shown.insert(label);
       message.markers.push_back(std::move(marker));
     }
   }
@@ -172,8 +212,8 @@ class CellMarkers : public MapPublisher {
 
   VoxelState state_;
   float alpha_;
-  IndexNumbering chunks_;                         ///< every chunk ever seen; its number is its id
-  std::map<GridIndex, std::set<ClassId>> shown_;  ///< what listeners hold: classes of each chunk in view
+  Chunks chunks_;                       ///< what listeners hold
+  std::vector<std::int32_t> free_ids_;  ///< below the greatest in use, and of no chunk
 };
 
 }  // namespace
