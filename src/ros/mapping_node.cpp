@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/ros/mapping_server.h"
+#include "bki_mapping/ros/termination.h"
 
 namespace {
 
@@ -30,6 +31,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   ros::init(argc, argv, "mapping");
+  bki_mapping::ros_shell::endOnTerminate();
   const ros::NodeHandle node, private_node("~");  // while one lives, ROS can still say what went wrong
   try {
     bki_mapping::ros_shell::MappingServer server(node, private_node);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "bki_mapping/ros/termination.h"
 #include "bki_mapping/tools/options.h"
 #include "bki_mapping/tools/sequence_messages.h"
 
@@ -97,6 +98,7 @@ int play(const po::variables_map& given) {
   player.waitForListener();
   const ros::WallTime start = ros::WallTime::now();
   std::uint64_t first_stamp = 0;
+  std::size_t played = 0;
   for (std::size_t i = first; i < last && ros::ok(); ++i) {
     const SequenceFrame frame = sequence.read(i);
     if (i == first) first_stamp = frame.stamp;
@@ -107,11 +109,15 @@ int play(const po::variables_map& given) {
       player.publishClock(first_stamp + static_cast<std::uint64_t>(now * 1e9));
       ros::WallDuration(std::min(kClockStep, (due() - now) / rate)).sleep();
     }
+    if (!ros::ok()) break;
     player.publish(frame);
+    ++played;
     if (rate == 0.0) player.waitForAcknowledgement(frame);
     tools::showProgress(i + 1 - first, last - first, "scans");
   }
-  std::cout << "played " << last - first << " scans\n";
+  std::cout << "played " << played;
+  if (played < last - first) std::cout << " of " << last - first;
+  std::cout << " scans\n";
   return 0;
 }
 
@@ -128,6 +134,7 @@ int main(int argc, char** argv) {
                      "Plays a sequence in SemanticKITTI's layout: cloud_in, /tf and /clock.", options());
     if (!given) return 0;
     ros::init(argc, argv, "play_sequence");
+    ros_shell::endOnTerminate();
     return play(*given);
   });
 }
