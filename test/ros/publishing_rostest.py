@@ -11,6 +11,7 @@ import rostest
 from bki_mapping.msg import ElevationMap, OccupancyUpdate
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
+from rosgraph_msgs.msg import Log
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import CAR, ROAD, Listener, MapperTest, random_scan, wait_until  # noqa: E402
@@ -156,6 +157,23 @@ class Publishing(MapperTest):
             block = (int(x // 8), 0, 0)
             self.assertIn(block, self.map_of_server(stamp))
             self.assertTrue(all(abs(b[0] - block[0]) <= 1 for b in self.map_of_server(stamp)))
+
+    def test_grids_too_large_for_a_message_are_refused_in_a_sentence(self):
+        grid, log = Listener('projected_map', OccupancyGrid), Listener('/rosout', Log)
+        for listener in (grid, log):
+            self.addCleanup(listener.close)
+            wait_until(listener.subscriber.get_num_connections, 'the connection')
+        self.integrate([(3.5, 0.5, 0.5)], [CAR])
+        stamp = self.integrate([(3.5, 0.5, 0.5)], [CAR], position=(1e6, 1e6, 0.0))  # localisation may jump
+        self.assertGreater(len(self.map_of_server(stamp)), 1)
+        elevation = Listener('elevation_map', ElevationMap)  # wants all of it; updates are small
+        self.addCleanup(elevation.close)
+        for topic in ('projected_map', 'elevation_map'):
+            log.wait_for(lambda m: topic in m.msg and 'set window' in m.msg, f'a warning of {topic}')
+        self.call('reset')
+        stamp = self.integrate([(3.5, 0.5, 0.5)], [CAR])
+        for listener in (grid, elevation):
+            listener.wait_for(lambda m: m.header.stamp == stamp, 'a grid of the new map')
 
     def test_nothing_is_built_while_nobody_listens(self):
         def connections():

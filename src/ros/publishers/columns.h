@@ -1,11 +1,15 @@
 /// @file What the publishers of maps seen from above have in common.
 #pragma once
 
+#include <ros/console.h>
+
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "bki_mapping/mapping/column_map.h"
 #include "bki_mapping/ros/map_publisher.h"
+#include "bki_mapping/ros/sentence_throttle.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -61,6 +65,18 @@ class ColumnPublisher : public MapPublisher {
     return columns_.update(map, snapshot.mapper.classes(), blocks);
   }
 
+  /// Whether a message with a rectangle is short enough to be sent; says so if it is not.
+  bool fits(const CellRectangle& r, std::size_t bytes_per_cell) {
+    constexpr double kLongest = 1e9;  // roscpp ends connections over which more comes [bytes]
+    const double bytes = static_cast<double>(r.width) * r.height * static_cast<double>(bytes_per_cell);
+    if (bytes <= kLongest) return true;
+    const std::string why =
+        topic() + " is not sent: " + std::to_string(r.width) + " x " + std::to_string(r.height) +
+        " cells are more than a message can hold; set window, " + "or check the localisation";
+    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("%s", why.c_str());
+    return false;
+  }
+
   /// Calls write(place in the rectangle's arrays, view) for every known column in a rectangle of whole
   /// blocks.
   template <typename Write>
@@ -89,6 +105,7 @@ class ColumnPublisher : public MapPublisher {
  private:
   ColumnMap columns_;
   bool known_ = false;  ///< whether columns_ follows the map
+  SentenceThrottle throttle_;
 };
 
 }  // namespace bki_mapping::ros_shell

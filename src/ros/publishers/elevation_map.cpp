@@ -15,16 +15,20 @@ class Elevation : public ColumnPublisher {
         "elevation_map", *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
           bool all = false;
           look(snapshot, all);
-          subscriber.publish(message(snapshot, everything(), true));
+          const CellRectangle rectangle = everything();
+          if (fits(rectangle, kBytesPerCell)) subscriber.publish(message(snapshot, rectangle, true));
         });
   }
 
  private:
+  static constexpr std::size_t kBytesPerCell = 3 * sizeof(float) + 1;
+
   void publishNew(const MapSnapshot& snapshot) override {
     bool all = false;
     const std::set<ColumnMap::Place> places = look(snapshot, all);
     ++sequence_;
-    publisher_.publish(message(snapshot, all ? everything() : around(places), all));
+    const CellRectangle rectangle = all ? everything() : around(places);
+    if (fits(rectangle, kBytesPerCell)) publisher_.publish(message(snapshot, rectangle, all));
   }
 
   ElevationMap message(const MapSnapshot& snapshot, const CellRectangle& rectangle, bool whole) const {
