@@ -67,7 +67,8 @@ if(CATKIN_ENABLE_TESTING)
   # rostest does not say that a test skipped: ctest is told before.
   add_test(NAME real_bag_rostest
     COMMAND ${PROJECT_SOURCE_DIR}/test/with_data bags/luminar_no_label_no_tf.bag ${CATKIN_ENV}
-      rostest --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} ${PROJECT_SOURCE_DIR}/test/ros/real_bag.test)
+      rostest --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} --results-filename test_ros_real_bag.xml
+      --results-base-dir ${CATKIN_TEST_RESULTS_DIR} ${PROJECT_SOURCE_DIR}/test/ros/real_bag.test)
   set_tests_properties(real_bag_rostest PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
   add_rostest(test/ros/two_mappers.test)
   # Found by rostest where catkin puts executables; loads the nodelet into its own process.

@@ -2,6 +2,7 @@
 #include <rosbag/bag.h>
 
 #include <iostream>
+#include <memory>
 
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/tools/options.h"
@@ -37,19 +38,20 @@ int writeBag(const po::variables_map& given) {
   const tools::FrameNames names{given["map-frame"].as<std::string>(), given["frame"].as<std::string>()};
   const std::string output = given["output"].as<std::string>();
   AtomicFile file(output);
+  auto bag = std::make_unique<rosbag::Bag>();
   try {
-    rosbag::Bag bag;
-    bag.open(file.temporaryPath(), rosbag::bagmode::Write);
-    bag.setCompression(compression(given["compression"].as<std::string>()));
+    bag->open(file.temporaryPath(), rosbag::bagmode::Write);
+    bag->setCompression(compression(given["compression"].as<std::string>()));
     for (std::size_t i = first; i < last; ++i) {
       const SequenceFrame frame = sequence.read(i);
       const ros::Time stamp = ros::Time().fromNSec(frame.stamp);
-      bag.write("/tf", stamp, tools::tfMessage(frame, names));
-      bag.write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
+      bag->write("/tf", stamp, tools::tfMessage(frame, names));
+      bag->write(given["cloud-topic"].as<std::string>(), stamp, tools::cloudMessage(frame, names));
       tools::showProgress(i + 1 - first, last - first, "scans");
     }
-    bag.close();
+    bag->close();
   } catch (const rosbag::BagException& fault) {
+    static_cast<void>(bag.release());  // its destructor would write once more, throw, and end the process
     throw writeFailure(output, fault.what());
   }
   file.commit();

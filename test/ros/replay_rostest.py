@@ -2,7 +2,9 @@
 """A simulated drive played by play_sequence, and the same drive replayed from a bag, give the map of map_sequence to
 the byte: through the launch files that users start."""
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -76,6 +78,30 @@ class Replay(unittest.TestCase):
                                     check=False)
             self.assertEqual(result.returncode, 1)
             self.assertIn("did you mean '--sequence'?", result.stderr)
+        for arguments, words in ((('play_sequence', '--rate', '-1'), '--rate is -1, but must be at least 0'),
+                                 (('play_sequence', '--rate', 'nan'), '--rate is nan, but must be at least 0'),
+                                 (('play_sequence', '--scans', '0'), '--scans is 0, but must be at least 1'),
+                                 (('sequence_to_bag', '--first', '-1', '--output', os.path.join(self.folder, 'x')),
+                                  '--first is -1, but must be at least 0')):
+            result = subprocess.run([program(arguments[0]), '--sequence', self.drive, *arguments[1:]], timeout=30,
+                                    capture_output=True, text=True, check=False)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(words, result.stderr)
+
+    def test_a_full_disk_is_said_in_one_sentence(self):
+        def limit():  # as if the disk were full
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
+        folder = os.path.join(self.folder, 'full')
+        os.mkdir(folder)
+        bag = os.path.join(folder, 'drive.bag')
+        result = subprocess.run([program('sequence_to_bag'), '--sequence', self.drive, '--output', bag],
+                                capture_output=True, text=True, timeout=60, check=False, preexec_fn=limit,
+                                restore_signals=False)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn(bag + ' cannot be written', result.stderr)
+        self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+        self.assertEqual(os.listdir(folder), [])
 
 
 if __name__ == '__main__':
