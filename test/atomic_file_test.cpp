@@ -176,6 +176,8 @@ TEST_F(FilesAndLinks, TemporariesOfOthersStay) {
     return folder_ / name;
   };
   const std::string removed = leave(".map.ply.bki_mapping-" + gone + "-abcDEF");
+  // In a container each run may have the same id; what this process itself writes to is locked.
+  const std::string of_namesake = leave(".map.ply.bki_mapping-" + std::to_string(getpid()) + "-abcDEF");
   std::vector<std::string> kept = {
       leave(".map.ply.bki_mapping-" + alive + "-abcDEF"),        // its process is alive
       leave(".other.ply.bki_mapping-" + gone + "-abcDEF"),       // of another file
@@ -192,6 +194,7 @@ TEST_F(FilesAndLinks, TemporariesOfOthersStay) {
   kept.push_back(folder_ / (".map.ply.bki_mapping-" + gone + "-aalink"));
   writeTextFile(path, "new");
   EXPECT_FALSE(fs::exists(removed));
+  EXPECT_FALSE(fs::exists(of_namesake));
   for (const std::string& name : kept) EXPECT_TRUE(fs::exists(fs::symlink_status(name))) << name;
 }
 
