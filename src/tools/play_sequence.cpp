@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <set>
 
 #include "bki_mapping/ros/termination.h"
 #include "bki_mapping/tools/options.h"
@@ -36,18 +37,27 @@ po::options_description options() {
 class Player {
  public:
   explicit Player(const tools::FrameNames& names) : names_(names) {
-    cloud_ = node_.advertise<sensor_msgs::PointCloud2>("cloud_in", 10);
+    cloud_ = node_.advertise<sensor_msgs::PointCloud2>(
+        "cloud_in", 10,
+        [this](const ros::SingleSubscriberPublisher& link) { listeners_.insert(link.getSubscriberName()); });
     tf_ = node_.advertise<tf2_msgs::TFMessage>("/tf", 100,
                                                true);  // latched: who comes late still gets the last
     clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 10);
     status_ = node_.subscribe("mapping/status", 100, &Player::onStatus, this);
   }
 
-  void waitForListener() {
+  /// @param mapper whether it must be the mapper that listens, and not rviz alone: the mapper would miss the
+  /// first cloud, and never acknowledge it.
+  void waitForListener(bool mapper) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kListenerWait);
-    while (ros::ok() && (cloud_.getNumSubscribers() == 0 || tf_.getNumSubscribers() == 0)) {
+    const auto missing = [&] {
+      return cloud_.getNumSubscribers() == 0 || tf_.getNumSubscribers() == 0 ||
+             (mapper && listeners_.count(mapper_) == 0);
+    };
+    while (ros::ok() && missing()) {
       if (ros::WallTime::now() > end) {
-        throw std::runtime_error("nobody subscribed to " + cloud_.getTopic() +
+        throw std::runtime_error((mapper ? "no mapper with " + status_.getTopic() : std::string("nobody")) +
+                                 " subscribed to " + cloud_.getTopic() +
                                  " and /tf within 60 s; start the mapper");
       }
       ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kClockStep));
@@ -55,6 +65,7 @@ class Player {
   }
 
   void publish(const SequenceFrame& frame) {
+    acknowledged_ = 0;  // a mapper that has mapped the sequence before acknowledged this stamp then
     publishClock(frame.stamp);
     tf_.publish(tools::tfMessage(frame, names_));
     cloud_.publish(tools::cloudMessage(frame, names_));
@@ -68,7 +79,7 @@ class Player {
 
   void waitForAcknowledgement(const SequenceFrame& frame) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kAcknowledgeWait);
-    while (ros::ok() && acknowledged_ < frame.stamp) {
+    while (ros::ok() && acknowledged_ != frame.stamp) {
       if (ros::WallTime::now() > end) {
         throw std::runtime_error(status_.getTopic() +
                                  " did not acknowledge a scan within 60 s; check the mapper");
@@ -78,14 +89,17 @@ class Player {
   }
 
  private:
-  void onStatus(const MappingStatus& status) {
-    acknowledged_ = std::max(acknowledged_, status.header.stamp.toNSec());
+  void onStatus(const ros::MessageEvent<const MappingStatus>& event) {
+    mapper_ = event.getPublisherName();
+    acknowledged_ = event.getConstMessage()->header.stamp.toNSec();
   }
 
   tools::FrameNames names_;
   ros::NodeHandle node_;
   ros::Publisher cloud_, tf_, clock_;
   ros::Subscriber status_;
+  std::set<std::string> listeners_;  ///< nodes that have subscribed to the clouds
+  std::string mapper_;               ///< the node that publishes the status; empty: none yet
   std::uint64_t acknowledged_ = 0;
 };
 
@@ -95,7 +109,7 @@ int play(const po::variables_map& given) {
   const double rate = given["rate"].as<double>();
 
   Player player({given["map-frame"].as<std::string>(), given["frame"].as<std::string>()});
-  player.waitForListener();
+  player.waitForListener(rate == 0.0);
   const ros::WallTime start = ros::WallTime::now();
   std::uint64_t first_stamp = 0;
   std::size_t played = 0;

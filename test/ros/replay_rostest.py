@@ -14,6 +14,8 @@ import rospy
 import rostest
 from bki_mapping.msg import MappingStatus
 from bki_mapping.srv import SaveMap
+from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import Listener, program, wait_until  # noqa: E402
@@ -71,6 +73,28 @@ class Replay(unittest.TestCase):
             run('sequence_to_bag', '--sequence', self.drive, '--output', bag, '--compression', compression)
             replayed = self.map_of_launch('line', 'replay.launch', f'bag:={bag}', 'rate:=0.5')
             self.assertTrue(replayed == self.expected_map('line'), 'the maps differ')
+
+    def test_rate_0_waits_for_the_mapper_and_not_for_just_any_listener(self):
+        clouds, poses = Listener('/velodyne_points', PointCloud2), Listener('/tf', TFMessage)
+        status = Listener('/mapping/status', MappingStatus)
+        player = subprocess.Popen([program('play_sequence'), '--sequence', self.drive, '--rate', '0',
+                                   'cloud_in:=/velodyne_points'])
+        try:
+            for listener in (clouds, poses):
+                wait_until(lambda: listener.subscriber.get_num_connections() > 0, 'the player starting')
+            mapper = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', 'mapping.launch'])
+            try:
+                status.wait_for(lambda m: m.integrated == SCANS, f'mapping {SCANS} scans')
+            finally:
+                mapper.terminate()
+                mapper.wait(30)
+        finally:
+            player.terminate()
+            player.wait(30)
+            for listener in (clouds, poses, status):
+                wait_until(lambda: listener.subscriber.get_num_connections() == 0, 'all programs ending')
+                listener.close()
+        self.assertEqual(len(clouds.messages), SCANS)
 
     def test_programs_refuse_what_they_do_not_know(self):
         for name in ('play_sequence', 'sequence_to_bag'):
