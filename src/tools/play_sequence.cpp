@@ -5,6 +5,8 @@
 #include <rosgraph_msgs/Clock.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <set>
 
@@ -28,7 +30,8 @@ po::options_description options() {
       "rate", tools::realOption("--rate", 0.0)->value_name("FACTOR")->default_value(1.0),
       "1 is real time, 2 twice as fast; 0 waits until `mapping/status` acknowledges each scan")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
-      "map-frame", text("FRAME")->default_value("map"), "frame of the map");
+      "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
+      "check", "read the first scan, print the folder's absolute path, and end; for launch files");
   options.add(tools::sequenceOptions());
   return options;
 }
@@ -103,6 +106,30 @@ class Player {
   std::uint64_t acknowledged_ = 0;
 };
 
+/// An absolute path; ~ is what shells leave in sequence:=~/DIR.
+std::filesystem::path absolutePath(const std::string& path) {
+  const char* home = std::getenv("HOME");
+  if (path.rfind("~/", 0) == 0 && home != nullptr) return home + path.substr(1);
+  return std::filesystem::absolute(path).lexically_normal();
+}
+
+/// Launch files resolve the folder where roslaunch runs, and give it to the node, which runs elsewhere.
+void takeFolderOfParameter(po::variables_map& given) {
+  std::string folder;
+  if (!given.count("sequence") && ros::param::get("~sequence", folder)) {
+    given.insert({"sequence", po::variable_value(folder, false)});
+  }
+}
+
+/// Prints the path of a sequence that can be played. @throws as Sequence.
+int check(const po::variables_map& given) {
+  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
+  const std::string folder = absolutePath(given["sequence"].as<std::string>()).string();
+  Sequence(folder, given["labels"].as<std::string>()).read(0);
+  std::cout << folder;  // roslaunch takes a line's end for a part of the path
+  return 0;
+}
+
 int play(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
@@ -147,8 +174,10 @@ int main(int argc, char** argv) {
         tools::parse(static_cast<int>(pointers.size()), pointers.data(),
                      "Plays a sequence in SemanticKITTI's layout: cloud_in, /tf and /clock.", options());
     if (!given) return 0;
+    if (given->count("check")) return check(*given);
     ros::init(argc, argv, "play_sequence");
     ros_shell::endOnTerminate();
+    takeFolderOfParameter(*given);
     return play(*given);
   });
 }

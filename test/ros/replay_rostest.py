@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """A simulated drive played by play_sequence, and the same drive replayed from a bag, give the map of map_sequence to
-the byte: through the launch files that users start."""
+the byte: through the launch files that users start, whose paths are those of the shell. What cannot be played ends."""
 import os
 import resource
 import shutil
@@ -10,6 +10,8 @@ import sys
 import tempfile
 import unittest
 
+import rosbag
+import roslib.packages
 import rospy
 import rostest
 from bki_mapping.msg import MappingStatus
@@ -18,9 +20,10 @@ from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import Listener, program, wait_until  # noqa: E402
+from harness import TIMEOUT, Listener, program, wait_until  # noqa: E402
 
 SCANS = 6
+PACKAGE = roslib.packages.get_pkg_dir('bki_mapping')
 
 
 def run(name, *arguments):
@@ -34,21 +37,24 @@ class Replay(unittest.TestCase):
         cls.folder = tempfile.mkdtemp()
         cls.drive = os.path.join(cls.folder, 'drive')
         run('simulate_drive', '--output', cls.drive, '--scans', str(SCANS), '--beams', '32', '--columns', '900')
+        cls.bag = os.path.join(cls.folder, 'my drive.bag')
+        run('sequence_to_bag', '--sequence', cls.drive, '--output', cls.bag)
 
     @classmethod
     def tearDownClass(cls):
         shutil.rmtree(cls.folder)
 
-    def expected_map(self, mode):
-        path = os.path.join(self.folder, f'expected_{mode}.ply')
-        run('map_sequence', '--sequence', self.drive, '--set', f'free_space/mode={mode}', '--include',
-            'occupied,free', '--output', path)
+    def expected_map(self, *options):
+        path = os.path.join(self.folder, 'expected.ply')
+        run('map_sequence', '--sequence', self.drive, '--include', 'occupied,free', '--output', path, *options)
         with open(path, 'rb') as file:
             return file.read()
 
-    def map_of_launch(self, mode, *launch):
+    def map_of_launch(self, *launch):
+        """The map after a launch in the drive's folder; HOME is that folder, PWD is not."""
         status = Listener('/mapping/status', MappingStatus)
-        server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, f'mode:={mode}', 'rviz:=false'])
+        server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, 'rviz:=false'], cwd=self.folder,
+                                  env={**os.environ, 'HOME': self.folder, 'PWD': '/'})
         try:
             status.wait_for(lambda m: m.integrated == SCANS, f'mapping {SCANS} scans with {launch[0]}')
             path = os.path.join(self.folder, 'map.ply')
@@ -63,16 +69,78 @@ class Replay(unittest.TestCase):
 
     def test_play_sequence(self):
         for mode, nodelet in (('line', 'true'), ('linear', 'false')):
-            played = self.map_of_launch(mode, 'semantic_kitti.launch', f'sequence:={self.drive}', 'rate:=0',
+            played = self.map_of_launch('semantic_kitti.launch', f'sequence:={self.drive}', 'rate:=0', f'mode:={mode}',
                                         f'nodelet:={nodelet}')
-            self.assertTrue(played == self.expected_map(mode), f'the maps of mode {mode} differ')
+            expected = self.expected_map('--set', f'free_space/mode={mode}')
+            self.assertTrue(played == expected, f'the maps of mode {mode} differ')
 
     def test_bag(self):
         for compression in ('none', 'lz4'):
             bag = os.path.join(self.folder, f'{compression}.bag')
             run('sequence_to_bag', '--sequence', self.drive, '--output', bag, '--compression', compression)
-            replayed = self.map_of_launch('line', 'replay.launch', f'bag:={bag}', 'rate:=0.5')
-            self.assertTrue(replayed == self.expected_map('line'), 'the maps differ')
+            replayed = self.map_of_launch('replay.launch', f'bag:={bag}', 'rate:=0.5')
+            self.assertTrue(replayed == self.expected_map(), 'the maps differ')
+
+    def test_paths_are_those_of_the_shell(self):
+        shutil.copy(os.path.join(PACKAGE, 'config/presets/paper_line.yaml'), os.path.join(self.folder, 'lines.yaml'))
+        shutil.copy(os.path.join(PACKAGE, 'config/classes/occupancy.yaml'), os.path.join(self.folder, 'one class.yaml'))
+        relative = ('config:=lines.yaml', 'classes:=one class.yaml')
+        home = ('config:=~/lines.yaml', 'classes:=~/one class.yaml')
+        expected = self.expected_map('--config', os.path.join(self.folder, 'lines.yaml'), '--classes',
+                                     os.path.join(self.folder, 'one class.yaml'))
+        for launch in (('replay.launch', 'bag:=my drive.bag', 'rate:=0.5', *relative),
+                       ('replay.launch', 'bag:=~/my drive.bag', 'rate:=0.5', *home),
+                       ('semantic_kitti.launch', 'sequence:=drive', 'rate:=0', *relative),
+                       ('semantic_kitti.launch', 'sequence:=~/drive', 'rate:=0', *home),
+                       ('demo.launch', 'sequence:=drive/../drive', *relative)):
+            self.assertTrue(self.map_of_launch(*launch) == expected, launch)
+
+    def ends(self, words, *launch):
+        """What cannot be played ends the launch, and is said in one line."""
+        server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, 'rviz:=false'], cwd=self.folder,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        try:
+            printed = server.communicate(timeout=TIMEOUT)[0]
+        finally:
+            server.terminate()
+            server.wait(30)
+        self.assertEqual(sum(words in line for line in printed.splitlines()), 1, printed)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def test_what_cannot_be_played_ends_the_launch(self):
+        self.ends(f"bag '{self.path('missing.bag')}' cannot be read (No such file or directory); check bag:=FILE",
+                  'replay.launch', 'bag:=missing.bag')
+        self.ends(f"bag '{self.drive}' cannot be read (Is a directory); check bag:=FILE", 'replay.launch', 'bag:=drive')
+        with open(self.path('text.bag'), 'w') as file:
+            file.write('no bag\n')
+        self.ends(f"bag '{self.path('text.bag')}' cannot be read (", 'replay.launch', 'bag:=text.bag')
+        with open(self.bag, 'rb') as whole, open(self.path('cut.bag'), 'wb') as file:
+            file.write(whole.read(100000))
+        self.ends(f"bag '{self.path('cut.bag')}' was not recorded to its end; run: rosbag reindex ",
+                  'replay.launch', 'bag:=cut.bag')
+        self.ends(f"bag '{self.bag}' has no clouds on /points; it has some on: /velodyne_points; choose with "
+                  'cloud_topic:=TOPIC', 'replay.launch', 'bag:=my drive.bag', 'cloud_topic:=/points')
+        with rosbag.Bag(self.path('empty.bag'), 'w'):
+            pass
+        self.ends(f"bag '{self.path('empty.bag')}' has no clouds (sensor_msgs/PointCloud2); record some",
+                  'replay.launch', 'bag:=empty.bag')
+        self.ends(f"{self.path('none/velodyne')} is no folder; give the folder of a sequence", 'semantic_kitti.launch',
+                  'sequence:=none')
+        self.ends(f"{self.path('none/velodyne')} is no folder; give the folder of a sequence", 'demo.launch',
+                  'sequence:=none')
+        self.ends(f"{self.path('drive/predictions/000000.label')} cannot be read; check", 'semantic_kitti.launch',
+                  'sequence:=drive', 'labels:=predictions')
+        self.ends('file does not exist [none.yaml]', 'semantic_kitti.launch', 'sequence:=drive', 'config:=none.yaml')
+
+    def test_a_mapper_that_does_not_start_ends_the_launch(self):
+        for nodelet in ('true', 'false'):
+            self.ends("did you mean 'line'?", 'semantic_kitti.launch', 'sequence:=drive', 'mode:=liner',
+                      f'nodelet:={nodelet}')
+        self.ends("did you mean 'toy'?", 'replay.launch', 'bag:=my drive.bag', 'classes:=tooy')
+        self.ends(f"'{self.path('none.yaml')}' is neither a file nor one of", 'replay.launch', 'bag:=my drive.bag',
+                  'classes:=./none.yaml')
 
     def test_rate_0_waits_for_the_mapper_and_not_for_just_any_listener(self):
         clouds, poses = Listener('/velodyne_points', PointCloud2), Listener('/tf', TFMessage)
