@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two mappers with different settings in one nodelet manager do not meet."""
+"""Mappers with different settings, two of them in one nodelet manager, do not meet: mapping.launch with namespaces."""
 import os
 import sys
 import unittest
@@ -11,7 +11,7 @@ from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import Listener, Robot  # noqa: E402
+from harness import TIMEOUT, Listener, Robot, wait_until  # noqa: E402
 
 
 def count(message, state):
@@ -22,17 +22,24 @@ class TwoMappers(unittest.TestCase):
     def test_each_has_its_own_map(self):
         rospy.init_node('two_mappers_rostest')
         robot = Robot('/cloud_in')
-        status = {name: Listener(f'/{name}/mapping/status', MappingStatus) for name in ('coarse', 'fine')}
+        spaces = {'coarse': '/coarse', 'fine': '/fine', 'beside': ''}
+        status = {name: Listener(f'{space}/mapping/status', MappingStatus) for name, space in spaces.items()}
         for listener in status.values():
             listener.wait_for(lambda m: True, 'a first status')
-        robot.connect()
+        for topic in (robot.clouds, robot.poses):  # the nodelets' process, and the node
+            wait_until(lambda: topic.get_num_connections() == 2, 'all mappers subscribing')
         stamp = robot.scan([(4.2, 0.1, 0.1), (4.1, 0.9, 0.1)], [10, 40])
         for name, listener in status.items():
             listener.wait_for(lambda m: m.header.stamp == stamp and m.integrated_last, f'{name} mapping the cloud')
-        occupancy = {name: Listener(f'/{name}/occupancy', OccupancyMap) for name in status}
+        for name, kind in (('mapping_manager', 'load_nodelet'), ('mapping', 'save_map')):
+            rospy.wait_for_service(f'/coarse/{name}/{kind}', TIMEOUT)
+        with self.assertRaises(rospy.ROSException):
+            rospy.wait_for_service('/fine/mapping_manager/load_nodelet', 0.1)
+        occupancy = {name: Listener(f'{space}/occupancy', OccupancyMap) for name, space in spaces.items()}
         maps = {name: occupancy[name].wait_for(lambda m: m.blocks, f'the map of {name}') for name in status}
         self.assertEqual(maps['coarse'].resolution, 1.0)
         self.assertEqual(maps['fine'].resolution, 0.25)
+        self.assertAlmostEqual(maps['beside'].resolution, 0.3)
         self.assertEqual(count(maps['coarse'], OccupancyMap.OCCUPIED), 1)
         self.assertEqual(count(maps['fine'], OccupancyMap.OCCUPIED), 2)
         self.assertEqual(count(maps['coarse'], OccupancyMap.FREE), 0)
@@ -40,8 +47,8 @@ class TwoMappers(unittest.TestCase):
         self.assertEqual((len(maps['coarse'].classes), len(maps['fine'].classes)), (20, 1))
 
         # The coarse map shows the class's colour, the fine one its height: z = 0.125 m is 1/160 of 20 m, nearly blue.
-        colors = {name: Listener(f'/{name}/occupied_cells_vis_array', MarkerArray).wait_for(
-            lambda m: any(marker.colors for marker in m.markers), f'markers of {name}') for name in status}
+        colors = {name: Listener(f'{spaces[name]}/occupied_cells_vis_array', MarkerArray).wait_for(
+            lambda m: any(marker.colors for marker in m.markers), f'markers of {name}') for name in ('coarse', 'fine')}
         car = next(marker for marker in colors['coarse'].markers if marker.ns == 'car')
         self.assertAlmostEqual(car.colors[0].b, 245 / 255, places=5)
         lowest = next(marker for marker in colors['fine'].markers if marker.colors).colors[0]
@@ -50,9 +57,10 @@ class TwoMappers(unittest.TestCase):
 
         rospy.ServiceProxy('/coarse/mapping/reset', Empty)()
         occupancy['coarse'].wait_for(lambda m: not m.blocks, 'the coarse map being empty')
-        occupancy['fine'].close()
-        fine = Listener('/fine/occupancy', OccupancyMap).wait_for(lambda m: True, 'the fine map')
-        self.assertEqual(count(fine, OccupancyMap.OCCUPIED), 2)
+        for name in ('fine', 'beside'):
+            occupancy[name].close()
+            kept = Listener(f'{spaces[name]}/occupancy', OccupancyMap).wait_for(lambda m: True, f'the map of {name}')
+            self.assertEqual(count(kept, OccupancyMap.OCCUPIED), count(maps[name], OccupancyMap.OCCUPIED))
 
 
 if __name__ == '__main__':
