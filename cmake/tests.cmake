@@ -48,6 +48,8 @@ add_test(NAME vector_symbols_test
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/vector_symbols_test.py $<TARGET_OBJECTS:bki_mapping_core>)
 
 if(CATKIN_ENABLE_TESTING)
+  bki_mapping_script_test(commands_test)
+  set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/mapping_rostest.py

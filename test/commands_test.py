@@ -1,0 +1,303 @@
+#!/usr/bin/env python3
+"""Every command of README.md and docs, word for word, in a copy of the source tree, on stand-in data.
+
+A block of commands is what a user types: what does not end by itself (roslaunch, rviz) goes on in a terminal of its own
+until the block's last command has ended. Launch files must map what is played to them.
+"""
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xmlrpc.client
+
+SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
+DEVEL = os.environ['BKI_MAPPING_DEVEL']
+DOCUMENTS = ['README.md', *(f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md'))]
+TIMEOUT = 60.0  # [s] of a command, or until what is waited for
+SCANS = 6
+
+# Not run, and why.
+LEFT_OUT = {
+    'catkin build': 'builds a whole workspace, for minutes',
+    'scripts/demo': 'installs packages and builds; continuous integration runs it by itself',
+    'scripts/test': 'runs this test; continuous integration runs it by itself',
+    'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
+}
+# What makes a command take long, and what is run in its place. All else of it is run as written.
+SHORTER = {
+    '--scans 300': '--scans 4',
+    '--scans 1000 --every 10': '--scans 20 --every 10',
+    ' --curves curves': '',  # two thousand simulated scans in each mode; tools_test draws curves
+}
+SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # read by Google Benchmark
+# First words of what is a command where it stands in a line of text; one word alone names a program.
+PROGRAMS = ('benchmark_', 'build/', 'catkin', 'cmake', 'ctest', 'dynparam', 'evaluate_map', 'map_sequence',
+            'play_sequence', 'ros', 'rviz', 'scripts/', 'sequence_to_bag', 'simulate_drive', 'source')
+# In a line of text, not commands: parts of one, whose other arguments the text leaves to the reader.
+PARTS = {
+    'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise SHARE',
+    'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --report', 'map_sequence --report FILE.json',
+    'rosrun bki_mapping map_sequence', 'simulate_drive --seed 2',
+}
+GOES_ON = re.compile(r'(\w+=\S+ )*(roslaunch(?!.* --ros-args)|rviz|rostopic echo)\b')
+WRONG = re.compile(r'\bERROR\b|FATAL|Traceback|\b[Uu]nknown\b|has died|command not found|No such file', re.MULTILINE)
+# rviz on a graphics card in software: a shader for images, of which there are none.
+HARMLESS = re.compile(r'rviz/glsl120/indexed_8bit_image')
+
+
+def text_of(document):
+    with open(os.path.join(SOURCE, document)) as file:
+        return file.read()
+
+
+def without_comment(line):
+    return re.sub(r'(^|\s+)# .*', '', line).strip()
+
+
+def blocks_of(document):
+    """Lists of commands: of each block, and one for each command in the text."""
+    text = text_of(document)
+    fenced = re.findall(r'^```(?:sh|bash|shell|console)\n(.*?)^```$', text, re.MULTILINE | re.DOTALL)
+    for block in fenced:
+        yield [line.strip() for line in block.splitlines() if without_comment(line)]
+    for span in re.findall(r'`([^`\n]+)`', re.sub(r'^```.*?^```$', '', text, flags=re.MULTILINE | re.DOTALL)):
+        if ' ' in span and span.startswith(PROGRAMS) and span not in PARTS and ' [' not in span:
+            yield [span]
+
+
+def status_of(launch):
+    """The status of the mapper that a launch file starts."""
+    space = re.search(r' namespace:=(\S+)', launch)
+    return f'/{space[1]}/mapping/status' if space else '/mapping/status'
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('localhost', 0))
+        return probe.getsockname()[1]
+
+
+def send(process, what):
+    """A signal to all that a command has started and that still runs."""
+    try:
+        os.killpg(process.pid, what)
+    except ProcessLookupError:
+        pass
+
+
+def wait_until(condition, what):
+    end = time.monotonic() + TIMEOUT
+    while time.monotonic() < end:
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError(f'{what} did not happen within {TIMEOUT} s')
+
+
+class Shell:
+    """What a user types in the clone's folder, in terminals that share a ROS master."""
+
+    def __init__(self, folder, display):
+        self.folder = folder
+        self.home = os.path.join(folder, 'home')
+        self.clone = os.path.join(folder, 'bki_mapping')
+        self.port = free_port()
+        self.master = f'http://localhost:{self.port}'
+        self.environment = {'HOME': self.home, 'PATH': '/usr/bin:/bin', 'LANG': 'C.UTF-8', 'TERM': 'dumb',
+                            'ROS_MASTER_URI': self.master, 'ROS_HOSTNAME': 'localhost', 'DISPLAY': display,
+                            'LIBGL_ALWAYS_SOFTWARE': '1', 'XDG_RUNTIME_DIR': folder, **SHORT_BENCHMARKS}
+        self.running = []
+
+    def start(self, command):
+        output = tempfile.TemporaryFile('w+', errors='replace')
+        lines = f'set -e\nsource build/devel/setup.bash\n{command}'
+        process = subprocess.Popen(['bash', '-c', lines], cwd=self.clone, env=self.environment, stdout=output,
+                                   stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True)
+        process.command, process.output = command, output
+        self.running.append(process)
+        return process
+
+    def printed(self, process):
+        process.output.seek(0)
+        return process.output.read()
+
+    def finish(self, process):
+        """Waits for a command that ends by itself; returns what it printed."""
+        try:
+            process.wait(TIMEOUT)
+        except subprocess.TimeoutExpired:
+            printed = self.printed(process)
+            raise AssertionError(f'{process.command}\ndid not end within {TIMEOUT} s:\n{printed}') from None
+        if process.returncode != 0:
+            raise AssertionError(f'{process.command}\nended with {process.returncode}:\n{self.printed(process)}')
+        self.running.remove(process)
+        with process.output:
+            return self.printed(process)
+
+    def run(self, command):
+        return self.finish(self.start(command))
+
+    def stop(self):
+        """Control-C in all terminals, the last one first; returns what each command has printed."""
+        printed = {}
+        for process in reversed(self.running):
+            send(process, signal.SIGINT)
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                send(process, signal.SIGKILL)
+                process.wait()
+            with process.output:
+                printed[process.command] = self.printed(process)
+        self.running = []
+        return printed
+
+    def subscribers(self, topic):
+        """Nodes that listen, as the master says; None without a master."""
+        try:
+            with xmlrpc.client.ServerProxy(self.master) as master:
+                code, _, (_, subscribers, _) = master.getSystemState('/commands_test')
+        except OSError:
+            return None
+        return dict(subscribers).get(topic, []) if code == 1 else None
+
+    def wait_for_status(self, topic, condition):
+        """Until a MappingStatus m meets the condition."""
+        wait_until(lambda: self.subscribers(topic) is not None, 'a ROS master')
+        self.run(f'timeout {TIMEOUT:.0f} rostopic echo -n 1 --filter "{condition}" {topic}')
+
+
+class Commands(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.display = cls.start_display()
+        shell = Shell(cls.folder, cls.display)
+        cls.copy_source(shell.clone)
+        os.makedirs(os.path.join(shell.home, 'kitti/sequences'))
+        shell.run(f'{DEVEL}/lib/bki_mapping/simulate_drive --output ~/kitti/sequences/04 --scans {SCANS} --beams 16 '
+                  '--columns 400')
+        shell.run(f'{DEVEL}/lib/bki_mapping/sequence_to_bag --sequence ~/kitti/sequences/04 --output drive.bag')
+
+    @classmethod
+    def start_display(cls):
+        if not shutil.which('Xvfb'):
+            raise AssertionError('Xvfb, in which rviz is run, is missing; install it (scripts/dependencies.debian.txt)')
+        read, write = os.pipe()
+        server = subprocess.Popen(['Xvfb', '-displayfd', str(write), '-screen', '0', '640x480x24'], pass_fds=[write],
+                                  stderr=subprocess.DEVNULL)
+        cls.addClassCleanup(server.wait)
+        cls.addClassCleanup(server.terminate)
+        os.close(write)
+        with os.fdopen(read) as number:
+            return ':' + number.readline().strip()
+
+    @classmethod
+    def copy_source(cls, clone):
+        """What a clone holds, and in build/devel what scripts/demo builds."""
+        listed = subprocess.run(['git', '-C', SOURCE, 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
+                                stdout=subprocess.PIPE, text=True, check=False).stdout.split('\0')
+        if listed == ['']:  # not of git, but an archive
+            listed = [os.path.relpath(os.path.join(folder, name), SOURCE) for folder, _, names in os.walk(SOURCE)
+                      for name in names if not os.path.relpath(folder, SOURCE).startswith('build')]
+        for name in listed:
+            if os.path.isfile(os.path.join(SOURCE, name)):
+                os.makedirs(os.path.dirname(os.path.join(clone, name)), exist_ok=True)
+                shutil.copy(os.path.join(SOURCE, name), os.path.join(clone, name))
+        os.mkdir(os.path.join(clone, 'build'))
+        os.symlink(DEVEL, os.path.join(clone, 'build/devel'))
+
+    def start_mapper(self, shell):
+        """The mapper that a command asks for that is to be typed beside it: that of README.md."""
+        shell.start(next(line for block in blocks_of('README.md') for line in block if 'mapping.launch' in line))
+        shell.wait_for_status('/mapping/status', 'm.received == 0')
+
+    def type_command(self, shell, command):
+        """Types one command; returns what it printed, or nothing if it goes on."""
+        for long, short in SHORTER.items():
+            command = command.replace(long, short)
+        if not GOES_ON.match(command):
+            return shell.run(command)
+        process = shell.start(command)
+        if 'mapping.launch' in command:
+            shell.wait_for_status(status_of(command), 'm.received == 0')
+        elif 'rviz' in command:
+            space = re.match(r'ROS_NAMESPACE=(\S+)', command)
+            topic = f'/{space[1]}/occupied_cells_vis_array' if space else '/occupied_cells_vis_array'
+            wait_until(lambda: shell.subscribers(topic), f'{command}: rviz listening to {topic}')
+        elif 'echo' in command:
+            wait_until(lambda: '---' in shell.printed(process), f'a message for {command}')
+        return ''
+
+    def see_it_map(self, shell, block):
+        """Waits until each mapper of a block has mapped all scans: those played by the block, or else our own."""
+        launches = [command for command in block if command.startswith('roslaunch') and GOES_ON.match(command)]
+        if not launches:
+            return
+        if not any('bag:=' in command or 'sequence:=' in command for command in launches):
+            shell.run('build/devel/lib/bki_mapping/play_sequence --sequence ~/kitti/sequences/04 --rate 0 '
+                      'cloud_in:=/velodyne_points')
+        for command in launches:
+            shell.wait_for_status(status_of(command), f'm.integrated == {SCANS} and m.blocks > 10')
+            if 'rviz:=false' not in command and 'mapping.launch' not in command:
+                wait_until(lambda: shell.subscribers('/occupied_cells_vis_array'), f'{command}: rviz listening')
+
+    def check_block(self, block):
+        shell = Shell(self.folder, self.display)
+        printed = {}
+        try:
+            if any('benchmark_publishing' in command for command in block):
+                shell.start(f'roscore -p {shell.port}')
+                wait_until(lambda: shell.subscribers('/rosout') is not None, 'a ROS master')
+            if any('/mapping/' in command for command in block) and not any('roslaunch' in c for c in block):
+                self.start_mapper(shell)
+            for command in block:
+                printed[command] = self.type_command(shell, command)
+            self.see_it_map(shell, block)
+        finally:
+            ended = [process.command for process in shell.running if process.poll() is not None]
+            stopped = shell.stop()
+            if sys.exc_info()[0]:
+                print(*(f'{command}:\n{text}' for command, text in stopped.items()), sep='\n', file=sys.stderr)
+        self.assertEqual(ended, [], stopped)
+        for command, text in {**printed, **stopped}.items():
+            wrong = [line for line in text.splitlines() if WRONG.search(line) and not HARMLESS.search(line)]
+            self.assertEqual(wrong, [], f'{command}\n{text}')
+
+    def test_every_command(self):
+        seen, count = set(), 0
+        for document in DOCUMENTS:
+            for block in blocks_of(document):
+                seen |= {without_comment(command) for command in block}
+                commands = [command for command in block if without_comment(command) not in LEFT_OUT]
+                if not commands:
+                    continue
+                count += 1
+                with self.subTest(document=document, block=commands):
+                    self.check_block(commands)
+        self.assertGreaterEqual(count, 6)
+        self.assertLessEqual(set(LEFT_OUT), seen, 'commands left out that no text has')
+
+    def test_arguments_of_launch_files_are_explained_and_documented(self):
+        rows = dict(re.findall(r'^\| `(\w+\.launch)` \|.*\| (.*) \|$', text_of('docs/ros.md'), re.MULTILINE))
+        self.assertEqual(set(rows), set(os.listdir(os.path.join(SOURCE, 'launch'))))
+        for launch, row in rows.items():
+            arguments = re.findall(r'<arg name="(\w+)" [^>]*doc="[^"]+"/>', text_of(f'launch/{launch}'))
+            self.assertEqual(len(arguments), len(re.findall(r'^  <arg ', text_of(f'launch/{launch}'), re.MULTILINE)))
+            self.assertEqual(sorted(arguments), sorted(re.findall(r'`(\w+)`', row)), launch)
+
+    def test_replacements_and_parts_are_of_the_text(self):
+        texts = ''.join(text_of(document) for document in DOCUMENTS)
+        for words in (*SHORTER, *(f'`{part}' for part in PARTS)):
+            self.assertIn(words, texts)
+
+
+if __name__ == '__main__':
+    unittest.main()
