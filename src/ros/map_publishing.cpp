@@ -30,7 +30,7 @@ void MapPublishing::publishDue(const MapSnapshot& snapshot) {
     }
     const auto start = Clock::now();
     if (publisher.changed.empty() || start < next_[p]) continue;
-    publisher.publish(snapshot);
+    publisher.tryTo([&] { publisher.publish(snapshot); });
     next_[p] = start + std::chrono::duration_cast<Clock::duration>(
                            publishPeriod(snapshot.config.publish_rate, Clock::now() - start));
   }

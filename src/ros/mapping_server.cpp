@@ -67,6 +67,7 @@ void MappingServer::subscribe() {
              mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
   }
   warned_of_origin_.assign(readers_.size(), false);
+  warned_of_far_points_.assign(readers_.size(), false);
   points_.resize(readers_.size());
 }
 
@@ -173,12 +174,22 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
         "the sensor's frame",
         cloud_subscribers_[waiting.input].getTopic().c_str(), config_.frame_id.c_str());
   }
+  warnOfFarPoints(waiting.input, stats.counts.beyond_max);
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
   appendPose(header, placed.T_map_sensor);
   publishing_->changed(mapper_->touchedBlocks());
   moveWindow();
   status_publisher_.publish(status());
+}
+
+void MappingServer::warnOfFarPoints(std::size_t input, std::size_t count) {
+  if (count == 0 || readers_[input].input().sensor_model.knowsRange() || warned_of_far_points_[input]) return;
+  warned_of_far_points_[input] = true;
+  ROS_WARN(
+      "%lu points of a cloud of %s are farther than %g m and left out as faults of the driver; set "
+      "sensor_model/max_range to what the sensor sees",
+      count, cloud_subscribers_[input].getTopic().c_str(), SensorModelConfig::kFarthest);
 }
 
 void MappingServer::appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor) {

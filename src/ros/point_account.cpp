@@ -65,6 +65,12 @@ std::string sentenceOf(const PointKind& kind, const PointAccount& account, const
     return "are nearer than " + limit("min_range", sensor.min_range, mapper.sensor_model.min_range) +
            "; lower it, or check that clouds are in metres";
   }
+  if (count == &PointCounts::beyond_max && !sensor.knowsRange()) {
+    return "are beyond " + numberText(sensor.reach()) +
+           " m, which no sensor is taken to see unless sensor_model/max_range says so; check that clouds are "
+           "in "
+           "metres, or set it";
+  }
   if (count == &PointCounts::beyond_max) {
     return "are beyond " + limit("max_range", sensor.max_range, mapper.sensor_model.max_range) +
            "; raise it, or check that clouds are in metres";

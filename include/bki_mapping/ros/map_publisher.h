@@ -2,10 +2,12 @@
 #pragma once
 
 #include <geometry_msgs/PoseStamped.h>
+#include <ros/console.h>
 #include <ros/node_handle.h>
 #include <ros/single_subscriber_publisher.h>
 #include <std_msgs/Header.h>
 
+#include <exception>
 #include <functional>
 #include <memory>
 #include <string>
@@ -75,6 +77,19 @@ class MapPublisher {
     publishNew(snapshot);
     changed.clear();
   }
+  /// Calls build(). A message that memory does not hold is left out, and said; mapping goes on, and the topic
+  /// is tried again when it is next due.
+  template <typename Build>
+  void tryTo(Build&& build) {
+    try {
+      build();
+    } catch (const std::exception& fault) {
+      ROS_ERROR_THROTTLE(5.0,
+                         "%s could not be published (%s): the map is too large for the memory that is left; "
+                         "set view_range, window or memory_limit, or listen to the topic with updates",
+                         topic().c_str(), fault.what());
+    }
+  }
   /// Called instead of publish while nobody listens.
   virtual void rest() { changed.clear(); }
   /// The topics look different from now on, or somebody asks for all of it.
@@ -105,9 +120,11 @@ struct PublisherContext {
   template <typename Message, typename Send>
   ros::Publisher advertiseUpdates(const std::string& topic, MapPublisher& owner, Send&& send) const {
     const auto connected = [&owner, send, make = snapshot](const ros::SingleSubscriberPublisher& subscriber) {
-      const MapSnapshot now = make();
-      if (!owner.changed.empty()) owner.publish(now);
-      send(subscriber, now);
+      owner.tryTo([&] {
+        const MapSnapshot now = make();
+        if (!owner.changed.empty()) owner.publish(now);
+        send(subscriber, now);
+      });
     };
     return advertise<Message>(topic, connected, false);
   }

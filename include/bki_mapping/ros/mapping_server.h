@@ -59,6 +59,8 @@ class MappingServer {
   void reset();
   void checkClock();
   void onTimeJump(const ros::Time& new_time, const std::string& what);
+  /// Says once of each input that points were left out since its range is not known.
+  void warnOfFarPoints(std::size_t input, std::size_t count);
   void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
   /// Forgets blocks and poses outside of the window about the sensor.
   void moveWindow();
@@ -84,7 +86,7 @@ class MappingServer {
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
   std::vector<geometry_msgs::PoseStamped> trajectory_;
   SentenceThrottle throttle_;
-  std::vector<bool> warned_of_origin_;  ///< of each input
+  std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
 
   std::unique_ptr<PoseSource> poses_;
   std::vector<ros::Subscriber> cloud_subscribers_;
