@@ -16,7 +16,7 @@ std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
   const bool is_new = map.size() > size;
   try {
     touched_.push_back(index);
-    jobs_.push_back({index, entry.block.get(), is_new, is_new ? 0 : entry.block->bytes(), false, 0});
+    jobs_.push_back({index, entry.block.get(), is_new, 0, false, 0});
   } catch (...) {
     if (is_new) map.erase(index);
     throw;
@@ -97,10 +97,13 @@ std::size_t MapUpdater::reservePlanes(const std::vector<Evidence*>& evidence, st
     const std::uint32_t number_there = numberIn(e, number);
     if (number_there != kNone) evidence[e]->markClasses(number_there, classes);
   }
-  Block& block = *jobs_[number].block;
+  Job& job = jobs_[number];
+  Block& block = *job.block;
+  const std::size_t bytes = block.bytes();
+  job.bytes_before = job.is_new ? 0 : bytes;
   for (const ClassId known : block.classes()) classes.reset(known);
   block.reserve(classes.count());
-  return block.bytes() - jobs_[number].bytes_before;
+  return block.bytes() - job.bytes_before;
 }
 
 void MapUpdater::reserve(const std::vector<Evidence*>& evidence, const UpdateLimits& limits,
@@ -117,7 +120,9 @@ void MapUpdater::reserve(const std::vector<Evidence*>& evidence, const UpdateLim
   workers.forEach(groups_.size(), [&](std::size_t g, std::size_t) {
     std::ptrdiff_t of_group = 0;
     const std::size_t number = groups_[g].number;
+    constexpr std::ptrdiff_t kAhead = 4;
     for (const std::uint32_t* job = group_jobs_.begin(number); job != group_jobs_.end(number); ++job) {
+      if (group_jobs_.end(number) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
       of_group += static_cast<std::ptrdiff_t>(reservePlanes(evidence, *job));
     }
     const std::ptrdiff_t sum = bytes += of_group;

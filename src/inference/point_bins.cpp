@@ -139,8 +139,11 @@ void PointBins::sortGroup(const Scratch& scratch, Group& group) const {
   for (std::size_t b = 1; b < group.begin.size(); ++b) group.begin[b] += group.begin[b - 1];
   group.points.resize(scratch.size);
   // begin[b] runs up to the next block's begin, and is then put back.
+  group.classes.assign(group.blocks.size(), 0);
   for (std::size_t i = 0; i < scratch.size; ++i) {
-    group.points[group.begin[scratch.block[i]]++] = scratch.points[i];
+    const std::uint32_t block = scratch.block[i];
+    group.points[group.begin[block]++] = scratch.points[i];
+    group.classes[block] |= PointRun::classBit(scratch.points[i].label);
   }
   std::copy_backward(group.begin.begin(), group.begin.end() - 1, group.begin.end());
   group.begin.front() = 0;
@@ -170,7 +173,8 @@ void PointBins::collectRuns(const Group& group) {
   one_class_ &= !group.has_other_class && group.first_class == groups_[0].first_class;
   const std::vector<GridIndex>& indices = group.blocks.members();
   for (std::size_t b = 0; b < indices.size(); ++b) {
-    blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b]});
+    blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b],
+                             group.classes[b]});
   }
 }
 

@@ -33,11 +33,15 @@ void PointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
     classes.set(bins_.begin(number)->points->label);
     return;
   }
-  std::size_t last = ClassSet().size();  // no class; neighbours mostly have the same
+  std::uint64_t bits = 0;
+  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) bits |= run->classes;
+  constexpr std::uint64_t kShared = std::uint64_t{1} << PointRun::kSharedBit;
+  for (std::uint64_t left = bits & ~kShared; left != 0; left &= left - 1) {
+    classes.set(static_cast<std::size_t>(__builtin_ctzll(left)));
+  }
+  if ((bits & kShared) == 0) return;
   for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) {
-    for (std::size_t i = 0; i < run->count; ++i) {
-      if (run->points[i].label != last) classes.set(last = run->points[i].label);
-    }
+    for (std::size_t i = 0; i < run->count; ++i) classes.set(run->points[i].label);
   }
 }
 
@@ -129,7 +133,7 @@ void PointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
   const std::size_t count = sortByClass(number, scratch, end);
   for (std::size_t i = 0; i < count;) {
     const auto label = static_cast<ClassId>(scratch.points[i].label);
-    const PointRun run{scratch.points.data() + i, end[label] - i};
+    const PointRun run{scratch.points.data() + i, end[label] - i, 0};
     addClass(label, &run, 1, limited, block, scratch);
     i = end[label];
   }

@@ -19,6 +19,13 @@ struct LocalPoint {
 struct PointRun {
   const LocalPoint* points;
   std::size_t count;
+  std::uint64_t classes = 0;  ///< of the points, by classBit(); not set where all points of a scan are of one
+
+  /// The bit of a class; large ids share the last one.
+  static constexpr std::uint32_t kSharedBit = 63;
+  static std::uint64_t classBit(std::uint32_t label) {
+    return std::uint64_t{1} << (label < kSharedBit ? label : kSharedBit);
+  }
 };
 
 }  // namespace bki_mapping

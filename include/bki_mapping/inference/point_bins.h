@@ -54,7 +54,8 @@ class PointBins {
     IndexNumbering blocks;
     std::vector<std::uint32_t> begin;  ///< of each block's points; one more than blocks
     std::vector<LocalPoint> points;
-    ClassId first_class;  ///< of the first point
+    std::vector<std::uint64_t> classes;  ///< of each block's points, as PointRun has them
+    ClassId first_class;                 ///< of the first point
     bool has_other_class;
   };
 
