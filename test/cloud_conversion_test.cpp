@@ -1,6 +1,7 @@
 // Clouds of every make are read right, and wrong ones refused in one sentence.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -95,6 +96,27 @@ TEST(Cloud, RefusesWhatDoesNotFit) {
   cloud = twoPoints();
   cloud.fields[3].name = "label";
   EXPECT_NE(faultOf(cloud).find("two fields 'label'"), std::string::npos);
+}
+
+TEST(Cloud, ThousandsOfFieldsCostWhatTheyHold) {
+  sensor_msgs::PointCloud2 cloud = twoPoints();
+  constexpr std::uint32_t kComponents = 200000;
+  cloud.width = 1;
+  cloud.point_step = 4 * kComponents;
+  cloud.data.resize(cloud.point_step);
+  for (int i = 0; i < 5000; ++i) {
+    cloud.fields.push_back(cloud.fields[0]);
+    cloud.fields.back().name = "further_" + std::to_string(i) + std::string(1000, 'n');
+  }
+  cloud.fields[4].offset = 0;
+  cloud.fields[4].count = kComponents;
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(readersOf(cloud, "label").size(), kComponents);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  // Nobody chooses how much is said.
+  const std::string fault = faultOf(cloud, "class");
+  EXPECT_LT(fault.size(), 3000u);
+  EXPECT_NE(fault.find("and 4985 more"), std::string::npos) << fault;
 }
 
 /// A cloud at the origin with any float fields; each row of values is a point.

@@ -1,5 +1,6 @@
 #include "bki_mapping/core/named_parameter.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <limits>
 #include <sstream>
@@ -38,8 +39,15 @@ double parseNumber(const std::string& text) {
   return whole ? number : std::numeric_limits<double>::quiet_NaN();
 }
 
+std::string shortText(const std::string& text, std::size_t most) {
+  std::string out = text.size() > most ? text.substr(0, most) + "..." : text;
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return out;
+}
+
 void refuseValue(const std::string& name, const std::string& value, const std::string& values) {
-  throw std::invalid_argument("parameter " + name + " is '" + value + "', but must be " + values);
+  throw std::invalid_argument("parameter " + name + " is '" + shortText(value) + "', but must be " + values);
 }
 
 std::string nearestWord(const std::string& word, const std::vector<std::string>& known) {

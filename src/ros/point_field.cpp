@@ -6,6 +6,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "bki_mapping/core/named_parameter.h"
+
 namespace bki_mapping::ros_shell {
 namespace {
 
@@ -40,18 +42,26 @@ T load(const std::uint8_t* bytes, bool swap) {
   return value;
 }
 
-const PointField& find(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
+/// The names of the first fields of a cloud, for a sentence.
+std::string namesOf(const sensor_msgs::PointCloud2& cloud) {
+  constexpr std::size_t kMost = 20;
   std::string names;
+  for (std::size_t f = 0; f < cloud.fields.size() && f < kMost; ++f) {
+    names += (f == 0 ? "" : ", ") + shortText(cloud.fields[f].name, 40);
+  }
+  if (cloud.fields.size() > kMost) names += ", and " + std::to_string(cloud.fields.size() - kMost) + " more";
+  return names.empty() ? "none" : names;
+}
+
+const PointField& find(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
   const PointField* found = nullptr;
   for (const PointField& field : cloud.fields) {
-    if (field.name == name && found) {
-      throw std::invalid_argument("the cloud has two fields '" + name + "'");
-    }
-    if (field.name == name) found = &field;
-    names += (names.empty() ? "" : ", ") + field.name;
+    if (field.name != name) continue;
+    if (found) throw std::invalid_argument("the cloud has two fields '" + name + "'");
+    found = &field;
   }
   if (found) return *found;
-  throw std::invalid_argument("the cloud has no field '" + name + "' (it has: " + names + ")");
+  throw std::invalid_argument("the cloud has no field '" + name + "' (it has: " + namesOf(cloud) + ")");
 }
 
 }  // namespace
@@ -63,10 +73,13 @@ bool hostIsBigEndian() {
   return first == 0;
 }
 
-FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name,
+FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name)
+    : FieldReader(cloud, find(cloud, name), 0) {}
+
+FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const PointField& field,
                          std::uint32_t component)
     : swap_((cloud.is_bigendian != 0) != hostIsBigEndian()) {
-  const PointField& field = find(cloud, name);
+  const std::string& name = field.name;  // one that was asked for
   datatype_ = field.datatype;
   const std::size_t size = sizeOf(field.datatype);
   if (size == 0) {
@@ -118,15 +131,12 @@ bool FieldReader::integer() const {
   return datatype_ != PointField::FLOAT32 && datatype_ != PointField::FLOAT64;
 }
 
-std::uint32_t componentsOf(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
-  return std::max(find(cloud, name).count, 1u);
-}
-
 std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list) {
   std::vector<FieldReader> readers;
   for (const std::string& name : splitList(list)) {
+    const PointField& field = find(cloud, name);
     // Made one by one: a count that does not fit into point_step is refused before memory is taken for it.
-    for (std::uint32_t c = 0; c < componentsOf(cloud, name); ++c) readers.emplace_back(cloud, name, c);
+    for (std::uint32_t c = 0; c < std::max(field.count, 1u); ++c) readers.emplace_back(cloud, field, c);
   }
   return readers;
 }

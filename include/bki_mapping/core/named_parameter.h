@@ -32,6 +32,11 @@ std::string numberText(double value);
 /// The number that a whole text names; NaN if it names none.
 double parseNumber(const std::string& text);
 
+/// Text of unknown origin as part of a sentence: whoever sends it must not choose how long the sentence is,
+/// nor what it does to a terminal. Control characters become '?', and what is longer than `most` bytes is
+/// cut.
+std::string shortText(const std::string& text, std::size_t most = 100);
+
 /// @throws std::invalid_argument.
 [[noreturn]] void refuseValue(const std::string& name, const std::string& value, const std::string& values);
 

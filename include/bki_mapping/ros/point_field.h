@@ -18,10 +18,12 @@ bool hostIsBigEndian();
 /// Reads one component of one field. The cloud's sizes must have been checked.
 class FieldReader {
  public:
-  /// @param component of a field with a count above 1.
   /// @throws std::invalid_argument in one sentence: the field is missing, there twice, of an unknown
   /// datatype, or beyond point_step.
-  FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name, std::uint32_t component = 0);
+  FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name);
+  /// @param field of the cloud. @param component of it, if its count is above 1.
+  FieldReader(const sensor_msgs::PointCloud2& cloud, const sensor_msgs::PointField& field,
+              std::uint32_t component);
 
   /// The value. @param point first byte of a point.
   double operator()(const std::uint8_t* point) const;
@@ -37,9 +39,6 @@ class FieldReader {
   std::size_t offset_;
   bool swap_;
 };
-
-/// The number of components of a field. @throws std::invalid_argument as FieldReader.
-std::uint32_t componentsOf(const sensor_msgs::PointCloud2& cloud, const std::string& name);
 
 /// Readers of all components of all fields of a list like "a,b".
 std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list);
