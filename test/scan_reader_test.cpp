@@ -1,6 +1,7 @@
 // Scans from clouds and tf: where beams start, when points were measured, labels in every encoding.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -91,6 +92,31 @@ TEST_F(Reader, NonsenseFromTfIsNoPose) {
   t.transform.rotation.w = 2.0;  // not a rotation
   poses_.add(t);
   EXPECT_FALSE(ready(scan));
+}
+
+TEST_F(Reader, TimesAtTheEndOfTimeDoNoHarm) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  pose("sensor", 100.0, {5, 0, 0});
+  pose("sensor", 4294967295.0, {9, 0, 0});  // in 2106: tf2 cannot add 10 s to it
+  poses_.restart(ros::Time(4294967290.0));  // puts in again what it has kept
+  pose("sensor", 100.0, {5, 0, 0});
+  EXPECT_TRUE(ready(scan));
+  EXPECT_EQ(placed(scan).scan.origin.x(), 5.0);
+}
+
+TEST_F(Reader, NobodyChoosesHowMuchIsSaidOfAName) {
+  for (const std::string& frame : {std::string(1000000, 'f'), std::string("f\n\0\033[2J", 7)}) {
+    pose("sensor", 100.0, {0, 0, 0});
+    CloudMaker maker = cloud({{1, 0, 0}});
+    maker.frame = frame;
+    std::string why = std::get<MissingPose>(read(maker.message())).why;
+    EXPECT_LT(why.size(), 1000u);
+    EXPECT_EQ(std::count_if(why.begin(), why.end(), [](unsigned char c) { return c < 0x20; }), 0) << why;
+    pose(std::string(1000000, 'c'), 100.0, {0, 0, 0}, 0.0, frame);  // nothing connects it
+    maker.frame = std::string(1000000, 'c');
+    why = std::get<MissingPose>(read(maker.message())).why;
+    EXPECT_LT(why.size(), 1000u);
+  }
 }
 
 geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, double seconds,

@@ -144,7 +144,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
                   "tf puts the sensor so far from the origin of '" + config_.frame_id + "' (" +
                       numberText(scan.scan.origin.norm()) + " m) that the map cannot hold it; mend what " +
                       "publishes the transforms from '" + config_.frame_id + "' to '" +
-                      cloud.header.frame_id + "'");
+                      shortText(cloud.header.frame_id) + "'");
     }
     integrate(waiting, scan);
   } catch (const ScanRefused& refused) {

@@ -49,9 +49,10 @@ void PoseSource::onTransforms(const tf2_msgs::TFMessage& message, bool is_static
 void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_static) {
   const std::string child = withoutSlash(transform.child_frame_id);
   if (const std::string fault = faultOf(transform.transform); !fault.empty()) {
-    const std::string why = "the transform from '" + withoutSlash(transform.header.frame_id) + "' to '" +
-                            child + "' of time " + numberText(transform.header.stamp.toSec()) +
-                            " is no pose: " + fault + "; mend what publishes it";
+    const std::string why = "the transform from '" + shortText(withoutSlash(transform.header.frame_id)) +
+                            "' to '" + shortText(child) + "' of time " +
+                            numberText(transform.header.stamp.toSec()) + " is no pose: " + fault +
+                            "; mend what publishes it";
     if (const auto before = findRefused(child); before != refused_.end()) refused_.erase(before);
     refused_.push_back({child, transform.header.stamp, why});
     if (refused_.size() > kMostRefused) refused_.pop_front();
@@ -66,7 +67,18 @@ void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_s
     latest_.push_back(transform);
     if (latest_.size() > kKept) latest_.pop_front();
   }
-  buffer_.setTransform(transform, "bki_mapping", is_static);
+  put(transform, is_static);
+}
+
+void PoseSource::put(const geometry_msgs::TransformStamped& transform, bool is_static) {
+  try {
+    buffer_.setTransform(transform, "bki_mapping", is_static);
+  } catch (const std::exception& fault) {  // tf2 adds 10 s to the stamp, which may be beyond all of ros::Time
+    const std::string why = "the transform to '" + shortText(transform.child_frame_id) + "' of time " +
+                            numberText(transform.header.stamp.toSec()) + ": " + fault.what() +
+                            "; mend the clock of what publishes it";
+    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("Refused %s", why.c_str());
+  }
 }
 
 std::deque<PoseSource::Refused>::const_iterator PoseSource::findRefused(const std::string& child) const {
@@ -94,7 +106,7 @@ void PoseSource::restart(const ros::Time& new_time) {
     return transform.header.stamp.toSec() > new_time.toSec() + TimeWatch::kOutOfOrder;
   });
   latest_.erase(latest_.begin(), of_old_time.base());
-  for (const auto& transform : latest_) buffer_.setTransform(transform, "bki_mapping");
+  for (const auto& transform : latest_) put(transform, false);
   refused_.clear();
 }
 
@@ -127,29 +139,31 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
     return {DropReason::kUnknownFrame,
             "its header has no frame_id; let the driver set one, or set sensor_frame_id"};
   }
+  const std::string from = shortText(source), to = shortText(target);
   const auto newest = find(target, source, ros::Time());
   const Refused* refused = refusedBetween(target, source);
   if (refused && (!newest || stamp > newest->stamp)) return {DropReason::kBadTransform, refused->why};
   for (const std::string& frame : {source, target}) {
     if (!buffer_._frameExists(frame)) {
-      return {DropReason::kUnknownFrame, "tf has never heard of frame '" + frame +
-                                             "'; publish a transform from '" + target + "' to '" + source +
+      return {DropReason::kUnknownFrame, "tf has never heard of frame '" + shortText(frame) +
+                                             "'; publish a transform from '" + to + "' to '" + from +
                                              "', or set frame_id or sensor_frame_id"};
     }
   }
   std::string why;
   if (!buffer_.canTransform(target, source, ros::Time(0), &why)) {
-    return {DropReason::kNoTransform, "no transform connects '" + source + "' with '" + target +
-                                          "'; publish it, or set frame_id or sensor_frame_id (" + why + ")"};
+    return {DropReason::kNoTransform, "no transform connects '" + from + "' with '" + to +
+                                          "'; publish it, or set frame_id or sensor_frame_id (" +
+                                          shortText(why, 300) + ")"};
   }
   const ros::Time latest = buffer_.lookupTransform(target, source, ros::Time(0)).header.stamp;
   if (stamp > latest) {
     return {DropReason::kTransformLate,
-            "the latest transform from '" + source + "' to '" + target + "' is " +
+            "the latest transform from '" + from + "' to '" + to + "' is " +
                 numberText(std::round(1e3 * (stamp.toSec() - latest.toSec()))) +
                 " ms older than the cloud; raise tf_timeout, or let the localisation publish sooner"};
   }
-  return {DropReason::kTooOld, "the transforms held from '" + source + "' to '" + target +
+  return {DropReason::kTooOld, "the transforms held from '" + from + "' to '" + to +
                                    "' do not reach back to it: the latest is " +
                                    numberText(std::round(1e3 * (latest.toSec() - stamp.toSec())) / 1e3) +
                                    " s newer; let clouds come sooner, or check the clocks"};

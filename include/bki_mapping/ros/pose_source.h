@@ -73,6 +73,8 @@ class PoseSource {
     std::string why;
   };
 
+  /// Gives a transform to tf2.
+  void put(const geometry_msgs::TransformStamped& transform, bool is_static);
   void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
   std::deque<Refused>::const_iterator findRefused(const std::string& child) const;
   /// The refused transform that find lacks, if there is one between the frames.
