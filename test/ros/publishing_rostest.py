@@ -216,6 +216,24 @@ class Publishing(MapperTest):
         self.assertGreaterEqual(len(times), 4)
         self.assertGreater(min(pauses), 0.4)
 
+    def test_a_pose_that_is_far_off(self):
+        """The map spans more columns than there is memory: the maps from above pause, and nothing else does."""
+        grid, ground = Listener('projected_map', OccupancyGrid), Listener('elevation_map', ElevationMap)
+        self.addCleanup(grid.close)
+        self.addCleanup(ground.close)
+        stamp = self.integrate(*random_scan(1))
+        for listener in (grid, ground):
+            listener.wait_for(lambda m: m.header.stamp == stamp, 'the map from above')
+        warnings = Listener('/rosout', Log)
+        self.addCleanup(warnings.close)
+        self.integrate(*random_scan(2), position=(1e6, 1e6, 0.0))
+        for topic in ('/projected_map', '/elevation_map'):
+            warnings.wait_for(lambda m: m.msg.startswith(topic + ' is not published'), f'saying so of {topic}')
+        self.call('reset')
+        stamp = self.integrate(*random_scan(3))
+        for listener in (grid, ground):
+            listener.wait_for(lambda m: m.header.stamp == stamp, 'the map from above')
+
 
 if __name__ == '__main__':
     rostest.rosrun('bki_mapping', 'publishing', Publishing)

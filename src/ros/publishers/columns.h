@@ -9,7 +9,6 @@
 
 #include "bki_mapping/mapping/column_map.h"
 #include "bki_mapping/ros/map_publisher.h"
-#include "bki_mapping/ros/sentence_throttle.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -65,18 +64,6 @@ class ColumnPublisher : public MapPublisher {
     return columns_.update(map, snapshot.mapper.classes(), blocks);
   }
 
-  /// Whether a message with a rectangle is short enough to be sent; says so if it is not.
-  bool fits(const CellRectangle& r, std::size_t bytes_per_cell) {
-    constexpr double kLongest = 1e9;  // roscpp ends connections over which more comes [bytes]
-    const double bytes = static_cast<double>(r.width) * r.height * static_cast<double>(bytes_per_cell);
-    if (bytes <= kLongest) return true;
-    const std::string why =
-        topic() + " is not sent: " + std::to_string(r.width) + " x " + std::to_string(r.height) +
-        " cells are more than a message can hold; set window, " + "or check the localisation";
-    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("%s", why.c_str());
-    return false;
-  }
-
   /// Calls write(place in the rectangle's arrays, view) for every known column in a rectangle of whole
   /// blocks.
   template <typename Write>
@@ -94,6 +81,20 @@ class ColumnPublisher : public MapPublisher {
     }
   }
 
+  /// Whether a message about the rectangle is of a size that can be made and sent. A pose that is far off by
+  /// mistake spans a rectangle of more cells than there is memory.
+  static bool fits(const CellRectangle& r, std::size_t bytes_a_cell) {
+    constexpr std::size_t kMostBytes = std::size_t{1} << 29;
+    return std::size_t{r.width} * r.height <= kMostBytes / bytes_a_cell;
+  }
+  void warnOfSize(const CellRectangle& r) const {
+    ROS_WARN_THROTTLE(
+        5.0,
+        "%s is not published: the map spans %u x %u columns of voxels, which no message holds; set "
+        "window, call ~reset, or look for a pose that is far off",
+        topic().c_str(), r.width, r.height);
+  }
+
   CellRectangle everything() const {
     return CellRectangle::around(columns_.columns().begin(), columns_.columns().end(),
                                  [](const auto& entry) { return entry.first; });
@@ -105,7 +106,6 @@ class ColumnPublisher : public MapPublisher {
  private:
   ColumnMap columns_;
   bool known_ = false;  ///< whether columns_ follows the map
-  SentenceThrottle throttle_;
 };
 
 }  // namespace bki_mapping::ros_shell

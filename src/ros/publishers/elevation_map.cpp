@@ -16,19 +16,24 @@ class Elevation : public ColumnPublisher {
           bool all = false;
           look(snapshot, all);
           const CellRectangle rectangle = everything();
-          if (fits(rectangle, kBytesPerCell)) subscriber.publish(message(snapshot, rectangle, true));
+          if (!fits(rectangle, kBytesACell)) return warnOfSize(rectangle);
+          subscriber.publish(message(snapshot, rectangle, true));
         });
   }
 
  private:
-  static constexpr std::size_t kBytesPerCell = 3 * sizeof(float) + 1;
+  static constexpr std::size_t kBytesACell = 3 * sizeof(float) + 1;
 
   void publishNew(const MapSnapshot& snapshot) override {
     bool all = false;
     const std::set<ColumnMap::Place> places = look(snapshot, all);
-    ++sequence_;
+    // What was forgotten here and what is new elsewhere may lie far apart.
+    all = all || missed_ || !fits(around(places), kBytesACell);
     const CellRectangle rectangle = all ? everything() : around(places);
-    if (fits(rectangle, kBytesPerCell)) publisher_.publish(message(snapshot, rectangle, all));
+    missed_ = !fits(rectangle, kBytesACell);
+    if (missed_) return warnOfSize(rectangle);
+    ++sequence_;
+    publisher_.publish(message(snapshot, rectangle, all));
   }
 
   ElevationMap message(const MapSnapshot& snapshot, const CellRectangle& rectangle, bool whole) const {
@@ -57,6 +62,7 @@ class Elevation : public ColumnPublisher {
   }
 
   std::uint64_t sequence_ = 0;
+  bool missed_ = false;  ///< whether the last change was too large to be sent
 };
 
 }  // namespace

@@ -18,7 +18,8 @@ class ProjectedMap : public ColumnPublisher {
           bool all = false;
           look(snapshot, all);
           if (all) layOut(snapshot);
-          if (fits(grid_, 1)) subscriber.publish(whole(snapshot));
+          if (!fits(grid_, 1)) return warnOfSize(grid_);
+          subscriber.publish(whole(snapshot));
         });
     updates_ = context.advertiseUpdates<map_msgs::OccupancyGridUpdate>(
         "projected_map_updates", *this, [](const auto&, const MapSnapshot&) {});
@@ -32,9 +33,10 @@ class ProjectedMap : public ColumnPublisher {
     const std::set<ColumnMap::Place> places = look(snapshot, all);
     const bool inside =
         std::all_of(places.begin(), places.end(), [&](const auto& p) { return grid_.contains(p); });
-    if (all || !inside) layOut(snapshot);
-    if (!fits(grid_, 1)) return;
-    if (all || !inside || snapshot.config.full_projected_map) {
+    const bool anew = all || !inside || !fits(grid_, 1);
+    if (anew) layOut(snapshot);
+    if (!fits(grid_, 1)) return warnOfSize(grid_);
+    if (anew || snapshot.config.full_projected_map) {
       publisher_.publish(whole(snapshot));
     } else if (!places.empty()) {
       updates_.publish(update(snapshot, around(places)));
