@@ -3,6 +3,12 @@
 #include "bki_mapping/ros/mapping_server.h"
 
 namespace bki_mapping::ros_shell {
+namespace {
+
+/// Of an answer; it holds a path [bytes].
+constexpr std::size_t kLongestAnswer = 1000;
+
+}  // namespace
 
 void MappingServer::offerServices() {
   services_.push_back(private_node_.advertiseService("reset", &MappingServer::onReset, this));
@@ -52,6 +58,9 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     if (request.path.empty() || request.path.front() != '/') {
       throw std::invalid_argument("path '" + request.path + "' must be absolute");
     }
+    if (request.path.find('\0') != std::string::npos) {  // the file system would read up to there
+      throw std::invalid_argument("path '" + request.path + "' must not hold a zero byte");
+    }
     const std::string include = request.include.empty() ? "occupied" : request.include;
     exportMap(request.path, mapper_->map(), mapper_->classes(), parseStates(include));
     response.success = true;
@@ -60,6 +69,7 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     response.success = false;
     response.message = fault.what();
   }
+  response.message = shortText(response.message, kLongestAnswer);
   ROS_INFO("save_map: %s", response.message.c_str());
   return true;
 }
