@@ -223,6 +223,7 @@ TEST(Allocation, AFailureOnOneOfTwoThreadsLeavesTheMapAsItWas) {
     config.free_space.mode = mode;
     config.threads = 2;
     failEverywhere(config, everywhere(), fewPoints(1), false);
+    failEverywhere(config, fewPoints(1), everywhere(), false);  // the index grows, too
   }
 }
 

@@ -32,7 +32,7 @@ LEFT_OUT = {
 # What makes a command take long, and what is run in its place. All else of it is run as written.
 SHORTER = {
     '--scans 300': '--scans 4',
-    '--scans 1000 --every 10': '--scans 20 --every 10',
+    '--scans 1000 --every 10': '--scans 50 --every 10',
     ' --curves curves': '',  # two thousand simulated scans in each mode; tools_test draws curves
 }
 SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # read by Google Benchmark
@@ -43,7 +43,7 @@ PROGRAMS = ('benchmark_', 'build/', 'catkin', 'cmake', 'ctest', 'dynparam', 'eva
 PARTS = {
     'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise SHARE',
     'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --report', 'map_sequence --report FILE.json',
-    'rosrun bki_mapping map_sequence', 'simulate_drive --seed 2',
+    'rosnode kill', 'rosrun bki_mapping map_sequence', 'simulate_drive --seed 2',
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roslaunch(?!.* --ros-args)|rviz|rostopic echo)\b')
 WRONG = re.compile(r'\bERROR\b|FATAL|Traceback|\b[Uu]nknown\b|has died|command not found|No such file', re.MULTILINE)

@@ -9,6 +9,7 @@
 
 #include "bki_mapping/mapping/column_map.h"
 #include "bki_mapping/ros/map_publisher.h"
+#include "bki_mapping/ros/sentence_throttle.h"
 
 namespace bki_mapping::ros_shell {
 
@@ -87,12 +88,13 @@ class ColumnPublisher : public MapPublisher {
     constexpr std::size_t kMostBytes = std::size_t{1} << 29;
     return std::size_t{r.width} * r.height <= kMostBytes / bytes_a_cell;
   }
-  void warnOfSize(const CellRectangle& r) const {
-    ROS_WARN_THROTTLE(
-        5.0,
-        "%s is not published: the map spans %u x %u columns of voxels, which no message holds; set "
-        "window, call ~reset, or look for a pose that is far off",
-        topic().c_str(), r.width, r.height);
+  void warnOfSize(const CellRectangle& r) {
+    const std::string why =
+        topic() + " is not published: the map spans " + std::to_string(r.width) + " x " +
+        std::to_string(r.height) +
+        " columns of voxels, which no message holds; set window, call ~reset, or look for a "
+        "pose that is far off";
+    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("%s", why.c_str());
   }
 
   CellRectangle everything() const {
@@ -106,6 +108,7 @@ class ColumnPublisher : public MapPublisher {
  private:
   ColumnMap columns_;
   bool known_ = false;  ///< whether columns_ follows the map
+  SentenceThrottle throttle_;
 };
 
 }  // namespace bki_mapping::ros_shell
