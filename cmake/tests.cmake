@@ -52,13 +52,15 @@ if(CATKIN_ENABLE_TESTING)
   set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
-    test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/mapping_rostest.py
-    test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py test/ros/two_mappers_rostest.py
+    test/ros/killed_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py
+    test/ros/mapping_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
+    test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_test(cloud_conversion_test bki_mapping_ros)
   bki_mapping_unit_test(scan_account_test bki_mapping_ros)
   bki_mapping_unit_test(scan_reader_test bki_mapping_ros)
   bki_mapping_unit_test(server_config_test bki_mapping_ros)
+  add_rostest(test/ros/killed.test)
   add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)
   add_rostest(test/ros/live.test)
@@ -79,4 +81,13 @@ if(CATKIN_ENABLE_TESTING)
   bki_mapping_warnings(soak_test)
   add_dependencies(soak_test bki_mapping_nodelets)
   add_rostest(test/ros/soak.test)
+  # Likewise: a hostile publisher.
+  add_executable(hostile_test test/ros/hostile_test.cpp test/ros/hostile/calls.cpp test/ros/hostile/clouds.cpp
+    test/ros/hostile/transforms.cpp)
+  target_include_directories(hostile_test PRIVATE test)
+  target_link_libraries(hostile_test PRIVATE bki_mapping_ros GTest::gtest ${catkin_LIBRARIES})
+  target_compile_definitions(hostile_test PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  bki_mapping_warnings(hostile_test)
+  add_dependencies(hostile_test bki_mapping_nodelets)
+  add_rostest(test/ros/hostile.test)
 endif()

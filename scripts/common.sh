@@ -51,17 +51,46 @@ source_build() {
   set -u
 }
 
-# The soak test by itself, so that its exit status counts. $1: build folder, $2: seconds, $3: seed of the faults.
-run_soak() {
+# A program of the package with a ROS master of its own, so that its exit status counts. $1: build folder, $2: program.
+run_with_master() {
   (
     source_build "$1"
-    export ROS_MASTER_URI=http://localhost:11611
-    roscore -p 11611 >/dev/null 2>&1 &
+    export ROS_MASTER_URI=http://localhost:${BKI_MAPPING_MASTER_PORT:-11611}
+    roscore -p "${ROS_MASTER_URI##*:}" >/dev/null 2>&1 &
     trap 'kill %1; wait' EXIT
     for _ in $(seq 100); do
       if rosparam list >/dev/null 2>&1; then break; fi
       sleep 0.1
     done
-    BKI_MAPPING_SOAK_SECONDS=$2 BKI_MAPPING_SOAK_SEED=$3 "$1/devel/lib/bki_mapping/soak_test"
+    "$1/devel/lib/bki_mapping/$2"
   )
+}
+
+# $1: build folder, $2: seconds, $3: seed of the faults.
+run_soak() {
+  BKI_MAPPING_SOAK_SECONDS=$2 BKI_MAPPING_SOAK_SEED=$3 run_with_master "$1" soak_test
+}
+
+# The hostile publisher, set by BKI_MAPPING_HOSTILE_*. It says its counts; where it fails, also what failed, and the last
+# messages that were sent. $1: build folder.
+run_hostile() {
+  local folder failed=false
+  folder=$(mktemp -d)
+  UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ASAN_OPTIONS=quarantine_size_mb=64 \
+    BKI_MAPPING_HOSTILE_JOURNAL=$folder/journal run_with_master "$1" hostile_test >"$folder/log" 2>&1 || failed=true
+  grep -a '^\[hostile\]' "$folder/log" || true
+  if $failed; then
+    grep -a -A 8 -E ': Failure$|ERROR: AddressSanitizer|runtime error|terminate called' "$folder/log" | head -n 200
+    echo "The last messages sent, the last of them last:"
+    tail -n 5 "$folder/journal"
+    echo "All of the log: $folder/log"
+    return 1
+  fi >&2
+  rm -rf "$folder"
+}
+
+# A build for a sanitizer. $1: build folder, $2: sanitizer, $3: debug flags.
+configure_sanitizer() {
+  cmake -S "$root" -B "$1" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="$3" \
+    -DCMAKE_CXX_FLAGS="-O1 -fsanitize=$2 -fno-omit-frame-pointer" >/dev/null
 }

@@ -207,12 +207,14 @@ class Publishing(MapperTest):
         stamp = self.integrate(*random_scan(1))
         for listener in (grid, ground):
             listener.wait_for(lambda m: m.header.stamp == stamp, 'the map from above')
-        warnings = Listener('/rosout', Log)
-        self.addCleanup(warnings.close)
-        wait_until(warnings.subscriber.get_num_connections, 'the connection to the log')
         self.integrate(*random_scan(2), position=(1e6, 1e6, 0.0))
+        log = Listener('/rosout', Log)
+        self.addCleanup(log.close)
         for topic in ('/projected_map', '/elevation_map'):
-            warnings.wait_for(lambda m: m.msg.startswith(topic + ' is not published'), f'saying so of {topic}')
+            def said(sentence=topic + ' is not published: the map spans '):
+                self.call('publish_map')
+                return log.find(lambda m: m.msg.startswith(sentence))
+            wait_until(said, f'saying why there is no {topic}')
         self.call('reset')
         stamp = self.integrate(*random_scan(3))
         for listener in (grid, ground):

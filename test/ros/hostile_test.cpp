@@ -1,0 +1,903 @@
+// A hostile publisher: clouds, transforms, calls and settings of every kind in hostile/, at random, to the
+// nodelet in this process. Nothing crashes or hangs, memory is bounded, every cloud is accounted for under a
+// reason that its kind allows, every refusal has a sentence, and afterwards the mapper maps as a fresh one.
+//
+// BKI_MAPPING_HOSTILE_SEED: of the random numbers (default 1). BKI_MAPPING_HOSTILE_MESSAGES: how many at
+// least (default 2000); BKI_MAPPING_HOSTILE_SECONDS: how long instead. BKI_MAPPING_HOSTILE_SETTINGS: one set
+// of settings alone. BKI_MAPPING_HOSTILE_JOURNAL: a file that takes each message's kind before it is sent.
+#include <bki_mapping/ElevationMap.h>
+#include <bki_mapping/MappingStatus.h>
+#include <bki_mapping/OccupancyMap.h>
+#include <bki_mapping/OccupancyUpdate.h>
+#include <bki_mapping/SaveMap.h>
+#include <bki_mapping/VoxelCloudUpdate.h>
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <map_msgs/OccupancyGridUpdate.h>
+#include <nav_msgs/OccupancyGrid.h>
+#include <nav_msgs/Path.h>
+#include <nodelet/loader.h>
+#include <ros/ros.h>
+#include <rosgraph_msgs/Log.h>
+#include <std_srvs/Empty.h>
+#include <std_srvs/Trigger.h>
+#include <sys/stat.h>
+#include <tf2_msgs/TFMessage.h>
+#include <unistd.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <condition_variable>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "bki_mapping/ros/point_account.h"
+#include "bki_mapping/ros/scan_ledger.h"
+#include "hostile/kinds.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using namespace bki_mapping::hostile;
+using Clock = std::chrono::steady_clock;
+using sensor_msgs::PointCloud2;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+/// Most resident memory at any time [MB]; sanitizers keep freed memory, and shadows of all.
+constexpr double kMostMemory = kSanitized ? 1000.0 : 400.0;
+/// No answer may take longer [s].
+constexpr double kLongestAnswer = 20.0;
+/// What is said of a refusal names its cause and a remedy, and no sender chooses how much is said [bytes].
+constexpr std::size_t kShortestText = 20, kLongestText = 3000;
+
+const std::string kName = "/hostile_mapping";
+
+std::string environment(const char* name, const std::string& standard) {
+  const char* text = std::getenv(name);
+  return text ? text : standard;
+}
+
+/// Resident memory of this process [MB].
+double residentMemory() {
+  std::ifstream in("/proc/self/statm");
+  double pages = 0.0;
+  in >> pages >> pages;
+  return pages * static_cast<double>(sysconf(_SC_PAGESIZE)) * 1e-6;
+}
+
+/// Settings under which the mapper is attacked.
+struct Settings {
+  std::string name;
+  std::map<std::string, std::string> values;
+};
+
+const std::vector<Settings>& allSettings() {
+  static const std::vector<Settings> all = {
+      {"robot",
+       {{"kernel/scale", "100"},
+        {"free_space/hits_before_misses", "true"},
+        {"free_space/evidence_before_misses", "true"},
+        {"scan_limit/hits", "0.2"},
+        {"scan_limit/free", "0.1"},
+        {"free_gain/static", "0.1"},
+        {"free_gain/dynamic", "8"},
+        {"free_gain/persistence", "0.5"},
+        {"sensor_model/max_range", "60"}}},
+      {"window_below_a_block", {{"window", "0.5"}, {"sensor_model/max_range", "20"}}},
+      {"defaults", {{"window", "0"}}},
+      {"coarse",
+       {{"resolution", "5"},
+        {"downsample_resolution", "1"},
+        {"free_space/mode", "linear"},
+        {"window", "400"}}},
+      {"fine",
+       {{"resolution", "0.02"},
+        {"downsample_resolution", "0.01"},
+        {"window", "2"},
+        {"free_space/mode", "even"},
+        {"free_space/gap", "0.2"},
+        {"sensor_model/max_range", "3"}}},
+      {"counting",
+       {{"kernel/type", "counting"},
+        {"occlusion", "all"},
+        {"downsample_resolution", "0"},
+        {"sensor_model/max_range", "15"}}},
+      {"colours",
+       {{"label_encoding", "rgb"},
+        {"label_field", "rgb"},
+        {"color_match", "nearest"},
+        {"free_space/mode", "none"},
+        {"occlusion", "mapped"},
+        {"sensor_model/max_range", "30"}}},
+      {"scores",
+       {{"label_encoding", "scores"},
+        {"label_field", ""},
+        {"score_fields", "scores"},
+        {"free_space/mode", "uniform"},
+        {"free_space/samples_per_beam", "3"},
+        {"sensor_model/max_range", "30"}}},
+      {"top_k",
+       {{"label_encoding", "top_k"},
+        {"label_field", "labels"},
+        {"score_fields", "label_scores"},
+        {"score_type", "logit"},
+        {"free_space/extent", "mapped"},
+        {"sensor_model/max_range", "60"}}},
+      {"moving_sensor",
+       {{"sensor_frame_id", "honest_base"},
+        {"time_field", "seconds"},
+        {"free_space/beam_index", "rtree"},
+        {"unknown_labels", "unlabelled"},
+        {"on_time_jump", "reset"},
+        {"sensor_model/max_range", "30"}}},
+      {"no_returns",
+       {{"clear_no_returns", "true"},
+        {"time_field", "ns"},
+        {"unlabelled_points", "ignore"},
+        {"queue_policy", "drop_newest"},
+        {"memory_limit", "2"},
+        {"free_space/weight", "uniform"},
+        {"sensor_model/max_range", "10"}}},
+      {"two_lidars",
+       {{"inputs/front/topic", "/hostile_cloud"},
+        {"inputs/front/time_field", "seconds"},
+        {"inputs/front/clear_no_returns", "true"},
+        {"inputs/front/max_range", "12"},
+        {"inputs/rear/topic", "/hostile_cloud_2"},
+        {"inputs/rear/label_encoding", "bgr"},
+        {"inputs/rear/label_field", "rgb"},
+        {"inputs/rear/sensor_frame_id", "honest_base"},
+        {"inputs/rear/min_range", "1"},
+        {"inputs/rear/max_range", "40"},
+        {"window", "30"}}},
+  };
+  return all;
+}
+
+/// What the kinds of a run met with.
+struct Tally {
+  std::map<std::string, std::map<std::string, std::size_t>> answers;  ///< by kind and answer
+  std::map<std::string, std::size_t> tried;
+  std::map<std::string, double> seconds;         ///< that they took
+  std::map<std::string, std::string> sentences;  ///< one of each kind and answer
+  std::size_t messages = 0;
+  double most_memory = 0.0;
+};
+
+/// Ends the process if nothing happens for long: a hang cannot be left by an exception.
+class Watchdog {
+ public:
+  Watchdog() : thread_([this] { watch(); }) {}
+  ~Watchdog() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      over_ = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+  }
+  void feed(const std::string& doing) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    doing_ = doing;
+    since_ = Clock::now();
+  }
+
+ private:
+  void watch() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!wake_.wait_for(lock, std::chrono::seconds(1), [this] { return over_; })) {
+      if (Clock::now() - since_ < std::chrono::duration<double>(6.0 * kLongestAnswer)) continue;
+      std::printf("[hostile] hangs: %s\n", doing_.c_str());
+      std::fflush(stdout);
+      std::_Exit(3);
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool over_ = false;
+  std::string doing_ = "start";
+  Clock::time_point since_ = Clock::now();
+  std::thread thread_;
+};
+
+/// The log of this process: how many clouds were refused with a sentence, and how long texts are.
+class LogReader {
+ public:
+  explicit LogReader(ros::NodeHandle& node) {
+    subscriber_ = node.subscribe<rosgraph_msgs::Log>(
+        "/rosout", 10000, [this](const rosgraph_msgs::Log::ConstPtr& m) { read(*m); });
+  }
+  std::size_t refusals() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return refusals_;
+  }
+  std::string longest() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return longest_;
+  }
+  std::size_t bytes() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return bytes_;
+  }
+
+ private:
+  void read(const rosgraph_msgs::Log& log) {
+    if (log.file.find("src/ros/") == std::string::npos) return;  // a library's
+    const std::lock_guard<std::mutex> lock(mutex_);
+    bytes_ += log.msg.size();
+    if (log.msg.size() > longest_.size()) longest_ = log.msg;
+    const std::string beginning = "Dropped the cloud of ";
+    refusals_ +=
+        log.level == rosgraph_msgs::Log::WARN && log.msg.compare(0, beginning.size(), beginning) == 0;
+  }
+
+  mutable std::mutex mutex_;
+  std::size_t refusals_ = 0, bytes_ = 0;
+  std::string longest_;
+  ros::Subscriber subscriber_;
+};
+
+/// Loads and unloads the mapper, and keeps the books on its status.
+class Mapper {
+ public:
+  explicit Mapper(ros::NodeHandle& node) : node_(node), loader_(true) {
+    status_ = node.subscribe<MappingStatus>(kName + "/status", 10000,
+                                            [this](const MappingStatus::ConstPtr& m) { onStatus(*m); });
+  }
+  ~Mapper() { unload(); }
+
+  void load(const Settings& settings) {
+    ros::param::del(kName);
+    const std::map<std::string, std::string> common = {
+        {"classes", "toy"},      {"tf_timeout", "0.02"}, {"publish_rate", "20"}, {"diagnostic_period", "0.2"},
+        {"memory_limit", "100"}, {"window", "60"},       {"threads", "2"}};
+    for (const auto& [name, value] : common) ros::param::set(kName + "/" + name, value);
+    for (const auto& [name, value] : settings.values) ros::param::set(kName + "/" + name, value);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      last_ = MappingStatus();
+      fresh_ = false;
+      reasons_.clear();
+    }
+    ASSERT_TRUE(loader_.load(kName, "bki_mapping/MappingNodelet", {{"/cloud_in", "/hostile_cloud"}}, {}));
+    loaded_ = true;
+    ASSERT_TRUE(waitFor([this] { return fresh_; })) << "no status after loading";
+  }
+  void unload() {
+    if (loaded_) loader_.unload(kName);
+    loaded_ = false;
+  }
+
+  /// Waits until a status has `received` clouds of which none waits. @return whether one came.
+  bool settle(std::uint64_t received, MappingStatus& status) {
+    const bool came = waitFor([&] { return last_.received == received && last_.waiting == 0; });
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status = last_;
+    return came;
+  }
+
+  std::size_t faults() const { return faults_; }
+  std::size_t statuses() const { return statuses_; }
+  /// Reasons for which this mapper has dropped clouds.
+  std::size_t reasons() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return reasons_.size();
+  }
+
+  template <typename Service>
+  bool call(const std::string& name, Service& service) {
+    return ros::service::call(kName + "/" + name, service);
+  }
+
+ private:
+  bool waitFor(const std::function<bool()>& condition) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    return came_.wait_for(lock, std::chrono::duration<double>(kLongestAnswer), condition);
+  }
+
+  void onStatus(const MappingStatus& status) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++statuses_;
+    std::uint64_t dropped = 0;
+    for (const DropKind& kind : dropKinds()) {
+      dropped += status.*kind.count;
+      if (status.*kind.count > 0) reasons_.insert(kind.reason);
+    }
+    if (status.received != status.integrated + status.waiting + dropped) {
+      ++faults_;
+      ADD_FAILURE() << "the books do not add up: " << status;
+    }
+    std::uint64_t points = status.points_used + status.points_no_returns;
+    for (const PointKind& kind : pointKinds()) points += status.*kind.in_status;
+    if (status.points_received != points) {
+      ++faults_;
+      ADD_FAILURE() << "points are lost: " << status;
+    }
+    const bool refused = !status.integrated_last && status.integrated + dropped > 0;
+    if (refused && (status.last_drop.size() < kShortestText || status.last_drop.size() > kLongestText)) {
+      ++faults_;
+      ADD_FAILURE() << "this is no sentence: " << status.last_drop.substr(0, 300);
+    }
+    if (status.last_refusal.size() > kLongestText) {
+      ++faults_;
+      ADD_FAILURE() << "this is too long: " << status.last_refusal.substr(0, 300);
+    }
+    last_ = status;
+    fresh_ = true;
+    came_.notify_all();
+  }
+
+  ros::NodeHandle& node_;
+  nodelet::Loader loader_;
+  bool loaded_ = false;
+  mutable std::mutex mutex_;
+  std::condition_variable came_;
+  MappingStatus last_;
+  bool fresh_ = false;
+  std::set<DropReason> reasons_;
+  std::atomic<std::size_t> faults_{0}, statuses_{0};
+  ros::Subscriber status_;
+};
+
+/// Somebody who listens to everything, and goes away, at random.
+class Listeners {
+ public:
+  explicit Listeners(ros::NodeHandle& node) : node_(node) {}
+
+  void change(Dice& dice) {
+    toggle<visualization_msgs::MarkerArray>(dice, "occupied_cells_vis_array");
+    toggle<visualization_msgs::MarkerArray>(dice, "free_cells_vis_array");
+    toggle<PointCloud2>(dice, "voxel_cloud");
+    toggle<VoxelCloudUpdate>(dice, "voxel_cloud_updates");
+    toggle<nav_msgs::OccupancyGrid>(dice, "projected_map");
+    toggle<map_msgs::OccupancyGridUpdate>(dice, "projected_map_updates");
+    toggle<ElevationMap>(dice, "elevation_map");
+    toggle<OccupancyMap>(dice, "occupancy");
+    toggle<OccupancyUpdate>(dice, "occupancy_updates");
+    toggle<nav_msgs::Path>(dice, "trajectory");
+  }
+  void leave() { subscribers_.clear(); }
+  std::size_t received() const { return received_; }
+
+ private:
+  template <typename Message>
+  void toggle(Dice& dice, const std::string& topic) {
+    if (dice.oneIn(2)) return;
+    if (subscribers_.erase(topic) > 0) return;
+    subscribers_[topic] =
+        node_.subscribe<Message>(topic, 2, [this](const typename Message::ConstPtr&) { ++received_; });
+  }
+
+  ros::NodeHandle& node_;
+  std::map<std::string, ros::Subscriber> subscribers_;
+  std::atomic<std::size_t> received_{0};
+};
+
+/// One mapper under one set of settings, from loading it to comparing it with a fresh one.
+class Attack {
+ public:
+  Attack(ros::NodeHandle& node, Mapper& mapper, LogReader& log, Watchdog& watchdog, Tally& tally,
+         const Settings& settings, std::uint64_t seed)
+      : mapper_(mapper),
+        log_(log),
+        watchdog_(watchdog),
+        tally_(tally),
+        settings_(settings),
+        seed_(seed),
+        dice_(seed),
+        listeners_(node),
+        journal_(open(environment("BKI_MAPPING_HOSTILE_JOURNAL", "/dev/null").c_str(),
+                      O_WRONLY | O_CREAT | O_APPEND, 0644)) {
+    for (const char* topic : {"/hostile_cloud", "/hostile_cloud_2"}) {
+      clouds_.push_back(node.advertise<PointCloud2>(topic, 1000));
+    }
+    transforms_ = node.advertise<tf2_msgs::TFMessage>("/tf", 1000);
+    static_transforms_ = node.advertise<tf2_msgs::TFMessage>("/tf_static", 1000);
+    for (const char letter : settings.name)
+      dice_ = Dice(31 * dice_.bits() + static_cast<unsigned char>(letter));
+    inputs_ = settings.values.count("inputs/rear/topic") > 0 ? 2 : 1;
+    points_have_times_ =
+        settings.values.count("time_field") + settings.values.count("inputs/front/time_field") > 0;
+  }
+  ~Attack() { close(journal_); }
+
+  /// Sends every kind `rounds` times, and then asks the mapper to map as ever.
+  void run(std::size_t rounds) {
+    load();
+    for (std::size_t round = 0; round < rounds; ++round) {
+      for (const auto& send : shuffledKinds()) {
+        send();
+        if (testing::Test::HasFatalFailure()) return;
+      }
+    }
+    mapsAsEver();
+    checkSentences();
+    mapper_.unload();
+  }
+
+  /// Sends 200 new frames in each of so many messages, and waits until they are taken. @return memory [MB].
+  double floodFrames(int messages) {
+    if (sent_ == 0) load();
+    begin("flood");
+    for (int n = 0; n < messages; ++n) {
+      const std::string frame = "flood_" + std::to_string(sent_) + "_" + std::to_string(n);
+      TransformKind::Message message{false, {}};
+      for (int k = 0; k < 200; ++k) {
+        message.transforms.push_back(honestTransform("map", frame + "_" + std::to_string(k), nextStamp()));
+      }
+      publish({message});
+    }
+    publish(changedCloud(cloudKinds().front()));
+    expectAnswer({"mapped"});
+    return residentMemory();
+  }
+
+ private:
+  std::string where() const {
+    return "settings " + settings_.name + ", seed " + std::to_string(seed_) + ", message " +
+           std::to_string(number_) + ", " + kind_;
+  }
+
+  void begin(const std::string& kind) {
+    const Clock::time_point now = Clock::now();
+    tally_.seconds[kind_] += std::chrono::duration<double>(now - begun_).count();
+    begun_ = now;
+    kind_ = kind;
+    ++number_;
+    ++tally_.messages;
+    ++tally_.tried[kind];
+    const std::string line = where() + "\n";
+    if (write(journal_, line.data(), line.size()) < 0) ADD_FAILURE() << "the journal cannot be written";
+    watchdog_.feed(where());
+    const double memory = residentMemory();
+    tally_.most_memory = std::max(tally_.most_memory, memory);
+    EXPECT_LT(memory, kMostMemory) << where();
+  }
+
+  void load() {
+    watchdog_.feed("loading: " + where());
+    refusals_before_ = log_.refusals();
+    mapper_.load(settings_);
+    sent_ = 0;
+    before_ = MappingStatus();
+    dynamic_reconfigure::Reconfigure ask;
+    ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", ask));
+    original_ = ask.response.config;
+    const auto connected = [this] {
+      for (std::size_t i = 0; i < inputs_; ++i) {
+        if (clouds_[i].getNumSubscribers() == 0) return false;
+      }
+      return transforms_.getNumSubscribers() > 0;
+    };
+    const auto end = Clock::now() + std::chrono::duration<double>(kLongestAnswer);
+    while (!connected() && Clock::now() < end) ros::WallDuration(0.005).sleep();
+    ASSERT_TRUE(connected());
+  }
+
+  // --- what is sent ---
+
+  ros::Time nextStamp() {
+    ++turn_;
+    return ros::Time(1000.0) + ros::Duration(0.1 * static_cast<double>(turn_));
+  }
+
+  void publish(const std::vector<TransformKind::Message>& messages) {
+    for (const auto& message : messages) {
+      const boost::shared_ptr<tf2_msgs::TFMessage> out(new tf2_msgs::TFMessage);
+      out->transforms = message.transforms;
+      (message.is_static ? static_transforms_ : transforms_).publish(out);
+    }
+  }
+  void publishHonestTransforms(const ros::Time& stamp) {
+    const double x = 0.05 * static_cast<double>(turn_ % 100);
+    std::vector<geometry_msgs::TransformStamped> all;
+    for (const double later : {0.0, 0.15}) {
+      const ros::Time time = stamp + ros::Duration(later);
+      all.push_back(honestTransform("map", "honest_base", time, x + later));
+      all.push_back(honestTransform("honest_base", "honest_sensor", time, 0.5));
+    }
+    publish({{false, all}});
+  }
+  void publish(const PointCloud2& cloud) {
+    ++sent_;
+    clouds_[dice_.below(inputs_)].publish(boost::shared_ptr<PointCloud2>(new PointCloud2(cloud)));
+  }
+
+  /// Waits for the mapper's answer to the last cloud, and says what became of it.
+  void wait(std::string& answer) {
+    MappingStatus now;
+    ASSERT_TRUE(mapper_.settle(sent_, now)) << "no answer: " << where() << "\n" << now;
+    answer = now.integrated > before_.integrated ? "mapped" : "none";
+    for (const DropKind& kind : dropKinds()) {
+      if (now.*kind.count == before_.*kind.count) continue;
+      answer = kind.name;
+      tally_.sentences[kind_ + ": " + answer] = now.last_drop;
+    }
+    before_ = now;
+    ++tally_.answers[kind_][answer];
+  }
+  std::string answer() {
+    std::string answer = "none";
+    wait(answer);
+    return answer;
+  }
+  void expectAnswer(Answers allowed) {
+    const std::string given = answer();
+    allowed.insert(allowed.end(), {"memory limit", "too large"});  // by the settings
+    EXPECT_TRUE(std::find(allowed.begin(), allowed.end(), given) != allowed.end())
+        << where() << ": was answered with '" << given << "'";
+  }
+
+  PointCloud2 changedCloud(const CloudKind& kind) {
+    const ros::Time stamp = nextStamp();
+    publishHonestTransforms(stamp);
+    PointCloud2 cloud = honestCloud("honest_sensor", stamp, dice_);
+    kind.change(cloud, dice_);
+    return cloud;
+  }
+  void send(const CloudKind& kind) {
+    begin(kind.name);
+    publish(changedCloud(kind));
+    expectAnswer(kind.answers);
+  }
+  void send(const TransformKind& kind) {
+    begin(kind.name);
+    const ros::Time stamp = nextStamp();
+    publishHonestTransforms(stamp);
+    const std::string frame = "frame_" + std::to_string(tally_.messages);
+    publish(kind.make(frame, stamp, dice_));
+    publish(honestCloud(frame, stamp, dice_));
+    Answers allowed = kind.answers;
+    if (points_have_times_) {  // for which this kind sends no transforms
+      allowed.insert(allowed.end(), {"transform late", "too old"});
+    }
+    expectAnswer(allowed);
+  }
+  void send(const PathKind& kind) {
+    begin(kind.name);
+    SaveMap save;
+    save.request.path = kind.make(folder_ / ".");
+    save.request.include = "occupied,free,occluded";
+    struct stat before {};
+    const bool there = stat(save.request.path.c_str(), &before) == 0;
+    ASSERT_TRUE(mapper_.call("save_map", save)) << where();
+    ++tally_.answers[kind.name][save.response.success ? "written" : "refused"];
+    EXPECT_EQ(save.response.success, kind.written) << where() << ": " << save.response.message;
+    EXPECT_GT(save.response.message.size(), 10u) << where();
+    struct stat after {};
+    if (there && !S_ISREG(before.st_mode)) {
+      EXPECT_EQ(stat(save.request.path.c_str(), &after), 0) << where();
+      EXPECT_EQ(after.st_mode & S_IFMT, before.st_mode & S_IFMT) << where() << ": the node was replaced";
+    }
+  }
+  void send(const SettingsKind& kind) {
+    begin(kind.name);
+    dynamic_reconfigure::Reconfigure change;
+    kind.change(change.request.config, dice_);
+    ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", change)) << where();
+    // What was taken over maps, at least a small cloud.
+    const ros::Time stamp = nextStamp();
+    publishHonestTransforms(stamp);
+    PointCloud2 cloud = honestCloud("honest_sensor", stamp, dice_);
+    cloud.height = 1;
+    cloud.width = std::min(cloud.width, 3u);
+    publish(cloud);
+    expectAnswer({"mapped"});
+    if (kind.name != "settings/allowed" || dice_.oneIn(2)) restoreSettings();
+  }
+  void restoreSettings() {
+    dynamic_reconfigure::Reconfigure back;
+    back.request.config = original_;
+    ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", back)) << where();
+  }
+
+  void send(const DeedKind& kind) {
+    begin(kind.name);
+    if (kind.name == "deed/two_wrongs") return twoWrongs();
+    if (kind.name == "deed/burst") return burst();
+    if (kind.name == "deed/transform_after") return transformAfter();
+    if (kind.name == "deed/time_back") return timeBack();
+    if (kind.name == "deed/pause") return pause();
+    if (kind.name == "deed/reset") return callEmpty("reset");
+    if (kind.name == "deed/publish_map") return callEmpty("publish_map");
+    if (kind.name == "deed/include") return include();
+    if (kind.name == "deed/listeners") return listeners_.change(dice_);
+    if (kind.name == "deed/reload") return reload();
+    ADD_FAILURE() << kind.name << " is not done";
+  }
+  void twoWrongs() {
+    PointCloud2 cloud = changedCloud(dice_.oneOf(cloudKinds()));
+    if (!cloud.fields.empty() && !cloud.data.empty() && cloud.width > 0 && cloud.height > 0) {
+      for (int n = 0; n < 2 && cloud.fields.size() > 3; ++n) {
+        const CloudKind& other = dice_.oneOf(cloudKinds());
+        if (other.name.compare(0, 5, "size/") == 0 || other.name.compare(0, 7, "header/") == 0) {
+          other.change(cloud, dice_);
+          break;
+        }
+      }
+    }
+    publish(cloud);
+    answer();
+  }
+  void burst() {
+    for (int n = 0; n < 30; ++n) publish(changedCloud(dice_.oneOf(cloudKinds())));
+    answer();
+  }
+  void transformAfter() {
+    const ros::Time stamp = nextStamp();
+    publish(honestCloud("honest_sensor", stamp, dice_));
+    publishHonestTransforms(stamp);
+    expectAnswer({"mapped", "transform late"});  // late where the machine is slow
+  }
+  void timeBack() {
+    const auto drive = [this] {  // clouds that agree on the time
+      for (int n = 0; n < 3; ++n) {
+        publish(changedCloud(cloudKinds().front()));
+        answer();
+      }
+    };
+    drive();
+    turn_ = turn_ > 1000 ? turn_ - 1000 : 0;
+    drive();
+  }
+  void pause() {
+    std_srvs::Trigger service;
+    EXPECT_TRUE(mapper_.call("pause", service) && service.response.success) << where();
+    publish(changedCloud(dice_.oneOf(cloudKinds())));
+    expectAnswer({"paused"});
+    EXPECT_TRUE(mapper_.call("resume", service) && service.response.success) << where();
+  }
+  void callEmpty(const std::string& name) {
+    std_srvs::Empty service;
+    EXPECT_TRUE(mapper_.call(name, service)) << where();
+  }
+  void include() {
+    SaveMap save;
+    save.request.path = folder_ / "included.ply";
+    std::string many;
+    for (int n = 0; n < 100000; ++n) many += "occupied,";
+    save.request.include =
+        dice_.oneOf<std::string>({"occupied", ",", "nothing", many, std::string("free\0", 5)});
+    EXPECT_TRUE(mapper_.call("save_map", save)) << where();
+    EXPECT_GT(save.response.message.size(), 10u) << where();
+  }
+  void reload() {
+    for (int n = 0; n < 5; ++n) publish(changedCloud(cloudKinds().front()));
+    checkSentences();
+    mapper_.unload();
+    load();
+  }
+
+  /// One call for each kind of everything, in a random order.
+  std::vector<std::function<void()>> shuffledKinds() {
+    std::vector<std::function<void()>> all;
+    const auto append = [&](const auto& kinds) {
+      for (const auto& kind : kinds) all.push_back([this, &kind] { send(kind); });
+    };
+    append(cloudKinds());
+    append(transformKinds());
+    append(pathKinds());
+    append(settingsKinds());
+    append(deedKinds());
+    for (std::size_t n = all.size(); n > 1; --n) std::swap(all[n - 1], all[dice_.below(n)]);
+    return all;
+  }
+
+  // --- what must hold afterwards ---
+
+  /// What the status says the log says, too, once for many alike.
+  void checkSentences() {
+    const std::size_t least = mapper_.reasons() > 0 ? 1 : 0;
+    const auto end = Clock::now() + std::chrono::seconds(10);  // the log has a thread of its own
+    while (log_.refusals() - refusals_before_ < least && Clock::now() < end) ros::WallDuration(0.01).sleep();
+    EXPECT_GE(log_.refusals() - refusals_before_, least) << where();
+    EXPECT_LE(log_.longest().size(), kLongestText) << where() << ": " << log_.longest().substr(0, 300);
+  }
+
+  /// A short drive. @return the map.
+  std::string drive(bool big_endian) {
+    callEmpty("reset");
+    Dice dice(seed_);
+    for (int scan = 0; scan < 6; ++scan) {
+      turn_ = static_cast<std::size_t>(10000 + scan);
+      const ros::Time stamp = nextStamp();
+      publishHonestTransforms(stamp);
+      PointCloud2 cloud = honestCloud("honest_sensor", stamp, dice);
+      Dice alpha(seed_);
+      if (big_endian) {
+        swapBytes(cloud);
+        setAlpha(cloud, alpha);
+      }
+      ++sent_;
+      clouds_[static_cast<std::size_t>(scan) % inputs_].publish(
+          boost::shared_ptr<PointCloud2>(new PointCloud2(cloud)));
+      expectAnswer({"mapped"});
+    }
+    SaveMap save;
+    save.request.path = folder_ / "drive.ply";
+    save.request.include = "occupied,free,occluded";
+    EXPECT_TRUE(mapper_.call("save_map", save) && save.response.success) << save.response.message;
+    std::ifstream in(save.request.path, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+
+  std::string freshDrive(bool big_endian) {
+    mapper_.unload();
+    load();
+    return drive(big_endian);
+  }
+
+  void mapsAsEver() {
+    begin("drive");
+    listeners_.leave();
+    restoreSettings();
+    for (int n = 0; n < 3; ++n) {  // time may have to be found again
+      turn_ = static_cast<std::size_t>(9000 + n);
+      publish(changedCloud(cloudKinds().front()));
+      answer();
+    }
+    const std::string after = drive(false);
+    EXPECT_GT(after.size(), 1000u) << where();
+    checkSentences();
+    const std::string fresh = freshDrive(false);
+    EXPECT_TRUE(fresh == after) << where() << ": the map is not that of a fresh mapper";
+    EXPECT_TRUE(freshDrive(true) == fresh)
+        << where() << ": the map of big-endian clouds with an alpha differs";
+  }
+
+  Mapper& mapper_;
+  LogReader& log_;
+  Watchdog& watchdog_;
+  Tally& tally_;
+  const Settings& settings_;
+  const std::uint64_t seed_;
+  Dice dice_;
+  Listeners listeners_;
+  TemporaryFolder folder_;
+  int journal_;
+  std::size_t inputs_ = 1;
+  bool points_have_times_ = false;
+  std::vector<ros::Publisher> clouds_;
+  ros::Publisher transforms_, static_transforms_;
+  std::string kind_ = "load";
+  Clock::time_point begun_ = Clock::now();
+  std::size_t number_ = 0, turn_ = 0, refusals_before_ = 0;
+  std::uint64_t sent_ = 0;  ///< clouds since the mapper was loaded
+  MappingStatus before_;
+  dynamic_reconfigure::Config original_;
+};
+
+/// name, what is sent and answers of every kind, as rows of docs/robustness.md.
+std::vector<std::pair<std::string, std::string>> allRows() {
+  std::vector<std::pair<std::string, std::string>> rows;
+  const auto add = [&](const std::string& name, const std::string& sent, const std::string& answers) {
+    rows.emplace_back(name, "| `" + name + "` | " + sent + " | " + answers + " |");
+  };
+  const auto join = [](const Answers& answers) {
+    std::string text;
+    for (const std::string& answer : answers) text += (text.empty() ? "" : ", ") + answer;
+    return text;
+  };
+  for (const CloudKind& kind : cloudKinds()) add(kind.name, kind.sent, join(kind.answers));
+  for (const TransformKind& kind : transformKinds()) add(kind.name, kind.sent, join(kind.answers));
+  for (const PathKind& kind : pathKinds()) add(kind.name, kind.sent, kind.written ? "written" : "refused");
+  for (const SettingsKind& kind : settingsKinds())
+    add(kind.name, kind.sent, "taken over or refused as a whole");
+  for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud alone");
+  return rows;
+}
+
+void print(Tally& tally) {
+  for (const auto& [kind, tried] : tally.tried) {
+    std::string answers;
+    const auto found = tally.answers.find(kind);
+    if (found != tally.answers.end()) {
+      for (const auto& [answer, count] : found->second)
+        answers += " " + std::to_string(count) + " " + answer + ";";
+    }
+    const double each = 1e3 * tally.seconds[kind] / static_cast<double>(tried);
+    std::printf("[hostile] %-26s %5zu, %5.0f ms each:%s\n", kind.c_str(), tried, each, answers.c_str());
+  }
+}
+
+TEST(Hostile, NothingCrashesHangsOrIsLost) {
+  const auto seed =
+      static_cast<std::uint64_t>(std::atoll(environment("BKI_MAPPING_HOSTILE_SEED", "1").c_str()));
+  const auto messages =
+      static_cast<std::size_t>(std::atoll(environment("BKI_MAPPING_HOSTILE_MESSAGES", "2000").c_str()));
+  const double seconds = std::atof(environment("BKI_MAPPING_HOSTILE_SECONDS", "0").c_str());
+  const std::string only = environment("BKI_MAPPING_HOSTILE_SETTINGS", "");
+  std::vector<Settings> chosen;
+  for (const Settings& settings : allSettings()) {
+    if (only.empty() || settings.name == only) chosen.push_back(settings);
+  }
+  ASSERT_FALSE(chosen.empty()) << "no settings are named '" << only << "'";
+  const std::size_t kinds = allRows().size();
+  const std::size_t rounds =
+      seconds > 0.0 ? 2 : (messages + chosen.size() * kinds - 1) / (chosen.size() * kinds);
+
+  ros::NodeHandle node;
+  Tally tally;
+  Watchdog watchdog;
+  LogReader log(node);
+  Mapper mapper(node);
+  const auto start = Clock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  for (std::uint64_t turn = 0; turn == 0 || elapsed() < seconds; ++turn) {
+    for (const Settings& settings : chosen) {
+      const double before = elapsed();
+      Attack(node, mapper, log, watchdog, tally, settings, seed + turn).run(rounds);
+      std::printf("[hostile] settings %s, seed %lu: %zu messages so far, %.1f s, %.0f MB\n",
+                  settings.name.c_str(), seed + turn, tally.messages, elapsed() - before, residentMemory());
+      std::fflush(stdout);
+      if (HasFatalFailure() || (seconds > 0.0 && elapsed() > seconds)) break;
+    }
+    if (HasFailure()) break;
+  }
+  print(tally);
+  std::printf(
+      "[hostile] %zu kinds, %zu messages in %.0f s, %zu status messages, %zu kB of log, at most %.0f MB\n",
+      tally.tried.size(), tally.messages, elapsed(), mapper.statuses(), log.bytes() / 1000,
+      tally.most_memory);
+  if (HasFailure()) return;
+  for (const auto& [kind, row] : allRows()) EXPECT_GT(tally.tried[kind], 0u) << kind << " was not tried";
+  for (const CloudKind& kind : cloudKinds()) {
+    std::size_t answered = 0;
+    for (const auto& [answer, count] : tally.answers[kind.name]) answered += count;
+    EXPECT_EQ(answered, tally.tried[kind.name]) << kind.name;
+  }
+  EXPECT_EQ(mapper.faults(), 0u);
+}
+
+TEST(Hostile, NewFramesCostWhatTf2KeepsOfThem) {
+  constexpr int kMessages = 200;
+  ros::NodeHandle node;
+  Tally tally;
+  Watchdog watchdog;
+  LogReader log(node);
+  Mapper mapper(node);
+  Attack attack(node, mapper, log, watchdog, tally, allSettings().front(), 1);
+  const double before = attack.floodFrames(kMessages / 4);  // what is made once
+  const double after = attack.floodFrames(kMessages);
+  mapper.unload();
+  const double each = 1e6 * (after - before) / (200.0 * kMessages);
+  std::printf("[hostile] tf2 keeps %.0f bytes of a frame\n", each);
+  EXPECT_LT(each, kSanitized ? 20000.0 : 2000.0);
+}
+
+TEST(Hostile, KindsAreThoseOfTheDocumentation) {
+  std::ifstream in(std::string(BKI_MAPPING_SOURCE_DIR) + "/docs/robustness.md");
+  std::set<std::string> rows;
+  for (std::string line; std::getline(in, line);) {
+    if (line.compare(0, 3, "| `") == 0 && line.find('/') < line.find("` |")) rows.insert(line);
+  }
+  for (const auto& [kind, row] : allRows()) {
+    EXPECT_EQ(rows.erase(row), 1u) << "docs/robustness.md lacks:\n" << row;
+  }
+  for (const std::string& row : rows) ADD_FAILURE() << "docs/robustness.md has, but no kind is:\n" << row;
+}
+
+}  // namespace
+}  // namespace bki_mapping::ros_shell
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "hostile_test");
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
