@@ -35,8 +35,9 @@ std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const MapperConfig& config) {
   if (found != registry().end()) return found->second(config);
   std::string known;
   for (const std::string& name : freeSpaceModes()) known += (known.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("free_space/mode '" + shortText(config.free_space.mode) + "' is unknown; known modes: " +
-                              known + nearestWord(config.free_space.mode, freeSpaceModes()));
+  throw std::invalid_argument("free_space/mode '" + shortText(config.free_space.mode) +
+                              "' is unknown; known modes: " + known +
+                              nearestWord(config.free_space.mode, freeSpaceModes()));
 }
 
 }  // namespace bki_mapping
