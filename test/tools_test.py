@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import struct
 import stat
 import subprocess
 import tempfile
@@ -61,6 +62,31 @@ class Tools(unittest.TestCase):
             self.assertTrue(options, script)
             for option in options:
                 self.assertIn(f'[{option}', rows[f'scripts/{script}'])
+
+    def test_what_scans_and_settings_may_take_is_said(self):
+        coarse = call('map_sequence', '--sequence', self.drive, '--set', 'resolution=1', '--set', 'kernel/length=0.3')
+        self.assertEqual(coarse.returncode, 0, coarse.stderr)
+        self.assertIn("warning: kernel/length 0.3 m is below half a voxel's diagonal, 0.866 m", coarse.stderr)
+        fine = call('map_sequence', '--sequence', self.drive, '--set', 'resolution=0.005')
+        self.assertEqual(fine.returncode, 1)
+        self.assertRegex(fine.stderr, r'scan 000000: the scan would touch about .* blocks .* coarser resolution')
+        self.assertIn('4 of 4 scans were refused', fine.stderr)
+
+    def test_one_far_point_is_left_out_and_said(self):
+        far = self.path('far')
+        shutil.copytree(self.drive, far)
+        with open(os.path.join(far, 'velodyne', '000002.bin'), 'r+b') as file:
+            file.write(struct.pack('<fff', 1e7, 1e6, 0.0))
+        result = call('map_sequence', '--sequence', far)
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        self.assertRegex(result.stdout, r'left out of \d+ points: 1 beyond 300 m')
+        trusted = call('map_sequence', '--sequence', far, '--set', 'sensor_model/max_range=1e9', '--report',
+                       self.path('far.json'))
+        self.assertEqual(trusted.returncode, 1)
+        self.assertIn('scan 000002: the scan would touch', trusted.stderr)
+        self.assertIn('1 of 4 scans were refused', trusted.stderr)
+        with open(self.path('far.json')) as file:
+            self.assertEqual(len(json.load(file)['scans']), 3, 'the others are mapped')
 
     def test_help(self):
         for program in ('map_sequence', 'simulate_drive'):

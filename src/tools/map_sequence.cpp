@@ -4,7 +4,6 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
@@ -46,9 +45,6 @@ int mapSequence(const po::variables_map& given) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
-  for (const std::string& warning : settingWarnings(mapper.config())) {
-    std::cerr << "map_sequence: " << warning << "\n";
-  }
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
 

@@ -96,6 +96,7 @@ MapperConfig mapperConfig(const po::variables_map& given) {
     throw std::invalid_argument("parameter threads is given by --threads and by --set; keep one");
   }
   setParameters(config, values);
+  for (const std::string& warning : settingWarnings(config)) std::cerr << "warning: " << warning << "\n";
   return config;
 }
 

@@ -37,7 +37,8 @@ std::size_t count(const po::variables_map& given, const std::string& name);
 
 /// Options that tools with a mapper share: --classes, --config, --set, --threads.
 po::options_description mapperOptions();
-/// The settings that those options ask for. @throws std::invalid_argument.
+/// The settings that those options ask for; warns on standard error of those that are hardly meant.
+/// @throws std::invalid_argument.
 MapperConfig mapperConfig(const po::variables_map& given);
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 

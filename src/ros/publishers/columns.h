@@ -85,7 +85,7 @@ class ColumnPublisher : public MapPublisher {
   /// Whether a message about the rectangle is of a size that can be made and sent. A pose that is far off by
   /// mistake spans a rectangle of more cells than there is memory.
   static bool fits(const CellRectangle& r, std::size_t bytes_a_cell) {
-    constexpr std::size_t kMostBytes = std::size_t{1} << 29;
+    constexpr std::size_t kMostBytes = std::size_t{1} << 28;
     return std::size_t{r.width} * r.height <= kMostBytes / bytes_a_cell;
   }
   void warnOfSize(const CellRectangle& r) {
