@@ -27,6 +27,8 @@ LEFT_OUT = {
     'catkin build': 'builds a whole workspace, for minutes',
     'scripts/demo': 'installs packages and builds; continuous integration runs it by itself',
     'scripts/test': 'runs this test; continuous integration runs it by itself',
+    'scripts/fuzz --seconds 14400 --seed 7': 'builds with sanitizers; scripts/test runs hostile_test',
+    'scripts/fuzz --seed 7 --settings two_lidars': 'the same',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # What makes a command take long, and what is run in its place. All else of it is run as written.
