@@ -79,13 +79,14 @@ class Launch(unittest.TestCase):
             wait_until(lambda: clock.get_num_connections() > 0, 'the mapper listening to /clock')
             for seconds in (101, 102):
                 clock.publish(Clock(rospy.Time(seconds)))
-                self.assertEqual(mapping.scan().time_jumps, 0)
+                before = mapping.scan()  # on a busy machine a transform may come too late for its cloud
+                self.assertEqual(before.time_jumps, 0)
             mapping.robot.seconds = 50
             clock.publish(Clock(rospy.Time(51)))
             log.wait_for(lambda m: '/clock went back' in m.msg, 'a warning')
             after = mapping.scan()
             self.assertTrue(after.integrated_last, 'transforms of the new time serve')
-            self.assertEqual((after.time_jumps, after.integrated), (1, 3))
+            self.assertEqual((after.time_jumps, after.integrated), (1, before.integrated + 1))
 
 
 if __name__ == '__main__':
