@@ -56,7 +56,8 @@ void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_s
     if (const auto before = findRefused(child); before != refused_.end()) refused_.erase(before);
     refused_.push_back({child, transform.header.stamp, why});
     if (refused_.size() > kMostRefused) refused_.pop_front();
-    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("Refused a transform: %s", why.c_str());
+    if (throttle_.allow(why, SentenceThrottle::Clock::now()))
+      ROS_WARN("Refused a transform: %s", why.c_str());
     return;
   }
   const auto refused = findRefused(child);
@@ -77,7 +78,8 @@ void PoseSource::put(const geometry_msgs::TransformStamped& transform, bool is_s
     const std::string why = "the transform to '" + shortText(transform.child_frame_id) + "' of time " +
                             numberText(transform.header.stamp.toSec()) + ": " + fault.what() +
                             "; mend the clock of what publishes it";
-    if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("Refused a transform: %s", why.c_str());
+    if (throttle_.allow(why, SentenceThrottle::Clock::now()))
+      ROS_WARN("Refused a transform: %s", why.c_str());
   }
 }
 
