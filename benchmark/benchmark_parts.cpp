@@ -2,15 +2,16 @@
 // --benchmark_filter=Lines.
 #include <benchmark/benchmark.h>
 
-#include "bki_mapping/core/map_query.h"
-#include "bki_mapping/inference/beam_evidence.h"
-#include "bki_mapping/inference/downsample.h"
-#include "bki_mapping/inference/map_updater.h"
-#include "bki_mapping/inference/point_evidence.h"
+#include "beams/line_evidence.h"
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/voxel_pcl.h"
+#include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/simulation/lidar.h"
+#include "io/voxel_pcl.h"
+#include "mapping/scan_preprocessor.h"
+#include "points/downsample.h"
+#include "points/point_evidence.h"
+#include "simulation/lidar.h"
+#include "update/map_updater.h"
 
 namespace {
 
@@ -18,8 +19,8 @@ using namespace bki_mapping;
 
 /// A scan of 64 beams, what was seen of it, and a map that holds it.
 struct Fixture {
-  Fixture() : workers(1), observer(config), mapper(config, classes) {
-    seen = observer.observe(scan, *classes, workers);
+  Fixture() : pool(1), observer(config), mapper(config, classes) {
+    seen = observer.observe(scan, *classes, pool);
     mapper.integrate(scan);
   }
 
@@ -28,9 +29,9 @@ struct Fixture {
   std::shared_ptr<const ClassTable> classes =
       std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
   Scan scan = simulation::Drive({5, 8.0, 1, {}}).frame(4).scan();
-  Workers workers;
-  Observer observer;
-  Observation seen;
+  ThreadPool pool;
+  ScanPreprocessor observer;
+  PreprocessedScan seen;
   SemanticMapper mapper;
 };
 
@@ -41,31 +42,31 @@ Fixture& fixture() {
 
 void observing(benchmark::State& state) {
   Fixture& f = fixture();
-  for (auto _ : state) benchmark::DoNotOptimize(&f.observer.observe(f.scan, *f.classes, f.workers));
+  for (auto _ : state) benchmark::DoNotOptimize(&f.observer.observe(f.scan, *f.classes, f.pool));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.scan.points.size()));
 }
 
 void binning(benchmark::State& state) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel);
-  for (auto _ : state) evidence.setPoints(f.scan.origin, f.observer.hits(), f.workers);
+  for (auto _ : state) evidence.setPoints(f.scan.origin, f.observer.hits(), f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
 }
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel, instruction_set);
-  evidence.setPoints(f.scan.origin, f.observer.hits(), f.workers);
+  evidence.setPoints(f.scan.origin, f.observer.hits(), f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
-  for (auto _ : state) updater.update(map, {&evidence}, f.workers);
+  for (auto _ : state) updater.update(map, {&evidence}, f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
 }
 
 void beamField(benchmark::State& state, BeamIndexType index) {
   Fixture& f = fixture();
   BeamField field(f.geometry, f.config.kernel, index);
-  for (auto _ : state) field.setBeams(f.seen.beams, f.workers);
+  for (auto _ : state) field.setBeams(f.seen.beams, f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
 }
 
@@ -73,7 +74,7 @@ void beamField(benchmark::State& state, BeamIndexType index) {
 void retrieval(benchmark::State& state, BeamIndexType index) {
   Fixture& f = fixture();
   BeamField field(f.geometry, f.config.kernel, index);
-  field.setBeams(f.seen.beams, f.workers);
+  field.setBeams(f.seen.beams, f.pool);
   EvidenceScratch scratch;
   for (auto _ : state) {
     for (const auto& entry : f.mapper.map().entries()) {
@@ -87,12 +88,12 @@ void retrieval(benchmark::State& state, BeamIndexType index) {
 void lines(benchmark::State& state, BeamIndexType index, const std::string& instruction_set) {
   Fixture& f = fixture();
   BeamField field(f.geometry, f.config.kernel, index);
-  field.setBeams(f.seen.beams, f.workers);
-  BeamEvidence evidence(BeamWeight::kBilinear, FreeSpaceExtent::kObserved, instruction_set);
-  evidence.setField(field, f.workers);
+  field.setBeams(f.seen.beams, f.pool);
+  LineEvidence evidence(BeamWeight::kBilinear, FreeSpaceExtent::kObserved, instruction_set);
+  evidence.setField(field, f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
-  for (auto _ : state) updater.update(map, {&evidence}, f.workers);
+  for (auto _ : state) updater.update(map, {&evidence}, f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
 }
 

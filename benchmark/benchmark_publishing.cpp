@@ -7,11 +7,11 @@
 #include <fstream>
 #include <iostream>
 
-#include "bki_mapping/core/stopwatch.h"
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/ros/map_publisher.h"
-#include "bki_mapping/simulation/lidar.h"
-#include "bki_mapping/tools/options.h"
+#include "core/stopwatch.h"
+#include "ros/map_publisher.h"
+#include "simulation/lidar.h"
+#include "tools/options.h"
 
 namespace {
 

@@ -5,15 +5,15 @@
 
 #include <cstdio>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/core/stopwatch.h"
-#include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/report.h"
+#include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/tools/options.h"
 #include "cases.h"
+#include "core/stopwatch.h"
 #include "curves.h"
+#include "evaluation/run_report.h"
+#include "io/atomic_file.h"
+#include "tools/options.h"
 
 namespace {
 

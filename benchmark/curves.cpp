@@ -4,15 +4,15 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/core/stopwatch.h"
-#include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/report.h"
+#include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/simulation/lidar.h"
-#include "bki_mapping/tools/draw.h"
 #include "cases.h"
+#include "core/stopwatch.h"
+#include "evaluation/run_report.h"
+#include "io/atomic_file.h"
+#include "simulation/lidar.h"
+#include "tools/draw.h"
 
 namespace bki_mapping::benchmark {
 namespace {

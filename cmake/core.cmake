@@ -1,58 +1,59 @@
-# The core: no ROS, no PCL. Everything a scan passes through until it is in the map.
-add_library(bki_mapping_core SHARED
-  src/core/class_table.cpp
-  src/core/map_query.cpp
-  src/core/named_parameter.cpp
-  src/core/parameters.cpp
-  src/core/semantic_map.cpp
-  src/inference/beam_evidence.cpp
-  src/inference/beam_field.cpp
-  src/inference/beam_rtree.cpp
-  src/inference/beam_table.cpp
-  src/inference/beam_tracks.cpp
-  src/inference/block_walk.cpp
-  src/inference/cell_merger.cpp
-  src/inference/downsample.cpp
-  src/inference/group_sums.cpp
-  src/inference/inner_loops.cpp
-  src/inference/inner_loops_generic.cpp
-  src/inference/kernel_table.cpp
-  src/inference/map_updater.cpp
-  src/inference/occlusion.cpp
-  src/inference/parallel_for.cpp
-  src/inference/point_bins.cpp
-  src/inference/point_evidence.cpp
-  src/inference/soft_point_evidence.cpp
-  src/inference/tile_grid.cpp
-  src/free_space/beam_lines.cpp
-  src/free_space/even_samples.cpp
-  src/free_space/no_free_space.cpp
-  src/free_space/random_samples.cpp
-  src/free_space/registry.cpp
-  src/mapping/dynamics_quality.cpp
-  src/mapping/column_map.cpp
-  src/mapping/observation.cpp
-  src/mapping/semantic_quality.cpp
-  src/mapping/soft_merge.cpp
-  src/mapping/semantic_mapper.cpp
-)
-target_include_directories(bki_mapping_core PUBLIC
-  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
-target_link_libraries(bki_mapping_core PUBLIC Eigen3::Eigen Threads::Threads PRIVATE Boost::headers)
+# The core: no ROS, no PCL. Everything a scan passes through until it is in the map. One library a room: what it links is
+# all that it may use, and the linker refuses the rest.
+
+# bki_mapping_room(NAME SOURCES file... [LINK target...]): the library bki_mapping_NAME from files in src/NAME, or from
+# paths below src.
+function(bki_mapping_room room)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  list(TRANSFORM arg_SOURCES PREPEND "src/${room}/")
+  set(target bki_mapping_${room})
+  add_library(${target} SHARED ${arg_SOURCES})
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
+  target_link_libraries(${target} PUBLIC ${arg_LINK})
+  bki_mapping_warnings(${target})
+  set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_ROOMS ${target})
+endfunction()
+
+# A room in which scans are computed.
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
-target_compile_options(bki_mapping_core PRIVATE -fno-math-errno -fno-trapping-math
-  $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> -O3)
-bki_mapping_warnings(bki_mapping_core)
+function(bki_mapping_core_room room)
+  bki_mapping_room(${room} ${ARGN})
+  target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math
+    $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> -O3)
+endfunction()
+
+bki_mapping_core_room(core SOURCES class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)
+bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
+bki_mapping_core_room(map SOURCES column_map.cpp map_query.cpp semantic_map.cpp LINK bki_mapping_core)
+bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core)
+bki_mapping_core_room(beams SOURCES
+    beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp
+    raster/beam_tracks.cpp raster/group_sums.cpp
+    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp ../update/map_updater.cpp
+    ../points/cell_merger.cpp ../points/downsample.cpp ../points/point_bins.cpp ../points/point_evidence.cpp
+    ../points/soft_point_evidence.cpp ../points/tile_grid.cpp
+  LINK bki_mapping_parallel bki_mapping_kernel bki_mapping_map)
+target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
+foreach(room points update simd)  # of which the beams' library holds all
+  add_library(bki_mapping_${room} ALIAS bki_mapping_beams)
+endforeach()
+bki_mapping_core_room(free_space SOURCES
+    beam_lines.cpp even_samples.cpp no_free_space.cpp random_samples.cpp registry.cpp
+  LINK bki_mapping_beams)
+bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
+  LINK bki_mapping_free_space)
+
 # The inner loops meet no infinities or NaN; without them a choice is a minimum or a maximum, one instruction.
 set(inner_loop_options -ffinite-math-only -fno-signed-zeros)
-set_source_files_properties(src/inference/inner_loops_generic.cpp PROPERTIES COMPILE_OPTIONS "${inner_loop_options}")
+set_source_files_properties(src/beams/../simd/inner_loops_generic.cpp PROPERTIES COMPILE_OPTIONS "${inner_loop_options}")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Chosen at run time where the processor has it.
-  target_sources(bki_mapping_core PRIVATE src/inference/inner_loops_avx2.cpp src/inference/inner_loops_avx512.cpp)
-  set_source_files_properties(src/inference/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
+  target_sources(bki_mapping_beams PRIVATE src/simd/inner_loops_avx2.cpp src/simd/inner_loops_avx512.cpp)
+  set_source_files_properties(src/simd/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
     "${inner_loop_options};-mavx2;-mfma")
-  set_source_files_properties(src/inference/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
+  set_source_files_properties(src/simd/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
     "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl;-mbmi2;-Wno-maybe-uninitialized")
   # The last: GCC 12 warns of its own intrinsics (its bug 105593).
-  target_compile_definitions(bki_mapping_core PRIVATE BKI_MAPPING_X86)
+  target_compile_definitions(bki_mapping_beams PRIVATE BKI_MAPPING_X86)
 endif()

@@ -5,35 +5,21 @@ find_package(nlohmann_json REQUIRED)
 
 
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
-add_library(bki_mapping_io SHARED
-  src/io/atomic_file.cpp
-  src/io/class_table_yaml.cpp
-  src/io/config_yaml.cpp
-  src/io/map_export.cpp
-  src/io/report.cpp
-  src/io/sequence_reader.cpp
-  src/io/sequence_writer.cpp
-  src/io/share_path.cpp
-  src/io/voxel_pcl.cpp
-  src/io/yaml_file.cpp
-  src/simulation/drive_file.cpp
-  src/simulation/lidar.cpp
-  src/simulation/scene.cpp
-  src/simulation/street.cpp
-  src/simulation/truth_quality.cpp
-  src/simulation/voxel_truth.cpp
-  src/tools/draw.cpp
-  src/tools/options.cpp
-  src/tools/quality_report.cpp
-)
+bki_mapping_room(io SOURCES
+    atomic_file.cpp class_table_yaml.cpp config_yaml.cpp map_export.cpp sequence_reader.cpp sequence_writer.cpp
+    share_path.cpp voxel_pcl.cpp yaml_file.cpp
+  LINK bki_mapping_mapping pcl_common)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-target_link_libraries(bki_mapping_io
-  PUBLIC bki_mapping_core Boost::program_options pcl_common
-  PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
-bki_mapping_warnings(bki_mapping_io)
+target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
+target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
+bki_mapping_room(evaluation SOURCES dynamics.cpp quality_report.cpp run_report.cpp semantics.cpp truth.cpp
+  LINK bki_mapping_simulation)
+target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json)
+bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation Boost::program_options)
 
 function(bki_mapping_tool target)
-  target_link_libraries(${target} PRIVATE bki_mapping_io ${ARGN})
+  target_link_libraries(${target} PRIVATE bki_mapping_tools ${ARGN})
   bki_mapping_warnings(${target})
 endfunction()
 add_executable(map_sequence src/tools/map_sequence.cpp)

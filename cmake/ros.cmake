@@ -1,36 +1,33 @@
 # The ROS shell: nodelet, node and the programs that speak ROS.
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
-add_library(bki_mapping_ros SHARED
-  src/ros/cloud_conversion.cpp
-  src/ros/color_reader.cpp
-  src/ros/input_config.cpp
-  src/ros/label_reader.cpp
-  src/ros/live_settings.cpp
-  src/ros/load_advice.cpp
-  src/ros/map_publishing.cpp
-  src/ros/mapping_diagnostics.cpp
-  src/ros/mapping_server.cpp
-  src/ros/mapping_services.cpp
-  src/ros/no_returns.cpp
-  src/ros/point_account.cpp
-  src/ros/point_field.cpp
-  src/ros/pose_source.cpp
-  src/ros/publishers/cell_markers.cpp
-  src/ros/publishers/elevation_map.cpp
-  src/ros/publishers/occupancy.cpp
-  src/ros/publishers/projected_map.cpp
-  src/ros/publishers/registry.cpp
-  src/ros/publishers/trajectory.cpp
-  src/ros/publishers/voxel_cloud.cpp
-  src/ros/scan_ledger.cpp
-  src/ros/scan_reader.cpp
-  src/ros/score_reader.cpp
-  src/ros/server_config.cpp
-  src/tools/sequence_messages.cpp
-)
-target_link_libraries(bki_mapping_ros PUBLIC bki_mapping_io ${catkin_LIBRARIES})
+bki_mapping_room(ros SOURCES
+    cloud_conversion.cpp
+    color_reader.cpp
+    input_config.cpp
+    label_reader.cpp
+    live_settings.cpp
+    load_advice.cpp
+    map_publishing.cpp
+    mapping_diagnostics.cpp
+    mapping_server.cpp
+    mapping_services.cpp
+    no_returns.cpp
+    point_account.cpp
+    point_field.cpp
+    pose_source.cpp
+    publishers/cell_markers.cpp
+    publishers/elevation_map.cpp
+    publishers/occupancy.cpp
+    publishers/projected_map.cpp
+    publishers/registry.cpp
+    publishers/trajectory.cpp
+    publishers/voxel_cloud.cpp
+    scan_ledger.cpp
+    scan_reader.cpp
+    score_reader.cpp
+    server_config.cpp
+  LINK bki_mapping_evaluation ${catkin_LIBRARIES})
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
-bki_mapping_warnings(bki_mapping_ros)
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)
 target_link_libraries(bki_mapping_nodelets PRIVATE bki_mapping_ros)
@@ -40,15 +37,16 @@ add_executable(mapping_node src/ros/mapping_node.cpp)
 target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
 bki_mapping_warnings(mapping_node)
 
-add_executable(play_sequence src/tools/play_sequence.cpp)
+add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
-add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp)
+add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 
 add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
 bki_mapping_tool(benchmark_publishing bki_mapping_ros)
 
-install(TARGETS bki_mapping_core bki_mapping_io bki_mapping_ros bki_mapping_nodelets
+get_property(bki_mapping_rooms GLOBAL PROPERTY BKI_MAPPING_ROOMS)
+install(TARGETS ${bki_mapping_rooms} bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})

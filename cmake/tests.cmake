@@ -1,4 +1,4 @@
-# Unit tests of the core; rostests are added in ros.cmake.
+# Tests: of each room, of scripts, and of the nodes.
 if(NOT BUILD_TESTING AND NOT CATKIN_ENABLE_TESTING)
   return()
 endif()
@@ -6,49 +6,55 @@ find_package(GTest REQUIRED CONFIG)
 
 add_library(bki_mapping_reference STATIC test/reference/reference.cpp)
 target_include_directories(bki_mapping_reference PUBLIC test)
-target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_core)
+target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_mapping)
 target_compile_options(bki_mapping_reference PRIVATE -O2)
 bki_mapping_warnings(bki_mapping_reference)
 
-function(bki_mapping_unit_test name)
-  add_executable(${name} test/${name}.cpp)
-  target_link_libraries(${name} PRIVATE bki_mapping_reference GTest::gtest GTest::gtest_main ${ARGN})
-  target_compile_definitions(${name} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  bki_mapping_warnings(${name})
-  add_test(NAME ${name} COMMAND ${name})
-  # Where the last line names a skipped test, none failed: GoogleTest lists those after them.
-  set_tests_properties(${name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
+# bki_mapping_unit_tests(ROOM name...): test/ROOM/NAME_test.cpp, linked with the room and the reference.
+function(bki_mapping_unit_tests room)
+  foreach(each ${ARGN})
+    set(name ${each}_test)
+    add_executable(${name} test/${room}/${name}.cpp)
+    target_link_libraries(${name} PRIVATE bki_mapping_${room} bki_mapping_reference GTest::gtest GTest::gtest_main)
+    target_compile_definitions(${name} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+    bki_mapping_warnings(${name})
+    add_test(NAME ${name} COMMAND ${name})
+    # Where the last line names a skipped test, none failed: GoogleTest lists those after them.
+    set_tests_properties(${name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
+  endforeach()
 endfunction()
 
-foreach(name
-    allocation_test beam_index_test beam_tracks_test bounds_test brute_force_test column_map_test downsample_test
-    dynamics_quality_test grid_geometry_test instruction_sets_test kernel_test laws_test map_query_test
-    observation_test occlusion_test parallel_for_test point_bins_test sampling_test semantic_map_test
-    semantic_quality_test tile_grid_test)
-  bki_mapping_unit_test(${name})
-endforeach()
-foreach(name atomic_file_test class_table_test map_export_test parameters_test real_data_test sequence_test simulation_test
-    truth_quality_test yaml_file_test)
-  bki_mapping_unit_test(${name} bki_mapping_io)
-endforeach()
+bki_mapping_unit_tests(core grid_geometry)
+bki_mapping_unit_tests(parallel thread_pool)
+bki_mapping_unit_tests(kernel sparse_kernel)
+bki_mapping_unit_tests(map column_map map_query semantic_map)
+bki_mapping_unit_tests(points downsample point_bins tile_grid)
+bki_mapping_unit_tests(beams beam_index beam_tracks instruction_sets occlusion)
+bki_mapping_unit_tests(free_space sampling)
+bki_mapping_unit_tests(mapping allocation bounds brute_force laws parameters real_data scan_preprocessor)
+bki_mapping_unit_tests(io atomic_file class_table map_export sequence yaml_file)
+bki_mapping_unit_tests(simulation simulation)
+bki_mapping_unit_tests(evaluation dynamics semantics truth)
+target_link_libraries(parameters_test PRIVATE bki_mapping_io)
+target_link_libraries(real_data_test PRIVATE bki_mapping_io)
 target_link_libraries(map_export_test PRIVATE pcl_io)
-target_link_libraries(yaml_file_test PRIVATE yaml-cpp)
+target_link_libraries(yaml_file_test PRIVATE bki_mapping_simulation yaml-cpp)
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
-function(bki_mapping_script_test name)
-  add_test(NAME ${name} COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/${name}.py)
+function(bki_mapping_script_test room name)
+  add_test(NAME ${name} COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/${room}/${name}.py)
   set_tests_properties(${name} PROPERTIES TIMEOUT 300
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
-bki_mapping_script_test(figures_test)
-bki_mapping_script_test(layering_test)
-bki_mapping_script_test(skip_test)
-bki_mapping_script_test(tools_test)
+bki_mapping_script_test(scripts figures_test)
+bki_mapping_script_test(house layering_test)
+bki_mapping_script_test(house skip_test)
+bki_mapping_script_test(tools tools_test)
 add_test(NAME vector_symbols_test
-  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/vector_symbols_test.py $<TARGET_OBJECTS:bki_mapping_core>)
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py $<TARGET_OBJECTS:bki_mapping_beams>)
 
 if(CATKIN_ENABLE_TESTING)
-  bki_mapping_script_test(commands_test)
+  bki_mapping_script_test(tools commands_test)
   set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
@@ -56,10 +62,7 @@ if(CATKIN_ENABLE_TESTING)
     test/ros/mapping_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-  bki_mapping_unit_test(cloud_conversion_test bki_mapping_ros)
-  bki_mapping_unit_test(scan_account_test bki_mapping_ros)
-  bki_mapping_unit_test(scan_reader_test bki_mapping_ros)
-  bki_mapping_unit_test(server_config_test bki_mapping_ros)
+  bki_mapping_unit_tests(ros cloud_conversion scan_account scan_reader server_config)
   add_rostest(test/ros/killed.test)
   add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)

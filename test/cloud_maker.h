@@ -12,7 +12,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "bki_mapping/ros/point_field.h"
+#include "ros/point_field.h"
 
 namespace bki_mapping::ros_shell {
 

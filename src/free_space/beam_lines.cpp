@@ -1,5 +1,5 @@
-#include "bki_mapping/free_space/modes.h"
-#include "bki_mapping/inference/beam_evidence.h"
+#include "beams/line_evidence.h"
+#include "free_space/modes.h"
 
 namespace bki_mapping {
 namespace {
@@ -9,19 +9,19 @@ class BeamLines : public FreeSpaceModel {
  public:
   explicit BeamLines(const FreeSpaceConfig& config) : evidence_(config.weight, config.extent) {}
 
-  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, Workers& workers) override {
-    evidence_.setField(beams.field(workers), workers);
+  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, ThreadPool& pool) override {
+    evidence_.setField(beams.field(pool), pool);
     return {&evidence_, beams.beams().ends.size()};
   }
 
  private:
-  BeamEvidence evidence_;
+  LineEvidence evidence_;
 };
 
 }  // namespace
 
-std::unique_ptr<FreeSpaceModel> makeBeamLines(const MapperConfig& config) {
-  return std::make_unique<BeamLines>(config.free_space);
+std::unique_ptr<FreeSpaceModel> makeBeamLines(const FreeSpaceSetup& setup) {
+  return std::make_unique<BeamLines>(setup.config);
 }
 
 }  // namespace bki_mapping

@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "bki_mapping/free_space/beam_samples.h"
-#include "bki_mapping/free_space/modes.h"
+#include "free_space/beam_samples.h"
+#include "free_space/modes.h"
 
 namespace bki_mapping {
 namespace {
@@ -9,9 +9,9 @@ namespace {
 /// A sample at every multiple of the gap before the end of a beam.
 class EvenSamples : public FreeSpaceModel {
  public:
-  explicit EvenSamples(const MapperConfig& config) : gap_(config.free_space.gap), samples_(config) {}
+  explicit EvenSamples(const FreeSpaceSetup& setup) : gap_(setup.config.gap), samples_(setup) {}
 
-  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, Workers& workers) override {
+  FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, ThreadPool& pool) override {
     double metres = 0.0, longest = 0.0;
     for (const Eigen::Vector3f& end : beams.beams().ends) {
       const auto length = static_cast<double>(end.norm());
@@ -19,7 +19,7 @@ class EvenSamples : public FreeSpaceModel {
       longest = std::max(longest, length);
     }
     BeamSamples::limit(metres / gap_, longest / gap_);
-    return samples_.sample(beams.beams(), workers, [this](std::size_t, double length, auto&& add) {
+    return samples_.sample(beams.beams(), pool, [this](std::size_t, double length, auto&& add) {
       for (int n = 1; n * gap_ < length; ++n) add(n * gap_);
     });
   }
@@ -31,8 +31,8 @@ class EvenSamples : public FreeSpaceModel {
 
 }  // namespace
 
-std::unique_ptr<FreeSpaceModel> makeEvenSamples(const MapperConfig& config) {
-  return std::make_unique<EvenSamples>(config);
+std::unique_ptr<FreeSpaceModel> makeEvenSamples(const FreeSpaceSetup& setup) {
+  return std::make_unique<EvenSamples>(setup);
 }
 
 }  // namespace bki_mapping

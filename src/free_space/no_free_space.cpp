@@ -1,4 +1,4 @@
-#include "bki_mapping/free_space/modes.h"
+#include "free_space/modes.h"
 
 namespace bki_mapping {
 namespace {
@@ -6,12 +6,12 @@ namespace {
 /// Maps hits alone: nothing is ever free.
 class NoFreeSpace : public FreeSpaceModel {
   bool needsBeams() const override { return false; }
-  FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t, Workers&) override { return {}; }
+  FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t, ThreadPool&) override { return {}; }
 };
 
 }  // namespace
 
-std::unique_ptr<FreeSpaceModel> makeNoFreeSpace(const MapperConfig&) {
+std::unique_ptr<FreeSpaceModel> makeNoFreeSpace(const FreeSpaceSetup&) {
   return std::make_unique<NoFreeSpace>();
 }
 

@@ -1,15 +1,15 @@
-#include "bki_mapping/free_space/registry.h"
+#include "free_space/registry.h"
 
 #include <map>
 #include <stdexcept>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/free_space/modes.h"
+#include "bki_mapping/core/named_parameter.h"
+#include "free_space/modes.h"
 
 namespace bki_mapping {
 namespace {
 
-using Maker = std::unique_ptr<FreeSpaceModel> (*)(const MapperConfig&);
+using Maker = std::unique_ptr<FreeSpaceModel> (*)(const FreeSpaceSetup&);
 
 const std::map<std::string, Maker>& registry() {
   static const std::map<std::string, Maker> makers = {
@@ -30,14 +30,14 @@ std::vector<std::string> freeSpaceModes() {
   return names;
 }
 
-std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const MapperConfig& config) {
-  const auto found = registry().find(config.free_space.mode);
-  if (found != registry().end()) return found->second(config);
+std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const FreeSpaceSetup& setup) {
+  const auto found = registry().find(setup.config.mode);
+  if (found != registry().end()) return found->second(setup);
   std::string known;
   for (const std::string& name : freeSpaceModes()) known += (known.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("free_space/mode '" + shortText(config.free_space.mode) +
+  throw std::invalid_argument("free_space/mode '" + shortText(setup.config.mode) +
                               "' is unknown; known modes: " + known +
-                              nearestWord(config.free_space.mode, freeSpaceModes()));
+                              nearestWord(setup.config.mode, freeSpaceModes()));
 }
 
 }  // namespace bki_mapping

@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/io/share_path.h"
-#include "bki_mapping/io/yaml_file.h"
+#include "bki_mapping/mapping/parameters.h"
+#include "io/share_path.h"
+#include "io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {

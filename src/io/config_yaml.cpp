@@ -2,8 +2,8 @@
 
 #include <stdexcept>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/io/yaml_file.h"
+#include "bki_mapping/mapping/parameters.h"
+#include "io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {

@@ -6,10 +6,10 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/core/voxel_color.h"
-#include "bki_mapping/io/atomic_file.h"
-#include "bki_mapping/io/little_endian.h"
-#include "bki_mapping/io/voxel_pcl.h"
+#include "io/atomic_file.h"
+#include "io/little_endian.h"
+#include "io/voxel_pcl.h"
+#include "map/voxel_color.h"
 
 namespace bki_mapping {
 namespace {

@@ -6,8 +6,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/sequence.h"
+#include "io/atomic_file.h"
 
 namespace bki_mapping {
 namespace {

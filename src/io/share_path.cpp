@@ -1,4 +1,4 @@
-#include "bki_mapping/io/share_path.h"
+#include "io/share_path.h"
 
 #include <dlfcn.h>
 

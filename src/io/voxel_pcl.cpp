@@ -1,6 +1,6 @@
-#include "bki_mapping/io/voxel_pcl.h"
+#include "io/voxel_pcl.h"
 
-#include "bki_mapping/io/little_endian.h"
+#include "io/little_endian.h"
 
 namespace bki_mapping {
 namespace {

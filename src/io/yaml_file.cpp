@@ -1,4 +1,4 @@
-#include "bki_mapping/io/yaml_file.h"
+#include "io/yaml_file.h"
 
 #include <yaml-cpp/eventhandler.h>
 

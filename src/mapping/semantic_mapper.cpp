@@ -11,10 +11,15 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/core/parameters.h"
-#include "bki_mapping/core/stopwatch.h"
-#include "bki_mapping/free_space/beam_samples.h"
-#include "bki_mapping/free_space/registry.h"
+#include "beams/occlusion.h"
+#include "bki_mapping/mapping/parameters.h"
+#include "core/stopwatch.h"
+#include "free_space/beam_samples.h"
+#include "free_space/registry.h"
+#include "mapping/scan_preprocessor.h"
+#include "points/point_evidence.h"
+#include "points/soft_point_evidence.h"
+#include "update/map_updater.h"
 
 namespace bki_mapping {
 namespace {
@@ -51,10 +56,61 @@ std::string megabytes(double bytes) {
   return numberText(std::round(bytes / 1e6)) + " MB";
 }
 
+/// What the update of a scan may take. @param map_bytes that the map takes already.
+UpdateLimits limitsFor(const Scan& scan, const MapperConfig& config, const GridGeometry& geometry,
+                       std::size_t map_bytes) {
+  UpdateLimits limits;
+  if (config.scan_limit.hits > 0.0) limits.evidence.hits = static_cast<float>(config.scan_limit.hits);
+  if (config.scan_limit.free > 0.0) limits.evidence.free = static_cast<float>(config.scan_limit.free);
+  if (config.scan_limit.blocks > 0) {
+    limits.blocks = static_cast<std::size_t>(config.scan_limit.blocks);
+  } else {
+    // A cube about the sensor, and a block beside it for the kernel and for rounding.
+    const double reach =
+        scan.sensor_model.value_or(config.sensor_model).reach() + config.kernel.lengthFor(config.resolution);
+    const double edge = std::ceil(2.0 * reach / geometry.blockSize()) + 2.0;
+    constexpr auto kMost = static_cast<double>(ScanLimitConfig::kMostBlocks);
+    limits.blocks = static_cast<std::size_t>(std::min(edge * edge * edge, kMost));
+  }
+  if (config.memory_limit > 0.0) {
+    const double left = 1e6 * config.memory_limit - static_cast<double>(map_bytes);
+    limits.bytes = static_cast<std::size_t>(std::clamp(left, 0.0, 1e18));
+  }
+  return limits;
+}
+
+/// What a scan larger than its limits would take, and what to set. @param map_bytes that the map takes
+/// already.
+ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::size_t map_bytes) {
+  const std::string resolution = numberText(config.resolution) + " m";
+  switch (work.of()) {
+    case TooMuchWork::What::kBlocks: {
+      constexpr double kBlockBytes = sizeof(Block) + kBlockVoxels * sizeof(float);
+      return {ScanRefused::Reason::kTooLarge,
+              "the scan would touch about " + about(work.estimate()) + " blocks of 8 x 8 x 8 voxels of " +
+                  resolution + ", " + megabytes(kBlockBytes * work.estimate()) +
+                  ", more than scan_limit/blocks allows; take a coarser resolution, set "
+                  "sensor_model/max_range to what the sensor sees, or raise scan_limit/blocks"};
+    }
+    case TooMuchWork::What::kSamples:
+      return {ScanRefused::Reason::kTooLarge,
+              "the scan would take about " + about(work.estimate()) + " free-space samples, more than " +
+                  about(BeamSamples::kMost) + " in all or " + about(BeamSamples::kMostOfBeam) +
+                  " on one beam; raise free_space/gap, lower free_space/samples_per_beam, or set "
+                  "sensor_model/max_range "
+                  "to what the sensor sees"};
+    default:
+      return {ScanRefused::Reason::kMemory, "the map holds " + megabytes(static_cast<double>(map_bytes)) +
+                                                ", and the scan would make it larger than memory_limit, " +
+                                                megabytes(1e6 * config.memory_limit) +
+                                                "; raise memory_limit, or take a coarser resolution"};
+  }
+}
+
 }  // namespace
 
 struct SemanticMapper::Pipeline {
-  Observer observer;
+  ScanPreprocessor observer;
   PointEvidence hits;
   SoftPointEvidence soft_hits;
   LazyBeamField beams;
@@ -68,7 +124,8 @@ struct SemanticMapper::Pipeline {
         hits(geometry, config.kernel),
         soft_hits(geometry, config.kernel),
         beams(geometry, config.kernel, config.free_space.beam_index),
-        free_space(makeFreeSpaceModel(config)),
+        free_space(
+            makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
         occlusion(config.occlusion) {
     hits.protectVoxels(config.free_space.hits_before_misses);
     soft_hits.protectVoxels(config.free_space.hits_before_misses);
@@ -81,7 +138,7 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
     : config_(checked(config, *classes)),
       classes_(std::move(classes)),
       map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
-      workers_(config_.threads),
+      pool_(std::make_unique<ThreadPool>(config_.threads)),
       pipeline_(std::make_unique<Pipeline>(config_, map_.geometry())) {
   setGains();
 }
@@ -127,53 +184,6 @@ const std::vector<GridIndex>& SemanticMapper::touchedBlocks() const {
   return pipeline_ ? pipeline_->updater.touched() : no_blocks_;
 }
 
-UpdateLimits SemanticMapper::limitsFor(const Scan& scan) const {
-  UpdateLimits limits;
-  if (config_.scan_limit.hits > 0.0) limits.evidence.hits = static_cast<float>(config_.scan_limit.hits);
-  if (config_.scan_limit.free > 0.0) limits.evidence.free = static_cast<float>(config_.scan_limit.free);
-  if (config_.scan_limit.blocks > 0) {
-    limits.blocks = static_cast<std::size_t>(config_.scan_limit.blocks);
-  } else {
-    // A cube about the sensor, and a block beside it for the kernel and for rounding.
-    const double reach = scan.sensor_model.value_or(config_.sensor_model).reach() +
-                         config_.kernel.lengthFor(config_.resolution);
-    const double edge = std::ceil(2.0 * reach / map_.geometry().blockSize()) + 2.0;
-    constexpr auto kMost = static_cast<double>(ScanLimitConfig::kMostBlocks);
-    limits.blocks = static_cast<std::size_t>(std::min(edge * edge * edge, kMost));
-  }
-  if (config_.memory_limit > 0.0) {
-    const double left = 1e6 * config_.memory_limit - static_cast<double>(mapBytes());
-    limits.bytes = static_cast<std::size_t>(std::clamp(left, 0.0, 1e18));
-  }
-  return limits;
-}
-
-ScanRefused SemanticMapper::refusalOf(const TooMuchWork& work) const {
-  const std::string resolution = numberText(config_.resolution) + " m";
-  switch (work.of()) {
-    case TooMuchWork::What::kBlocks: {
-      constexpr double kBlockBytes = sizeof(Block) + kBlockVoxels * sizeof(float);
-      return {ScanRefused::Reason::kTooLarge,
-              "the scan would touch about " + about(work.estimate()) + " blocks of 8 x 8 x 8 voxels of " +
-                  resolution + ", " + megabytes(kBlockBytes * work.estimate()) +
-                  ", more than scan_limit/blocks allows; take a coarser resolution, set "
-                  "sensor_model/max_range to what the sensor sees, or raise scan_limit/blocks"};
-    }
-    case TooMuchWork::What::kSamples:
-      return {ScanRefused::Reason::kTooLarge,
-              "the scan would take about " + about(work.estimate()) + " free-space samples, more than " +
-                  about(BeamSamples::kMost) + " in all or " + about(BeamSamples::kMostOfBeam) +
-                  " on one beam; raise free_space/gap, lower free_space/samples_per_beam, or set "
-                  "sensor_model/max_range "
-                  "to what the sensor sees"};
-    default:
-      return {ScanRefused::Reason::kMemory, "the map holds " + megabytes(static_cast<double>(mapBytes())) +
-                                                ", and the scan would make it larger than memory_limit, " +
-                                                megabytes(1e6 * config_.memory_limit) +
-                                                "; raise memory_limit, or take a coarser resolution"};
-  }
-}
-
 ScanStats SemanticMapper::integrate(const Scan& scan) {
   if (!map_.geometry().contains(scan.origin)) {
     throw std::invalid_argument("the sensor's origin is not finite, or too far from the map's origin");
@@ -189,7 +199,7 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
     return add(scan);
   } catch (const TooMuchWork& work) {
     recover();
-    throw refusalOf(work);
+    throw refusalOf(work, config_, mapBytes());
   } catch (const std::bad_alloc&) {
     throw memoryRanOut();
   } catch (const std::length_error&) {  // more than a vector can ever hold
@@ -204,8 +214,8 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   ScanStats stats;
   Stopwatch watch;
   const bool occludes = config_.occlusion != OcclusionExtent::kNone;
-  const Observation& seen =
-      p.observer.observe(scan, *classes_, workers_, p.free_space->needsBeams() || occludes);
+  const PreprocessedScan& seen =
+      p.observer.observe(scan, *classes_, *pool_, p.free_space->needsBeams() || occludes);
   stats.counts = seen.counts;
   stats.hits = p.observer.hits().size();
   stats.observe_ms = watch.lap();
@@ -214,15 +224,15 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   if (soft) {
     p.soft_hits.setPoints(scan.origin, seen.hits, seen.soft);
   } else {
-    p.hits.setPoints(scan.origin, p.observer.hits(), workers_);
+    p.hits.setPoints(scan.origin, p.observer.hits(), *pool_);
   }
   p.beams.setBeams(seen.beams);
-  const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, workers_);
+  const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
   p.evidence.assign(1, soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits);
   if (free.evidence) p.evidence.push_back(free.evidence);
   if (occludes) {
     const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
-    const BeamField& field = p.beams.field(workers_);
+    const BeamField& field = p.beams.field(*pool_);
     const double range = sensor.knowsRange() ? sensor.max_range : field.longest();
     const auto edge = static_cast<double>(map_.geometry().safeRange(scan.origin));  // voxels end there
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
@@ -231,7 +241,8 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  const MapUpdateStats update = p.updater.update(map_, p.evidence, workers_, limitsFor(scan));
+  const MapUpdateStats update =
+      p.updater.update(map_, p.evidence, *pool_, limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
   stats.not_finite = update.not_finite;
   block_bytes_ += static_cast<std::size_t>(update.bytes);  // two's complement: may be negative

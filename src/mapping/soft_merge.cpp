@@ -1,8 +1,8 @@
-#include "bki_mapping/mapping/soft_merge.h"
+#include "mapping/soft_merge.h"
 
 #include <algorithm>
 
-#include "bki_mapping/inference/index_numbering.h"
+#include "parallel/index_numbering.h"
 
 namespace bki_mapping {
 namespace {

@@ -1,10 +1,10 @@
-#include "bki_mapping/ros/cloud_conversion.h"
+#include "ros/cloud_conversion.h"
 
 #include <cstring>
 #include <memory>
 #include <optional>
 
-#include "bki_mapping/ros/no_returns.h"
+#include "ros/no_returns.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/color_reader.h"
+#include "ros/color_reader.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "bki_mapping/ros/point_field.h"
+#include "ros/point_field.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/input_config.h"
+#include "ros/input_config.h"
 
 namespace bki_mapping::ros_shell {
 

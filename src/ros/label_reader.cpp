@@ -1,8 +1,8 @@
-#include "bki_mapping/ros/label_reader.h"
+#include "ros/label_reader.h"
 
-#include "bki_mapping/ros/color_reader.h"
-#include "bki_mapping/ros/point_field.h"
-#include "bki_mapping/ros/score_reader.h"
+#include "ros/color_reader.h"
+#include "ros/point_field.h"
+#include "ros/score_reader.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/live_settings.h"
+#include "ros/live_settings.h"
 
 #include <ros/param.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/mapping/parameters.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

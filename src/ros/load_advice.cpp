@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/load_advice.h"
+#include "ros/load_advice.h"
 
 #include <cmath>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/map_publishing.h"
+#include "ros/map_publishing.h"
 
 #include <algorithm>
 

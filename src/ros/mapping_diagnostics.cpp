@@ -1,9 +1,9 @@
-#include "bki_mapping/ros/mapping_diagnostics.h"
+#include "ros/mapping_diagnostics.h"
 
 #include <algorithm>
 
-#include "bki_mapping/ros/load_advice.h"
-#include "bki_mapping/ros/point_account.h"
+#include "ros/load_advice.h"
+#include "ros/point_account.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

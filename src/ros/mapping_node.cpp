@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/ros/mapping_server.h"
-#include "bki_mapping/ros/termination.h"
+#include "ros/mapping_server.h"
+#include "ros/termination.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "bki_mapping/ros/mapping_server.h"
+#include "ros/mapping_server.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -1,12 +1,12 @@
-#include "bki_mapping/ros/mapping_server.h"
+#include "ros/mapping_server.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <new>
 
-#include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/ros/pose_conversion.h"
+#include "bki_mapping/mapping/parameters.h"
+#include "ros/pose_conversion.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

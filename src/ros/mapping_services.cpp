@@ -1,6 +1,6 @@
 // The services of the mapping server.
 #include "bki_mapping/io/map_export.h"
-#include "bki_mapping/ros/mapping_server.h"
+#include "ros/mapping_server.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/no_returns.h"
+#include "ros/no_returns.h"
 
 #include <cmath>
 

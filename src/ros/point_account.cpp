@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/point_account.h"
+#include "ros/point_account.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/ros/point_field.h"
+#include "ros/point_field.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

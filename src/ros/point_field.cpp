@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/point_field.h"
+#include "ros/point_field.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "bki_mapping/ros/pose_source.h"
+#include "ros/pose_source.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/ros/pose_conversion.h"
-#include "bki_mapping/ros/time_watch.h"
+#include "ros/pose_conversion.h"
+#include "ros/time_watch.h"
 
 namespace bki_mapping::ros_shell {
 

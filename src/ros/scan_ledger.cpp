@@ -1,6 +1,6 @@
-#include "bki_mapping/ros/scan_ledger.h"
+#include "ros/scan_ledger.h"
 
-#include "bki_mapping/ros/point_account.h"
+#include "ros/point_account.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -1,9 +1,9 @@
-#include "bki_mapping/ros/scan_reader.h"
+#include "ros/scan_reader.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "bki_mapping/ros/cloud_conversion.h"
+#include "ros/cloud_conversion.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -1,10 +1,10 @@
-#include "bki_mapping/ros/score_reader.h"
+#include "ros/score_reader.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "bki_mapping/ros/point_field.h"
+#include "ros/point_field.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

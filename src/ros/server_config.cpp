@@ -1,11 +1,11 @@
-#include "bki_mapping/ros/server_config.h"
+#include "ros/server_config.h"
 
 #include <ros/param.h>
 
 #include <set>
 #include <stdexcept>
 
-#include "bki_mapping/core/parameters.h"
+#include "bki_mapping/mapping/parameters.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -1,12 +1,12 @@
-#include "bki_mapping/simulation/drive_file.h"
+#include "simulation/drive_file.h"
 
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
 #include <stdexcept>
 
-#include "bki_mapping/io/atomic_file.h"
-#include "bki_mapping/io/yaml_file.h"
+#include "io/atomic_file.h"
+#include "io/yaml_file.h"
 
 namespace bki_mapping::simulation {
 namespace {

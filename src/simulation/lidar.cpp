@@ -1,12 +1,12 @@
-#include "bki_mapping/simulation/lidar.h"
+#include "simulation/lidar.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/inference/counter_random.h"
-#include "bki_mapping/inference/parallel_for.h"
+#include "parallel/counter_random.h"
+#include "parallel/thread_pool.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -98,8 +98,8 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
     return Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
                            std::sin(elevation));
   };
-  Workers workers(0);
-  workers.forEach(columns, [&](std::size_t column, std::size_t) {
+  ThreadPool pool(0);
+  pool.forEach(columns, [&](std::size_t column, std::size_t) {
     const auto world = [&](std::size_t beam) -> Eigen::Vector3d {
       return T_world_sensor.linear() * directionOf(column, beam);
     };

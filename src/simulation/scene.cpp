@@ -1,4 +1,4 @@
-#include "bki_mapping/simulation/scene.h"
+#include "simulation/scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include <cmath>
 
-#include "bki_mapping/inference/counter_random.h"
-#include "bki_mapping/simulation/scene.h"
+#include "parallel/counter_random.h"
+#include "simulation/scene.h"
 
 namespace bki_mapping::simulation {
 namespace {

@@ -1,4 +1,4 @@
-#include "bki_mapping/simulation/voxel_truth.h"
+#include "simulation/voxel_truth.h"
 
 #include <map>
 #include <utility>

@@ -1,11 +1,11 @@
-#include "bki_mapping/tools/draw.h"
+#include "tools/draw.h"
 
 #include <sys/wait.h>
 
 #include <cstdlib>
 #include <stdexcept>
 
-#include "bki_mapping/io/share_path.h"
+#include "io/share_path.h"
 
 namespace bki_mapping::tools {
 namespace {

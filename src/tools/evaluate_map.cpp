@@ -2,16 +2,16 @@
 #include <filesystem>
 #include <iostream>
 
-#include "bki_mapping/core/map_query.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/atomic_file.h"
-#include "bki_mapping/io/report.h"
 #include "bki_mapping/io/sequence.h"
+#include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/simulation/drive_file.h"
-#include "bki_mapping/tools/draw.h"
-#include "bki_mapping/tools/options.h"
-#include "bki_mapping/tools/quality_report.h"
+#include "evaluation/quality_report.h"
+#include "evaluation/run_report.h"
+#include "io/atomic_file.h"
+#include "simulation/drive_file.h"
+#include "tools/draw.h"
+#include "tools/options.h"
 
 namespace {
 

@@ -4,13 +4,13 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/io/atomic_file.h"
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/report.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/tools/options.h"
+#include "evaluation/run_report.h"
+#include "io/atomic_file.h"
+#include "tools/options.h"
 
 namespace {
 

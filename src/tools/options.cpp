@@ -1,4 +1,4 @@
-#include "bki_mapping/tools/options.h"
+#include "tools/options.h"
 
 #include <unistd.h>
 
@@ -6,9 +6,9 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "bki_mapping/core/parameters.h"
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/mapping/parameters.h"
 
 namespace bki_mapping::tools {
 namespace {

@@ -10,9 +10,9 @@
 #include <iostream>
 #include <set>
 
-#include "bki_mapping/ros/termination.h"
-#include "bki_mapping/tools/options.h"
-#include "bki_mapping/tools/sequence_messages.h"
+#include "ros/termination.h"
+#include "tools/options.h"
+#include "tools/sequence_messages.h"
 
 namespace {
 

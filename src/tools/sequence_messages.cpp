@@ -1,7 +1,7 @@
-#include "bki_mapping/tools/sequence_messages.h"
+#include "tools/sequence_messages.h"
 
-#include "bki_mapping/ros/cloud_conversion.h"
-#include "bki_mapping/ros/pose_conversion.h"
+#include "ros/cloud_conversion.h"
+#include "ros/pose_conversion.h"
 
 namespace bki_mapping::tools {
 

@@ -4,9 +4,9 @@
 #include <iostream>
 #include <memory>
 
-#include "bki_mapping/io/atomic_file.h"
-#include "bki_mapping/tools/options.h"
-#include "bki_mapping/tools/sequence_messages.h"
+#include "io/atomic_file.h"
+#include "tools/options.h"
+#include "tools/sequence_messages.h"
 
 namespace {
 

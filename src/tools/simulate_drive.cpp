@@ -1,8 +1,8 @@
 // Writes a simulated drive as a folder in SemanticKITTI's layout.
 #include <iostream>
 
-#include "bki_mapping/simulation/drive_file.h"
-#include "bki_mapping/tools/options.h"
+#include "simulation/drive_file.h"
+#include "tools/options.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bki_mapping/inference/counter_random.h"
+#include "parallel/counter_random.h"
 
 namespace bki_mapping::reference {
 namespace {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/core/scan.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::reference {
 

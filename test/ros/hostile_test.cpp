@@ -37,9 +37,9 @@
 #include <sstream>
 #include <thread>
 
-#include "bki_mapping/ros/point_account.h"
-#include "bki_mapping/ros/scan_ledger.h"
 #include "hostile/kinds.h"
+#include "ros/point_account.h"
+#include "ros/scan_ledger.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping::ros_shell {

@@ -18,10 +18,10 @@
 #include <random>
 #include <thread>
 
-#include "bki_mapping/ros/cloud_conversion.h"
-#include "bki_mapping/ros/pose_conversion.h"
-#include "bki_mapping/ros/scan_ledger.h"
-#include "bki_mapping/simulation/lidar.h"
+#include "ros/cloud_conversion.h"
+#include "ros/pose_conversion.h"
+#include "ros/scan_ledger.h"
+#include "simulation/lidar.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -7,10 +7,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/core/types.h"
 
 namespace bki_mapping {
+
+/// What the labels of a scan are: the data set's raw numbers, or ids of the class table.
+enum class LabelValues { kRaw, kId };
 
 /// One class of the table.
 struct SemanticClass {

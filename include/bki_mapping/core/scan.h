@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/core/config.h"
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/sensor_model.h"
 #include "bki_mapping/core/soft_labels.h"
 
 namespace bki_mapping {

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "bki_mapping/core/config.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping {
 

@@ -2,35 +2,18 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/core/config.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/core/scan_refused.h"
-#include "bki_mapping/core/semantic_map.h"
-#include "bki_mapping/free_space/free_space_model.h"
-#include "bki_mapping/inference/map_updater.h"
-#include "bki_mapping/inference/occlusion.h"
-#include "bki_mapping/inference/point_evidence.h"
-#include "bki_mapping/inference/soft_point_evidence.h"
-#include "bki_mapping/mapping/observation.h"
+#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/mapping/scan_stats.h"
 
 namespace bki_mapping {
 
-/// What one scan did, and how long its phases took.
-struct ScanStats {
-  PointCounts counts;
-  std::size_t hits = 0;        ///< after down-sampling
-  std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
-  std::size_t blocks = 0;      ///< blocks touched
-  std::size_t not_finite =
-      0;                     ///< voxels and classes that refused evidence since it would not have been finite
-  double observe_ms = 0.0;   ///< filtering, down-sampling
-  double evidence_ms = 0.0;  ///< sampling, binning, indexing
-  double collect_ms = 0.0;   ///< naming and allocating blocks
-  double update_ms = 0.0;    ///< adding to the blocks
-  double totalMs() const { return observe_ms + evidence_ms + collect_ms + update_ms; }
-};
+class ThreadPool;
 
 /// Owns a map, adds scans to it, and keeps threads and working memory for that. Not for several threads at
 /// once; each call may use several inside.
@@ -82,9 +65,6 @@ class SemanticMapper {
   struct Pipeline;
 
   ScanStats add(const Scan& scan);
-  UpdateLimits limitsFor(const Scan& scan) const;
-  /// What a scan larger than its limits would take, and what to set.
-  ScanRefused refusalOf(const TooMuchWork& work) const;
   /// After a failure: counts the map's bytes anew, and drops working memory, which may be large or half made.
   void recover() noexcept;
   void setGains();
@@ -92,7 +72,7 @@ class SemanticMapper {
   MapperConfig config_;
   std::shared_ptr<const ClassTable> classes_;
   SemanticMap map_;
-  Workers workers_;
+  std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<Pipeline> pipeline_;  ///< none between a failure and the next scan
   std::vector<GridIndex> no_blocks_;
   std::size_t block_bytes_ = 0;  ///< of the blocks alone

@@ -5,9 +5,9 @@
 #include <map>
 #include <set>
 
-#include "bki_mapping/core/map_query.h"
-#include "bki_mapping/core/voxel_color.h"
-#include "bki_mapping/ros/map_publisher.h"
+#include "bki_mapping/map/map_query.h"
+#include "map/voxel_color.h"
+#include "ros/map_publisher.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/mapping/column_map.h"
-#include "bki_mapping/ros/map_publisher.h"
-#include "bki_mapping/ros/sentence_throttle.h"
+#include "bki_mapping/map/column_map.h"
+#include "ros/map_publisher.h"
+#include "ros/sentence_throttle.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -1,7 +1,7 @@
 #include <bki_mapping/OccupancyMap.h>
 #include <bki_mapping/OccupancyUpdate.h>
 
-#include "bki_mapping/core/map_query.h"
+#include "bki_mapping/map/map_query.h"
 #include "updates.h"
 
 namespace bki_mapping::ros_shell {

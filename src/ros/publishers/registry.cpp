@@ -1,4 +1,4 @@
-#include "bki_mapping/ros/map_publisher.h"
+#include "ros/map_publisher.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -1,6 +1,6 @@
 #include <nav_msgs/Path.h>
 
-#include "bki_mapping/ros/map_publisher.h"
+#include "ros/map_publisher.h"
 
 namespace bki_mapping::ros_shell {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "bki_mapping/ros/map_publisher.h"
+#include "ros/map_publisher.h"
 
 namespace bki_mapping::ros_shell {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/voxel_pcl.h"
+#include "io/voxel_pcl.h"
 #include "updates.h"
 
 namespace bki_mapping::ros_shell {

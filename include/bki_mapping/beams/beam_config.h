@@ -1,0 +1,11 @@
+/// @file Settings of beam lines.
+#pragma once
+
+namespace bki_mapping {
+
+enum class BeamWeight { kUniform, kLinear, kBilinear };
+enum class FreeSpaceExtent { kMapped, kObserved };
+enum class BeamIndexType { kTable, kRtree };
+enum class OcclusionExtent { kNone, kMapped, kAll };
+
+}  // namespace bki_mapping

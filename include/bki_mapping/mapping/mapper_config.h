@@ -1,0 +1,34 @@
+/// @file Every setting of the mapper with its default; parameters.h gives them names.
+#pragma once
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/sensor_model.h"
+#include "bki_mapping/free_space/free_space_config.h"
+#include "bki_mapping/kernel/kernel_config.h"
+#include "bki_mapping/map/free_gain_config.h"
+#include "bki_mapping/update/scan_limit_config.h"
+
+namespace bki_mapping {
+
+enum class UnlabelledPoints { kOccupied, kIgnore };
+enum class UnknownLabels { kIgnore, kUnlabelled };
+
+struct MapperConfig {
+  double resolution = 0.3;             ///< edge of a voxel [m]
+  double prior = 0.001;                ///< alpha0, concentration of each class before any scan
+  double downsample_resolution = 0.1;  ///< edge of a down-sampling cell [m]; 0: off
+  int threads = 0;                     ///< 0: all cores
+  double memory_limit = 0.0;           ///< of the map [MB]; 0: none. A scan that would exceed it is refused
+  KernelConfig kernel;
+  FreeSpaceConfig free_space;
+  FreeGainConfig free_gain;
+  ScanLimitConfig scan_limit;
+  SensorModelConfig sensor_model;
+  bool clear_beyond_max_range = true;  ///< hits beyond max_range clear as beams cut there
+  OcclusionExtent occlusion = OcclusionExtent::kNone;
+  UnlabelledPoints unlabelled_points = UnlabelledPoints::kOccupied;
+  UnknownLabels unknown_labels = UnknownLabels::kIgnore;
+  LabelValues label_values = LabelValues::kRaw;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,120 @@
+/// @file The beams of a scan, indexed, and the voxels near them.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "beams/beam_index.h"
+#include "beams/beams.h"
+#include "beams/row_walk.h"
+#include "bki_mapping/map/semantic_map.h"
+#include "kernel/sparse_kernel.h"
+#include "update/evidence.h"
+
+namespace bki_mapping {
+
+/// What line evidence and occlusion share: the beams, their index, and how near a voxel must be. With the
+/// sparse kernel a beam reaches the voxels whose centre is within its length; with the counting kernel those
+/// that it crosses. Keeps its memory from scan to scan.
+class BeamField {
+ public:
+  BeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index);
+
+  /// Replaces the beams.
+  void setBeams(const Beams& beams, ThreadPool& pool);
+
+  const GridGeometry& geometry() const { return geometry_; }
+  const VoxelKernel& kernel() const { return kernel_; }
+  const Eigen::Vector3d& origin() const { return beams_.origin; }
+  /// In the order of the index.
+  const Beams& beams() const { return beams_; }
+  BeamBox boxOf(const BlockGroup& group) const;
+
+  /// Radius about a beam outside which no voxel centre is reached [m].
+  double reachMetres() const { return reach_ * geometry_.resolution(); }
+  double longest() const { return longest_; }  ///< length of the longest beam [m]
+
+  /// Takes the working memory that the finding of beams can need.
+  void reserve(EvidenceScratch& scratch) const;
+
+  /// Names beams, among them all whose half-lines reach the block, as numbers in scratch.ranges: sorted, and
+  /// none twice.
+  void findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const;
+
+  /// The same of a group.
+  void findRangesNear(const BlockGroup& group, EvidenceScratch& scratch) const;
+
+  /// Calls visit(offset, rho, length) for every voxel of the block that the line of a beam reaches, with rho
+  /// the projection of the voxel's centre on the beam / beam length [m]. Beams that end more than `follow`
+  /// before the block are left out. @param follow how far from the sensor beams matter, if that is farther
+  /// than their end [m].
+  template <typename Visit>
+  void forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
+                        Visit&& visit) const;
+
+ private:
+  /// @param centre of a ball, relative to the sensor [m]. @param radius [m].
+  void findRangesNear(const Eigen::Vector3d& centre, double radius, EvidenceScratch& scratch) const;
+  /// Finds the beams that may reach the block: their numbers in scratch.beams.
+  void findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const;
+  LocalBeam localBeam(std::size_t beam, const BlockIndex& index) const;
+  /// Whether a beam's line crosses a voxel of a block (the counting kernel's reach).
+  bool crosses(const BlockIndex& index, int offset, const Eigen::Vector3f& end) const;
+
+  GridGeometry geometry_;
+  VoxelKernel kernel_;
+  BeamIndexType index_type_;
+  float reach_;  ///< [voxels]
+  double longest_ = 0.0;
+  Beams beams_;
+  std::vector<float> inverse_length_;  ///< [1 / m]
+  BeamTable table_;
+  std::unique_ptr<BeamIndex> rtree_;
+  std::vector<std::uint32_t> cells_, order_;
+};
+
+/// The beams of a scan, and their field once somebody asks for it.
+class LazyBeamField {
+ public:
+  LazyBeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index)
+      : field_(geometry, kernel, index) {}
+
+  /// Replaces the beams, which must stay where they are until the scan is done.
+  void setBeams(const Beams& beams) {
+    beams_ = &beams;
+    ready_ = false;
+  }
+  const Beams& beams() const { return *beams_; }
+  const BeamField& field(ThreadPool& pool) {
+    if (!ready_) field_.setBeams(*beams_, pool);
+    ready_ = true;
+    return field_;
+  }
+
+ private:
+  BeamField field_;
+  const Beams* beams_ = nullptr;
+  bool ready_ = false;
+};
+
+template <typename Visit>
+void BeamField::forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
+                                 Visit&& visit) const {
+  const bool counting = kernel_.type == KernelType::kCounting;
+  findBeamsNear(index, follow, scratch);
+  for (const std::uint32_t b : scratch.beams) {
+    const LocalBeam local = localBeam(b, index);
+    const Eigen::Vector3f& end = beams_.ends[b];
+    const float length = end.norm();
+    forEachNearRow(local, reach_, [&](const NearRow& row) {
+      for (int i = 0; i < kBlockEdge; ++i) {
+        const float dx = static_cast<float>(i) - row.x;
+        const float d2 = row.distance2 + local.g * dx * dx;
+        if (d2 >= reach_ * reach_ || (counting && !crosses(index, row.offset + i, end))) continue;
+        visit(row.offset + i, row.rho + static_cast<float>(i) * row.rho_step, length);
+      }
+    });
+  }
+}
+
+}  // namespace bki_mapping

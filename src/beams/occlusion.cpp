@@ -1,0 +1,32 @@
+#include "beams/occlusion.h"
+
+namespace bki_mapping {
+
+const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, std::size_t most,
+                                                       ThreadPool& pool) {
+  const double reach = field_->reachMetres();
+  touched_.clear();
+  insertMappedBlocks(map, field_->origin(), range_ + reach, touched_);
+  if (extent_ == OcclusionExtent::kAll) {
+    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, most, pool, touched_);
+  }
+  return touched_.members();
+}
+
+void Occlusion::reserve(EvidenceScratch& scratch) const {
+  field_->reserve(scratch);
+  scratch.beams.reserve(field_->beams().ends.size());
+}
+
+void Occlusion::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
+  Block::Occlusion behind, crossed;
+  const auto range = static_cast<float>(range_);
+  field_->forEachVoxelNear(index, range_, scratch, [&](int offset, float rho, float length) {
+    const auto voxel = static_cast<std::size_t>(offset);
+    if (rho >= 1.0f && rho * length <= range) behind.set(voxel);
+    if (rho > 0.0f && rho < 1.0f) crossed.set(voxel);
+  });
+  block.setOcclusion((block.occlusion() | behind) & ~crossed);
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,37 @@
+/// @file Which voxels a scan saw only behind its hits.
+#pragma once
+
+#include "beams/beam_field.h"
+#include "beams/block_walk.h"
+
+namespace bki_mapping {
+
+/// Marks the voxels that lie behind the end of some beam (rho >= 1) and that no beam of this scan crosses
+/// (0 < rho < 1). Voxels that this scan does not reach keep the mark of an earlier one.
+class Occlusion : public Evidence {
+ public:
+  explicit Occlusion(OcclusionExtent extent) : extent_(extent) {}
+
+  /// Replaces the beams. @param field must stay where it is until the scan is done. @param range how far from
+  /// the sensor shadows are followed [m].
+  void setField(const BeamField& field, double range) {
+    field_ = &field;
+    range_ = range;
+  }
+
+  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+                                              ThreadPool& pool) override;
+  void markClasses(std::size_t, ClassSet&) const override {}
+  void reserve(EvidenceScratch& scratch) const override;
+  void addTo(std::size_t number, const BlockIndex& index, Block& block,
+             EvidenceScratch& scratch) const override;
+
+ private:
+  OcclusionExtent extent_;
+  const BeamField* field_ = nullptr;
+  double range_ = 0.0;
+  BlockWalk walk_;
+  IndexNumbering touched_;
+};
+
+}  // namespace bki_mapping

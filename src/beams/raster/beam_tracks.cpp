@@ -1,0 +1,30 @@
+#include "beams/raster/beam_tracks.h"
+
+#include <stdexcept>
+
+#include "beams/beam_cells.h"
+#include "parallel/chunks.h"
+#include "simd/inner_loops.h"
+
+namespace bki_mapping {
+
+void BeamTracks::set(const Beams& beams, double resolution, double length, const InnerLoops& loops,
+                     ThreadPool& pool) {
+  const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
+  axis_.resize(padded, 0);
+  for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
+  tracks_.resize(count);
+  if (length > kMostTrackReach * resolution) {
+    throw std::invalid_argument("a kernel of more than 72 voxels is too long for lines");
+  }
+  const auto reach = static_cast<float>(length / resolution);
+  const Chunks chunks(count);
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    const std::size_t begin = chunks.begin(c);
+    loops.make_tracks(beams.ends.data() + begin, chunks.end(c) - begin, resolution, reach,
+                      {axis_.data() + begin, slope_side_.data() + begin, slope_height_.data() + begin,
+                       end_.data() + begin, skew_.data() + begin, tracks_.data() + begin});
+  });
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,70 @@
+#include "evaluation/dynamics.h"
+
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping {
+
+std::set<std::uint32_t> DynamicsEvaluation::movingOfSemanticKitti() {
+  return {252, 253, 254, 255, 256, 257, 258, 259};
+}
+
+void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
+  const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
+    const auto id = classes.classOf(scan.labels[i], labelValues(scan));
+    if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
+    const VoxelIndex index = geometry_.voxelAt(point);
+    const auto fresh = static_cast<std::uint32_t>(voxels_.size());
+    const std::uint32_t number = number_.insert(index, fresh);
+    if (number == fresh) voxels_.push_back({index});
+    Voxel& voxel = voxels_[number];
+    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
+    const SemanticClass& known = *classes.find(*id);
+    voxel.ground_points += !moving && known.ground;
+    voxel.standing_points += !moving && known.dynamic;
+    voxel.other_points += !moving && !known.ground && !known.dynamic;
+    voxel.early_moving_points += moving && early;
+    voxel.hit_late |= late;
+  }
+  ++added_;
+}
+
+std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map) const {
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
+  for (const Voxel& voxel : voxels_) {
+    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
+    if (voxel.ground_points + voxel.standing_points + voxel.other_points > 0) {
+      fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
+    } else if (voxel.early_moving_points > 0 && !voxel.hit_late) {
+      fates.emplace_back(voxel.index, occupied ? VoxelFate::kLeft : VoxelFate::kForgotten);
+    }
+  }
+  return fates;
+}
+
+DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
+  DynamicsQuality quality;
+  for (const Voxel& voxel : voxels_) {
+    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
+    quality.ground_points += voxel.ground_points;
+    quality.standing_points += voxel.standing_points;
+    quality.other_points += voxel.other_points;
+    quality.floor_voxels += voxel.ground_points > 0;
+    if (occupied) {
+      quality.ground_kept += voxel.ground_points;
+      quality.standing_kept += voxel.standing_points;
+      quality.other_kept += voxel.other_points;
+    } else {
+      quality.floor_holes += voxel.ground_points > 0;
+    }
+    if (voxel.hit_late) continue;
+    quality.moving_points += voxel.early_moving_points;
+    if (!occupied) quality.moving_removed += voxel.early_moving_points;
+  }
+  quality.static_points = quality.ground_points + quality.standing_points + quality.other_points;
+  quality.static_kept = quality.ground_kept + quality.standing_kept + quality.other_kept;
+  return quality;
+}
+
+}  // namespace bki_mapping

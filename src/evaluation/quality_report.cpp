@@ -1,0 +1,181 @@
+#include "evaluation/quality_report.h"
+
+#include <cmath>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace bki_mapping::tools {
+namespace {
+
+using Json = nlohmann::json;
+using simulation::SpaceQuality;
+using simulation::Tally;
+using simulation::TruthQuality;
+
+/// The figures of SpaceQuality by name.
+struct SpaceFigure {
+  const char* name;
+  Tally SpaceQuality::*tally;
+  const char* meaning;
+};
+constexpr SpaceFigure kSpaceFigures[] = {
+    {"free_precision", &SpaceQuality::free_precision, "of the voxels called free have nothing in them"},
+    {"free_recall", &SpaceQuality::free_recall, "of the empty voxels that beams crossed are called free"},
+    {"occupied_precision", &SpaceQuality::occupied_precision,
+     "of those called occupied have something in them"},
+    {"occupied_near", &SpaceQuality::occupied_near, "of those have something in them or in a neighbour"},
+    {"occupied_recall", &SpaceQuality::occupied_recall,
+     "of the voxels hit, and not empty, are called occupied"},
+};
+
+Json spaceJson(const SpaceQuality& space) {
+  Json figures;
+  for (const SpaceFigure& figure : kSpaceFigures) {
+    figures[figure.name] = (space.*figure.tally).share();
+    figures[std::string(figure.name) + "_voxels"] = (space.*figure.tally).all;
+  }
+  return figures;
+}
+
+Json reliabilityJson(const Reliability& reliability) {
+  Json bins;
+  for (const Reliability::Bin& bin : reliability.bins()) {
+    const auto count = static_cast<double>(bin.count);
+    bins.push_back({{"count", bin.count},
+                    {"probability", bin.probability / count},
+                    {"right", static_cast<double>(bin.right) / count}});
+  }
+  return bins;
+}
+
+Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
+  Json figures = spaceJson(truth.all);
+  figures["voxel_miou"] = truth.meanIou(classes);
+  figures["voxel_occupied_iou"] = truth.occupiedIou(classes);
+  figures["occupancy_calibration_error"] = truth.occupancy.error();
+  figures["occupancy_reliability"] = reliabilityJson(truth.occupancy);
+  figures["movable_voxels"] = truth.movable;
+  figures["ghost_voxels"] = truth.ghosts;
+  figures["mean_ghost_voxels"] = truth.mean_ghosts;
+  for (std::size_t bin = 0; bin < truth.by_distance.size(); ++bin) {
+    Json at = spaceJson(truth.by_distance[bin]);
+    if (bin < TruthQuality::kDistances.size()) at["up_to"] = TruthQuality::kDistances[bin];
+    figures["by_distance"].push_back(std::move(at));
+  }
+  for (const SemanticClass& c : classes.classes()) {
+    if (truth.voxels.points(c.id) > 0) figures["voxel_iou"][c.name] = truth.voxels.iou(c.id);
+  }
+  return figures;
+}
+
+/// With one decimal; "-" for figures of nothing.
+std::string figureText(double figure) {
+  if (!std::isfinite(figure)) return "-";
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << figure;
+  return text.str();
+}
+
+class Table {
+ public:
+  void share(const std::string& name, double share, const std::string& meaning) {
+    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << figureText(100.0 * share)
+         << " %  " << meaning << "\n";
+  }
+  void text(const std::string& line) { out_ << line << "\n"; }
+  std::string str() const { return out_.str(); }
+
+ private:
+  std::ostringstream out_;
+};
+
+void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table) {
+  for (const SpaceFigure& figure : kSpaceFigures) {
+    table.share(figure.name, (truth.all.*figure.tally).share(), figure.meaning);
+  }
+  table.share("voxel mIoU", truth.meanIou(classes), "of the classes of voxels, over those there are");
+  table.share("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
+  table.share("occupancy ECE", truth.occupancy.error(),
+              "expected calibration error of the probability of occupancy");
+  table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
+             " voxels of things that can move (none there for half a second); " +
+             figureText(truth.mean_ghosts) + " on average while mapping");
+}
+
+}  // namespace
+
+std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
+  const DynamicsQuality& d = quality.dynamics;
+  const SemanticQuality& s = quality.semantics;
+  Table table;
+  table.share("SA", d.staticAccuracy(), "of the points of standing things are in occupied voxels");
+  table.share("  ground", d.groundAccuracy(), "of those of ground");
+  table.share("  standing", d.standingAccuracy(), "of those of things that could move, but stand");
+  table.share("  other", d.otherAccuracy(), "of the others");
+  table.share("holes", d.holes(), "of the voxels that hold points of ground are not occupied");
+  table.share("DA", d.dynamicAccuracy(), "of the early points of moving things are not");
+  table.share("AA", d.accuracy(), "sqrt(SA DA)");
+  table.share("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
+  table.share("mIoU of the map", s.map.meanIou(), "at the labelled points");
+  table.share("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
+  table.share("ECE", s.reliability.error(), "expected calibration error of the class's probability");
+  table.share("AUSE", s.sparsificationError, "area under the sparsification error curve, by variance");
+  if (quality.truth) addTruth(*quality.truth, classes, table);
+  table.text(std::to_string(d.static_points) + " points of standing and " + std::to_string(d.moving_points) +
+             " of moving things; median " + figureText(quality.median_ms) + " ms a scan");
+  if (quality.labels_are_ids) {
+    table.text(
+        "class ids do not tell what moves, so DA and AA are not known, and all points count as standing");
+  } else if (d.moving_points == 0) {
+    table.text("there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known");
+  }
+  if (quality.unknown_labels > 0) {
+    table.text(std::to_string(quality.unknown_labels) + " of " + std::to_string(quality.labels) +
+               " labels are not in the class table " + classes.name() + ", as " +
+               (quality.labels_are_ids ? "id " : "raw number ") + std::to_string(quality.unknown_label) +
+               ", and do not count; check --classes and --set label_values");
+  }
+  return table.str();
+}
+
+std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
+  const DynamicsQuality& d = quality.dynamics;
+  const SemanticQuality& s = quality.semantics;
+  Json figures = {{"static_points", d.static_points},
+                  {"static_kept", d.static_kept},
+                  {"moving_points", d.moving_points},
+                  {"moving_removed", d.moving_removed},
+                  {"floor_voxels", d.floor_voxels},
+                  {"floor_holes", d.holes()},
+                  {"sa", d.staticAccuracy()},
+                  {"sa_ground", d.groundAccuracy()},
+                  {"sa_standing", d.standingAccuracy()},
+                  {"sa_other", d.otherAccuracy()},
+                  {"da", d.dynamicAccuracy()},
+                  {"aa", d.accuracy()},
+                  {"ha", d.harmonicAccuracy()},
+                  {"miou_map", s.map.meanIou()},
+                  {"miou_input", s.input.meanIou()},
+                  {"accuracy_map", s.map.accuracy()},
+                  {"accuracy_input", s.input.accuracy()},
+                  {"calibration_error", s.reliability.error()},
+                  {"sparsification_error", s.sparsificationError},
+                  {"median_ms", quality.median_ms},
+                  {"labels_not_in_table", quality.unknown_labels},
+                  {"classes", Json::array()}};
+  for (const SemanticClass& c : classes.classes()) {
+    const auto voxels = quality.voxels_by_class.find(c.id);
+    figures["voxels_by_class"][c.name] = voxels == quality.voxels_by_class.end() ? 0 : voxels->second;
+    if (s.map.points(c.id) == 0) continue;
+    figures["classes"].push_back({{"name", c.name},
+                                  {"points", s.map.points(c.id)},
+                                  {"iou_map", s.map.iou(c.id)},
+                                  {"iou_input", s.input.iou(c.id)}});
+  }
+  figures["reliability"] = reliabilityJson(s.reliability);
+  if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
+  return figures.dump(2) + "\n";
+}
+
+}  // namespace bki_mapping::tools

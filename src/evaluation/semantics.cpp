@@ -1,0 +1,172 @@
+#include "evaluation/semantics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "parallel/counter_random.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Points of a voxel, how many of them are wrong, and by what they are ranked.
+struct Ranked {
+  double rank;
+  std::size_t points, wrong;
+};
+
+/// Mean, over all shares left out from the front, of the share of wrong points among those left.
+double meanErrorLeft(const std::vector<Ranked>& voxels, double points, double wrong) {
+  double area = 0.0, left = points;
+  for (const Ranked& voxel : voxels) {
+    if (left <= 0.0) break;
+    area += wrong / left * static_cast<double>(voxel.points) / points;
+    left -= static_cast<double>(voxel.points);
+    wrong -= static_cast<double>(voxel.wrong);
+  }
+  return area;
+}
+
+double sparsificationError(std::vector<Ranked> voxels) {
+  double points = 0.0, wrong = 0.0;
+  for (const Ranked& voxel : voxels) {
+    points += static_cast<double>(voxel.points);
+    wrong += static_cast<double>(voxel.wrong);
+  }
+  if (points == 0.0) return kNan;
+  const auto byRank = [](const Ranked& a, const Ranked& b) { return a.rank > b.rank; };
+  std::stable_sort(voxels.begin(), voxels.end(), byRank);
+  const double by_variance = meanErrorLeft(voxels, points, wrong);
+  for (Ranked& voxel : voxels)
+    voxel.rank = static_cast<double>(voxel.wrong) / static_cast<double>(voxel.points);
+  std::stable_sort(voxels.begin(), voxels.end(), byRank);
+  return by_variance - meanErrorLeft(voxels, points, wrong);
+}
+
+}  // namespace
+
+std::size_t Confusion::count(ClassId truth, ClassId told) const {
+  const auto found = counts_.find({truth, told});
+  return found == counts_.end() ? 0 : found->second;
+}
+
+std::size_t Confusion::points(ClassId truth) const {
+  std::size_t sum = 0;
+  for (const auto& [pair, count] : counts_) sum += pair.first == truth ? count : 0;
+  return sum;
+}
+
+double Confusion::iou(ClassId id) const {
+  std::size_t either = 0;
+  for (const auto& [pair, count] : counts_) either += pair.first == id || pair.second == id ? count : 0;
+  return either == 0 ? kNan : static_cast<double>(count(id, id)) / static_cast<double>(either);
+}
+
+double Confusion::meanIou() const {
+  std::set<ClassId> true_classes;
+  for (const auto& [pair, count] : counts_) {
+    if (count > 0) true_classes.insert(pair.first);
+  }
+  double sum = 0.0;
+  for (const ClassId id : true_classes) sum += iou(id);
+  return sum / static_cast<double>(true_classes.size());
+}
+
+double Confusion::accuracy() const {
+  std::size_t right = 0, all = 0;
+  for (const auto& [pair, count] : counts_) {
+    all += count;
+    right += pair.first == pair.second ? count : 0;
+  }
+  return all == 0 ? kNan : static_cast<double>(right) / static_cast<double>(all);
+}
+
+void Reliability::add(double probability, std::size_t count, std::size_t right) {
+  Bin& bin = bins_[static_cast<std::size_t>(10.0 * std::min(probability, 0.999999))];
+  bin.count += count;
+  bin.right += right;
+  bin.probability += probability * static_cast<double>(count);
+}
+
+double Reliability::error() const {
+  double error = 0.0, count = 0.0;
+  for (const Bin& bin : bins_) {
+    error += std::abs(static_cast<double>(bin.right) - bin.probability);
+    count += static_cast<double>(bin.count);
+  }
+  return error / count;
+}
+
+void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>& told,
+                             const ClassTable& classes) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
+    const auto truth = classes.classOf(scan.labels[i], labelValues(scan));
+    if (!truth || truth == classes.unlabelled() || !geometry_.contains(point)) continue;
+    input_.add(*truth, classes.classOf(told[i], labelValues(scan)).value_or(kFreeClass));
+    const VoxelIndex index = geometry_.voxelAt(point);
+    const auto fresh = static_cast<std::uint32_t>(voxels_.size());
+    const std::uint32_t number = number_.insert(index, fresh);
+    if (number == fresh) {
+      voxels_.push_back(index);
+      points_.emplace_back();
+    }
+    ++points_[number][*truth];
+  }
+}
+
+SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
+  SemanticQuality quality;
+  quality.input = input_;
+  std::vector<Ranked> ranked;
+  for (std::size_t n = 0; n < voxels_.size(); ++n) {
+    const VoxelView view = judgeVoxel(map, voxels_[n]);
+    Ranked voxel{static_cast<double>(view.variance), 0, 0};
+    for (const auto& [truth, points] : points_[n]) {
+      quality.map.add(truth, view.label, points);
+      voxel.points += points;
+      voxel.wrong += truth == view.label ? 0 : points;
+    }
+    if (view.state != VoxelState::kOccupied) continue;
+    ranked.push_back(voxel);
+    quality.reliability.add(static_cast<double>(view.probability), voxel.points, voxel.points - voxel.wrong);
+  }
+  quality.sparsificationError = sparsificationError(std::move(ranked));
+  return quality;
+}
+
+std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map) const {
+  std::vector<VoxelIndex> wrong;
+  for (std::size_t n = 0; n < voxels_.size(); ++n) {
+    const VoxelView view = judgeVoxel(map, voxels_[n]);
+    if (view.state == VoxelState::kOccupied && points_[n].count(view.label) == 0) wrong.push_back(voxels_[n]);
+  }
+  return wrong;
+}
+
+std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& classes, double rate,
+                                          std::uint64_t seed) {
+  std::vector<std::uint32_t> labels = scan.labels;
+  std::vector<const SemanticClass*> others;
+  for (const SemanticClass& c : classes.classes()) {
+    if (!c.unlabelled && (scan.labels_are_ids || !c.raw.empty())) others.push_back(&c);
+  }
+  for (std::size_t i = 0; i < labels.size() && others.size() > 1; ++i) {
+    if (counterRandom(seed, scan.stamp, i, 0) >= rate) continue;
+    const auto own = classes.classOf(labels[i], labelValues(scan));
+    const double u = counterRandom(seed, scan.stamp, i, 1);
+    // One of those that are not its own.
+    const auto is_own = [&](const SemanticClass* c) { return own == c->id; };
+    const auto mine = std::find_if(others.begin(), others.end(), is_own);
+    const std::size_t choices = others.size() - (mine == others.end() ? 0 : 1);
+    auto chosen = static_cast<std::size_t>(u * static_cast<double>(choices));
+    if (mine != others.end() && chosen >= static_cast<std::size_t>(mine - others.begin())) ++chosen;
+    labels[i] = scan.labels_are_ids ? others[chosen]->id : others[chosen]->raw.front();
+  }
+  return labels;
+}
+
+}  // namespace bki_mapping

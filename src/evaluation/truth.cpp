@@ -1,0 +1,138 @@
+#include "evaluation/truth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping::simulation {
+namespace {
+
+/// Of this many beams one tells which voxels were crossed.
+constexpr std::size_t kBeamStride = 16;
+/// Something that can move leaves a voxel this long before it is a ghost [s], looked at in such steps [s].
+constexpr double kGhostAge = 0.5, kGhostStep = 0.1;
+
+}  // namespace
+
+double TruthQuality::meanIou(const ClassTable& classes) const {
+  double sum = 0.0;
+  int count = 0;
+  for (const SemanticClass& c : classes.classes()) {
+    if (voxels.points(c.id) == 0) continue;
+    sum += voxels.iou(c.id);
+    ++count;
+  }
+  return sum / count;
+}
+
+double TruthQuality::occupiedIou(const ClassTable& classes) const {
+  std::size_t both = 0, truly = 0;
+  for (const SemanticClass& c : classes.classes()) {
+    truly += voxels.points(c.id);
+    both += voxels.points(c.id) - voxels.count(c.id, kFreeClass);
+  }
+  const std::size_t only_called = voxels.points(kFreeClass) - voxels.count(kFreeClass, kFreeClass);
+  return static_cast<double>(both) / static_cast<double>(truly + only_called);
+}
+
+TruthEvaluation::Seen& TruthEvaluation::seen(const VoxelIndex& index) {
+  const auto fresh = static_cast<std::uint32_t>(voxels_.size());
+  const std::uint32_t number = number_.insert(index, fresh);
+  if (number == fresh) voxels_.push_back({index});
+  return voxels_[number];
+}
+
+void TruthEvaluation::add(const Scan& scan) {
+  origins_.push_back(scan.origin);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d way = scan.points[i].cast<double>();
+    if (!geometry_.contains(scan.origin + way)) continue;
+    seen(geometry_.voxelAt(scan.origin + way)).hit = true;
+    if (i % kBeamStride != 0) continue;
+    const double step = 0.5 * geometry_.resolution();
+    for (double at = 0.0; at < way.norm() - geometry_.resolution(); at += step) {
+      seen(geometry_.voxelAt(scan.origin + at * way.normalized())).crossed = true;
+    }
+  }
+}
+
+std::size_t TruthEvaluation::distanceBin(const VoxelIndex& index) const {
+  const Eigen::Vector3d centre = geometry_.voxelCentre(index);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& origin : origins_) nearest = std::min(nearest, (centre - origin).squaredNorm());
+  const auto& ends = TruthQuality::kDistances;
+  return static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), std::sqrt(nearest)) -
+                                  ends.begin());
+}
+
+bool TruthEvaluation::isMovable(std::uint32_t raw_label) const {
+  const auto id = classes_.classOfRaw(raw_label);
+  return id && classes_.find(*id)->dynamic;
+}
+
+bool TruthEvaluation::isGhost(const VoxelIndex& index, double time) const {
+  for (double ago = 0.0; ago < kGhostAge + 0.5 * kGhostStep; ago += kGhostStep) {
+    const auto movable = [this](std::uint32_t label) { return isMovable(label); };
+    if (truth_.isNear(index, time - ago, geometry_.resolution(), movable)) return false;
+  }
+  return true;
+}
+
+ClassId TruthEvaluation::classAt(const VoxelIndex& index, double time) const {
+  const auto label = truth_.labelAt(index, time);
+  return label ? classes_.classOfRaw(*label).value_or(kFreeClass) : kFreeClass;
+}
+
+std::vector<VoxelIndex> TruthEvaluation::ghosts(const SemanticMap& map, double time) const {
+  std::vector<VoxelIndex> ghosts;
+  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
+    const bool movable = view.state == VoxelState::kOccupied && classes_.find(view.label)->dynamic;
+    if (movable && isGhost(index, time)) ghosts.push_back(index);
+  });
+  return ghosts;
+}
+
+void TruthEvaluation::countGhosts(const SemanticMap& map, double time) {
+  ghosts_ += ghosts(map, time).size();
+  ++moments_;
+}
+
+TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const {
+  TruthQuality quality;
+  const auto add = [&](Tally SpaceQuality::*tally, std::size_t bin, bool right) {
+    (quality.all.*tally).add(right);
+    (quality.by_distance[bin].*tally).add(right);
+  };
+  for (const Seen& voxel : voxels_) {
+    const std::size_t bin = distanceBin(voxel.index);
+    const ClassId truth = classAt(voxel.index, time);
+    const VoxelView view = judgeVoxel(map, voxel.index);
+    quality.voxels.add(truth, view.label);
+    if (view.evidence > 0.0f) {
+      quality.occupancy.add(static_cast<double>(view.occupancy), 1, truth == kFreeClass ? 0 : 1);
+    }
+    if (voxel.crossed && truth == kFreeClass) {
+      add(&SpaceQuality::free_recall, bin, view.state == VoxelState::kFree);
+    }
+    if (voxel.hit && truth != kFreeClass) {
+      add(&SpaceQuality::occupied_recall, bin, view.state == VoxelState::kOccupied);
+    }
+  }
+  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
+    if (view.state != VoxelState::kFree && view.state != VoxelState::kOccupied) return;
+    const std::size_t bin = distanceBin(index);
+    const ClassId truth = classAt(index, time);
+    if (view.state == VoxelState::kFree) return add(&SpaceQuality::free_precision, bin, truth == kFreeClass);
+    add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
+    add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
+    if (number_.find(index) == GridTable::kNone) quality.voxels.add(truth, view.label);
+    quality.movable += classes_.find(view.label)->dynamic;
+  });
+  quality.ghosts = ghosts(map, time).size();
+  quality.mean_ghosts = static_cast<double>(ghosts_) / static_cast<double>(moments_);
+  return quality;
+}
+
+}  // namespace bki_mapping::simulation

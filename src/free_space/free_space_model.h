@@ -1,0 +1,32 @@
+/// @file How a scan tells which space is free.
+#pragma once
+
+#include "beams/beam_field.h"
+#include "bki_mapping/free_space/free_space_config.h"
+
+namespace bki_mapping {
+
+/// What a mode is made from.
+struct FreeSpaceSetup {
+  FreeSpaceConfig config;
+  GridGeometry geometry;
+  KernelConfig kernel;
+  double downsample_resolution;  ///< edge of a down-sampling cell [m]; 0: off
+};
+
+struct FreeSpaceEvidence {
+  Evidence* evidence = nullptr;  ///< of the model, until its next scan; nullptr: none
+  std::size_t count = 0;         ///< samples (after down-sampling) or beams behind it
+};
+
+/// A free-space mode: a maker of evidence for `free`. Keeps its memory from scan to scan.
+class FreeSpaceModel {
+ public:
+  virtual ~FreeSpaceModel() = default;
+  /// Whether observe() looks at beams.
+  virtual bool needsBeams() const { return true; }
+  /// @param beams of one scan. @param stamp of the scan [ns], a key of random samples.
+  virtual FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, ThreadPool& pool) = 0;
+};
+
+}  // namespace bki_mapping

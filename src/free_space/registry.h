@@ -1,0 +1,18 @@
+/// @file The free-space modes by name.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "free_space/free_space_model.h"
+
+namespace bki_mapping {
+
+/// Names of all modes, sorted.
+std::vector<std::string> freeSpaceModes();
+
+/// @throws std::invalid_argument if setup.config.mode is no known mode; the text lists those.
+std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const FreeSpaceSetup& setup);
+
+}  // namespace bki_mapping

@@ -1,0 +1,98 @@
+#include "bki_mapping/map/column_map.h"
+
+#include <algorithm>
+
+namespace bki_mapping {
+namespace {
+
+/// One voxel of a column.
+struct Cell {
+  std::int32_t z;  ///< index of the voxel
+  VoxelState state;
+  ClassId label;
+};
+
+/// The known voxels of one column, from below.
+using Cells = std::vector<Cell>;
+
+ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const ColumnRules& rules,
+                      double resolution) {
+  const auto isGround = [&](const Cell& cell) {
+    return cell.state == VoxelState::kOccupied && classes.find(cell.label)->ground;
+  };
+  ColumnView view;
+  auto above = std::find_if(cells.begin(), cells.end(), isGround);
+  const bool grounded = above != cells.end();
+  if (grounded) {
+    std::int32_t top = above->z;
+    for (; above != cells.end() && isGround(*above) && above->z <= top + 1; ++above) {
+      top = above->z;
+      view.ground_class = above->label;
+    }
+    view.ground = static_cast<float>((top + 1) * resolution);
+    view.clearance = std::numeric_limits<float>::infinity();
+    view.occupancy = ColumnView::Occupancy::kFree;
+  } else {
+    above = cells.begin();
+  }
+  const bool from_ground = rules.reference == HeightReference::kGround;
+  for (auto cell = cells.begin(); cell != cells.end(); ++cell) {
+    const bool is_above = cell >= above;
+    const double height = (cell->z + 0.5) * resolution - (from_ground && grounded ? view.ground : 0.0);
+    const bool within = height >= rules.min_z && height <= rules.max_z;
+    if (cell->state == VoxelState::kOccluded && is_above) view.occluded += static_cast<float>(resolution);
+    if (cell->state == VoxelState::kFree && within) {
+      view.occupancy = std::max(view.occupancy, ColumnView::Occupancy::kFree);
+    }
+    if (cell->state != VoxelState::kOccupied || classes.find(cell->label)->ignored) continue;
+    if (grounded && is_above && std::isinf(view.clearance)) {
+      view.clearance = static_cast<float>(cell->z * resolution) - view.ground;
+    }
+    if (!isGround(*cell) && (within || (from_ground && !grounded))) {
+      view.occupancy = ColumnView::Occupancy::kOccupied;
+    }
+  }
+  return view;
+}
+
+}  // namespace
+
+std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
+                                             const std::vector<GridIndex>& changed) {
+  std::set<Place> places;
+  for (const GridIndex& index : changed) {
+    const Place place(index.x, index.y);
+    places.insert(place);
+    if (map.find({index})) {
+      blocks_[place].insert(index.z);
+    } else {
+      blocks_[place].erase(index.z);
+    }
+  }
+  Cells cells;
+  for (const Place& place : places) {
+    const auto blocks = blocks_.find(place);
+    if (blocks->second.empty()) {
+      blocks_.erase(blocks);
+      columns_.erase(place);
+      continue;
+    }
+    Columns& columns = columns_[place];
+    for (int c = 0; c < kBlockEdge * kBlockEdge; ++c) {
+      cells.clear();
+      for (const std::int32_t z : blocks->second) {
+        const Block& block = *map.find({{place.first, place.second, z}});
+        for (int k = 0; k < kBlockEdge; ++k) {
+          const VoxelView view = judgeVoxel(map, block, c + kBlockEdge * kBlockEdge * k);
+          if (view.state != VoxelState::kUnknown) {
+            cells.push_back({z * kBlockEdge + k, view.state, view.label});
+          }
+        }
+      }
+      columns[static_cast<std::size_t>(c)] = viewColumn(cells, classes, rules_, map.geometry().resolution());
+    }
+  }
+  return places;
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,23 @@
+/// @file Colours of voxels by what they are.
+#pragma once
+
+#include <array>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping {
+
+using Color = std::array<std::uint8_t, 3>;  ///< red, green, blue
+
+constexpr Color kFreeColor = {200, 225, 240};
+constexpr Color kOccludedColor = {60, 60, 70};
+
+/// The class's colour for occupied voxels, one fixed colour each for free and occluded ones.
+inline Color semanticColor(const VoxelView& view, const ClassTable& classes) {
+  if (view.state == VoxelState::kFree) return kFreeColor;
+  const SemanticClass* known = classes.find(view.label);
+  return known ? known->color : kOccludedColor;
+}
+
+}  // namespace bki_mapping

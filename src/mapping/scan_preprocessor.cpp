@@ -1,0 +1,226 @@
+#include "mapping/scan_preprocessor.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "bki_mapping/core/grid_geometry.h"
+#include "mapping/soft_merge.h"
+#include "parallel/chunks.h"
+
+namespace bki_mapping {
+namespace {
+
+/// Points nearer than this are no hits: drivers put missing returns at the sensor [m].
+constexpr float kSensorRadius = 1e-3f;
+
+/// Finds the classes of labels.
+class ClassFinder {
+ public:
+  ClassFinder(const ClassTable& classes, LabelValues values, const MapperConfig& config)
+      : classes_(classes), values_(values), config_(config) {}
+
+  /// The class of a label, or none if hits with it are to be left out (and counted).
+  std::optional<ClassId> classOf(std::uint32_t label, PointCounts& counts) {
+    if (knows_last_ && label == last_label_) return last_class_;  // most points have their neighbour's label
+    std::optional<ClassId> id = classes_.classOf(label, values_);
+    knows_last_ = false;
+    const bool listed = id.has_value();
+    if (!listed) {
+      ++counts.labels_not_in_table;
+      if (config_.unknown_labels == UnknownLabels::kUnlabelled) id = classes_.unlabelled();
+      if (!id) {
+        ++counts.unknown_label;
+        return std::nullopt;
+      }
+    }
+    if (config_.unlabelled_points == UnlabelledPoints::kIgnore && id == classes_.unlabelled()) {
+      ++counts.unlabelled;
+      return std::nullopt;
+    }
+    if (listed) {
+      knows_last_ = true;
+      last_label_ = label;
+      last_class_ = *id;
+    }
+    return id;
+  }
+
+ private:
+  const ClassTable& classes_;
+  LabelValues values_;
+  const MapperConfig& config_;
+  // The last label, where nothing was to be counted:
+  bool knows_last_ = false;
+  std::uint32_t last_label_ = 0;
+  ClassId last_class_ = 0;
+};
+
+/// Which ranges hits can have.
+class RangeLimits {
+ public:
+  RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
+      : sensor_(sensor), reach_(sensor.reach()), none_at_max_(sensor.knowsRange() && none_at_max) {}
+
+  /// False for NaN and infinity.
+  bool contain(float range) const {
+    return range >= kSensorRadius && range >= sensor_.min_range && range <= reach_ && !isAtMax(range);
+  }
+  bool isAtMax(float range) const {
+    return none_at_max_ && std::abs(range - sensor_.max_range) <= kAtMaxRange * sensor_.max_range;
+  }
+  /// Counts a point that no hit can be. @return whether its beam met nothing up to max_range.
+  bool countOutside(const Eigen::Vector3f& point, float range, PointCounts& counts) const {
+    if (!point.allFinite()) {
+      ++counts.not_finite;
+    } else if (range < kSensorRadius) {
+      ++counts.at_sensor;
+    } else if (range < sensor_.min_range) {
+      ++counts.too_near;
+    } else if (isAtMax(range)) {
+      ++counts.no_returns;
+      return true;
+    } else {
+      ++counts.beyond_max;
+      return sensor_.knowsRange();
+    }
+    return false;
+  }
+
+ private:
+  const SensorModelConfig& sensor_;
+  double reach_;
+  bool none_at_max_;
+};
+
+/// Whether the shares of the classes in a point are probabilities: evidence must stay finite.
+bool areShares(const ClassShare* begin, const ClassShare* end) {
+  constexpr float kMost = 1.001f;  // with room for rounding
+  return std::all_of(begin, end, [=](const ClassShare& s) { return s.share > 0.0f && s.share <= kMost; });
+}
+
+}  // namespace
+
+PointCounts& PointCounts::operator+=(const PointCounts& other) {
+  for (const auto count : {&PointCounts::points, &PointCounts::used, &PointCounts::not_finite,
+                           &PointCounts::at_sensor, &PointCounts::too_near, &PointCounts::beyond_max,
+                           &PointCounts::outside_map, &PointCounts::unknown_label, &PointCounts::unlabelled,
+                           &PointCounts::no_returns, &PointCounts::labels_not_in_table}) {
+    this->*count += other.*count;
+  }
+  return *this;
+}
+
+void ScanPreprocessor::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first,
+                                  std::size_t last, const Sorted& into) const {
+  const float safe_range = cells_.safeRange(scan.origin);
+  const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
+  const RangeLimits limits(sensor, scan.no_returns_at_max_range);
+  ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
+  PointCounts counts;
+  counts.points = last - first;
+  for (std::size_t i = first; i < last; ++i) {
+    const Eigen::Vector3f& point = scan.points[i];
+    const float range = point.norm();
+    if (!limits.contain(range)) {
+      if (limits.countOutside(point, range, counts) &&
+          (config_.clear_beyond_max_range || limits.isAtMax(range))) {
+        addCut(scan.origin, point * (static_cast<float>(sensor.max_range) / range), into.cut);
+      }
+    } else if (!(range < safe_range) && !cells_.contains(scan.origin + point.cast<double>())) {
+      ++counts.outside_map;
+    } else if (!scan.soft.empty() && !areShares(scan.soft.begin(i), scan.soft.end(i))) {
+      ++counts.not_finite;
+    } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
+      ++counts.used;
+      into.hits.add(point, *id);
+      if (!scan.soft.empty()) into.used.push_back({static_cast<std::uint32_t>(i), *id});
+    }
+  }
+  into.counts = counts;
+}
+
+void ScanPreprocessor::addCut(const Eigen::Vector3d& origin, const Eigen::Vector3f& end,
+                              Downsampler::Input& cut) const {
+  if (cells_.contains(origin + end.cast<double>())) cut.add(end, kFreeClass);
+}
+
+void ScanPreprocessor::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
+  const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
+  for (const Eigen::Vector3f& direction : scan.no_returns) {
+    const float length = direction.norm();
+    ++seen_.counts.points;
+    if (!direction.allFinite() || !(length > 0.0f) || !sensor.knowsRange()) {
+      ++seen_.counts.not_finite;
+      continue;
+    }
+    ++seen_.counts.no_returns;
+    addCut(scan.origin, direction * (static_cast<float>(sensor.max_range) / length), cut);
+  }
+}
+
+const PreprocessedScan& ScanPreprocessor::observe(const Scan& scan, const ClassTable& classes,
+                                                  ThreadPool& pool, bool beams) {
+  if (scan.labels.size() != scan.points.size()) {
+    throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
+                                std::to_string(scan.labels.size()) + " labels; give one label a point");
+  }
+  if (!scan.soft.empty() && scan.soft.size() != scan.points.size()) {
+    throw std::invalid_argument("the scan has soft labels, but not one set a point");
+  }
+  const Chunks chunks(scan.points.size());
+  if (used_.size() < chunks.count()) used_.resize(chunks.count());
+  for (auto& used : used_) used.clear();
+  const bool ordered = beams || !scan.soft.empty();
+  const std::size_t no_returns = chunks.count();  // a chunk of its own
+  hits_.start(scan.origin, chunks.count(), pool, ordered);
+  cut_.start(scan.origin, chunks.count() + 1, pool, true);
+  counts_.assign(chunks.count(), {});
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
+    sortPoints(scan, classes, chunks.begin(c), chunks.end(c),
+               {hits_.open(c, worker), cut_.open(c, worker), used_[c], counts_[c]});
+    hits_.close(c, worker);
+    cut_.close(c, worker);
+  });
+  seen_.counts = {};
+  for (const PointCounts& counts : counts_) seen_.counts += counts;
+  addNoReturns(scan, cut_.open(no_returns, 0));
+  cut_.close(no_returns, 0);
+  hits_.finish(pool);
+  seen_.hits.points.clear();
+  seen_.hits.labels.clear();
+  if (ordered) hits_.inOrder(pool, seen_.hits);
+  seen_.soft.clear();
+  if (!scan.soft.empty()) mergeSoftLabels(scan, used_, config_.downsample_resolution, seen_.hits, seen_.soft);
+  seen_.beams.origin = scan.origin;
+  seen_.beams.ends.clear();
+  if (beams) {
+    cut_.finish(pool);
+    cut_.inOrder(pool, cut_points_);
+    appendBeams(seen_.hits.points, pool);
+    appendBeams(cut_points_.points, pool);
+  }
+  return seen_;
+}
+
+void ScanPreprocessor::appendBeams(const std::vector<Eigen::Vector3f>& ends, ThreadPool& pool) {
+  std::vector<Eigen::Vector3f>& beams = seen_.beams.ends;
+  const std::size_t before = beams.size();
+  beams.resize(before + ends.size());
+  const Chunks chunks(ends.size());
+  std::atomic<bool> any_too_short{false};
+  const auto isTooShort = [](const Eigen::Vector3f& end) { return end.norm() < kSensorRadius; };
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    bool too_short = false;
+    for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
+      beams[before + i] = ends[i];
+      too_short |= isTooShort(ends[i]);
+    }
+    if (too_short) any_too_short = true;
+  });
+  if (any_too_short) beams.erase(std::remove_if(beams.begin(), beams.end(), isTooShort), beams.end());
+}
+
+}  // namespace bki_mapping

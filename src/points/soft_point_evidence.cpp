@@ -1,0 +1,107 @@
+#include "points/soft_point_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "points/axis_blocks.h"
+
+namespace bki_mapping {
+
+void SoftPointEvidence::bin(const Eigen::Vector3d& point, const ClassShare* begin, const ClassShare* end) {
+  const VoxelIndex voxel = geometry_.voxelAt(point);
+  const BlockIndex home = GridGeometry::blockOf(voxel);
+  const auto offset = static_cast<std::uint16_t>(GridGeometry::offsetInBlock(voxel));
+  const auto append = [&](const GridIndex& block, double x, double y, double z) {
+    const std::uint32_t number = blocks_.insert(block);
+    if (number == records_.size()) records_.emplace_back();
+    for (const ClassShare* s = begin; s != end; ++s) {
+      const LocalPoint local{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z), s->id,
+                             block == home ? offset : LocalPoint::kOutside};
+      records_[number].push_back({local, s->share});
+    }
+  };
+  const Eigen::Vector3d p = point / geometry_.resolution();
+  const double x = p.x() - home.x * kBlockEdge - 0.5, y = p.y() - home.y * kBlockEdge - 0.5,
+               z = p.z() - home.z * kBlockEdge - 0.5;
+  bool at_home = false;
+  if (kernel_.type == KernelType::kSparse) {
+    const double reach = kernel_.reach;
+    for (const AxisBlock& bz : AxisBlocks(home.z, z, reach)) {
+      for (const AxisBlock& by : AxisBlocks(home.y, y, reach)) {
+        for (const AxisBlock& bx : AxisBlocks(home.x, x, reach)) {
+          if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
+          const GridIndex block{bx.block, by.block, bz.block};
+          append(block, bx.local, by.local, bz.local);
+          at_home |= block == home;
+        }
+      }
+    }
+  }
+  if (!at_home && (protect_ || kernel_.type == KernelType::kCounting)) append(home, x, y, z);
+}
+
+void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points,
+                                  const SoftLabels& soft) {
+  blocks_.clear();
+  records_.clear();
+  for (std::size_t i = 0; i < points.points.size(); ++i) {
+    bin(origin + points.points[i].cast<double>(), soft.begin(i), soft.end(i));
+  }
+  for (auto& records : records_) {
+    std::stable_sort(records.begin(), records.end(),
+                     [](const Record& a, const Record& b) { return a.point.label < b.point.label; });
+  }
+}
+
+const std::vector<GridIndex>& SoftPointEvidence::collectBlocks(const SemanticMap&, std::size_t most,
+                                                               ThreadPool&) {
+  limitBlocks(blocks_.size(), most);
+  return blocks_.members();
+}
+
+void SoftPointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
+  for (const Record& record : records_[number]) classes.set(record.point.label);
+}
+
+void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
+  const LocalPoint& point = record.point;
+  if (kernel_.type == KernelType::kCounting) {
+    sums[point.voxel] += record.share;
+    return;
+  }
+  const float weight = record.share * kernel_.scale;
+  for (int v = 0; v < kBlockVoxels; ++v) {
+    const float dx = static_cast<float>(v % kBlockEdge) - point.x,
+                dy = static_cast<float>(v / kBlockEdge % kBlockEdge) - point.y,
+                dz = static_cast<float>(v / (kBlockEdge * kBlockEdge)) - point.z;
+    const float t = (dx * dx + dy * dy + dz * dz) * kernel_.inverse_reach2;
+    if (t < 1.0f) sums[v] += weight * sparseKernel(t);
+  }
+}
+
+void SoftPointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
+                              EvidenceScratch& scratch) const {
+  const std::vector<Record>& records = records_[number];
+  const bool limited = std::isfinite(scratch.limits.hits);
+  if (limited) {
+    scratch.sums.fill(0.0f);
+    for (const Record& record : records) addRecord(record, scratch.sums.data());
+    scratch.shareHits();
+  }
+  for (std::size_t i = 0; i < records.size();) {
+    const auto label = static_cast<ClassId>(records[i].point.label);
+    scratch.sums.fill(0.0f);
+    for (; i < records.size() && records[i].point.label == label; ++i) {
+      const std::uint16_t voxel = records[i].point.voxel;
+      if (protect_ && voxel != LocalPoint::kOutside) scratch.held.set(voxel);
+      addRecord(records[i], scratch.sums.data());
+    }
+    if (protect_evidence_) scratch.holdSums();
+    if (limited) scratch.limitHits();
+    const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(),
+                                                 [](float sum) { return sum == 0.0f; });
+    if (!nothing) scratch.not_finite += block.add(label, scratch.sums.data());
+  }
+}
+
+}  // namespace bki_mapping

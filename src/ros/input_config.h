@@ -1,0 +1,43 @@
+/// @file Settings of one input of clouds.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/mapping/mapper_config.h"
+
+namespace bki_mapping::ros_shell {
+
+/// How a cloud tells the class of a point.
+enum class LabelEncoding {
+  kNumber,  ///< a field with the label number
+  kRgb,     ///< colours of the class table: one field 0x00RRGGBB, as PCL packs it, or three fields r,g,b
+  kBgr,     ///< the same with red and blue exchanged
+  kScores,  ///< one field, or one component of a field, for each class
+  kTopK,    ///< fields, or components, with labels, and as many with their scores
+};
+
+enum class ColorMatch { kExact, kNearest };
+enum class ScoreType { kProbability, kLogit };
+
+/// Where clouds come from and what their fields mean.
+struct InputConfig {
+  std::string topic = "cloud_in";
+  std::string label_field = "label";  ///< "": every point has label 0; kRgb: one or three; kTopK: k names
+  LabelEncoding label_encoding = LabelEncoding::kNumber;
+  ColorMatch color_match = ColorMatch::kExact;
+  std::string score_fields;  ///< kScores: CLASS=FIELD pairs, or one field of many components; kTopK: k names
+  ScoreType score_type = ScoreType::kProbability;
+  std::string sensor_frame_id;  ///< frame at whose origin beams start; "": the cloud's
+  std::string time_field;       ///< field with the time of each point; "": all have the cloud's stamp
+  bool clear_no_returns = false;
+  SensorModelConfig sensor_model;
+};
+
+/// The parameters that each input may have of its own, but for topic and ranges.
+std::vector<NamedParameter<InputConfig>> inputParameters();
+/// All parameters below `inputs/NAME/`.
+std::vector<NamedParameter<InputConfig>> ownInputParameters();
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,153 @@
+/// @file What the publishers of map topics have in common.
+#pragma once
+
+#include <geometry_msgs/PoseStamped.h>
+#include <ros/console.h>
+#include <ros/node_handle.h>
+#include <ros/single_subscriber_publisher.h>
+#include <std_msgs/Header.h>
+
+#include <exception>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "parallel/index_numbering.h"
+#include "ros/server_config.h"
+
+namespace bki_mapping::ros_shell {
+
+/// The state of a server that publishers show.
+struct MapSnapshot {
+  std_msgs::Header header;  ///< map frame, stamp of the last scan
+  const SemanticMapper& mapper;
+  const std::vector<geometry_msgs::PoseStamped>& trajectory;  ///< sensor poses of integrated scans
+  const ServerConfig& config;
+  Eigen::Vector3d sensor;  ///< where the last beams started, map frame [m]
+
+  /// Whether a cube around a point is within view_range of the sensor, or there is no such limit.
+  /// @param edge of the cube [m].
+  bool inView(const Eigen::Vector3d& centre, double edge) const {
+    const double beyond = (centre - sensor).cwiseAbs().maxCoeff() - 0.5 * edge;
+    return config.view_range <= 0.0 || beyond <= config.view_range;
+  }
+  /// Whether a height is within view_min_z and view_max_z.
+  bool heightInView(double z) const { return z >= config.view_min_z && z <= config.view_max_z; }
+  bool inView(const BlockIndex& block) const {
+    const GridGeometry& geometry = mapper.map().geometry();
+    return inView(geometry.blockCentre(block), geometry.blockSize());
+  }
+};
+
+/// Which blocks changed since they were last published.
+class ChangedBlocks {
+ public:
+  void add(const std::vector<GridIndex>& blocks) {
+    if (all_) return;
+    for (const GridIndex& block : blocks) blocks_.insert(block);
+  }
+  void addAll() {
+    all_ = true;
+    blocks_.clear();
+  }
+  void clear() {
+    all_ = false;
+    blocks_.clear();
+  }
+  bool all() const { return all_; }
+  bool empty() const { return !all_ && blocks_.size() == 0; }
+  /// Changed, made or erased blocks; not filled where all() is true.
+  const std::vector<GridIndex>& blocks() const { return blocks_.members(); }
+
+ private:
+  IndexNumbering blocks_;
+  bool all_ = false;
+};
+
+/// Publishes one topic. Messages are built only while somebody listens.
+class MapPublisher {
+ public:
+  virtual ~MapPublisher() = default;
+  virtual bool wanted() const { return publisher_.getNumSubscribers() > 0; }
+  std::string topic() const { return publisher_.getTopic(); }
+  /// Publishes what is new since the last call, or all of it; then nothing is new.
+  void publish(const MapSnapshot& snapshot) {
+    publishNew(snapshot);
+    changed.clear();
+  }
+  /// Calls build(). A message that memory does not hold is left out, and said; mapping goes on, and the topic
+  /// is tried again when it is next due.
+  template <typename Build>
+  void tryTo(Build&& build) {
+    try {
+      build();
+    } catch (const std::exception& fault) {
+      ROS_ERROR_THROTTLE(5.0,
+                         "%s could not be published (%s): the map is too large for the memory that is left; "
+                         "set view_range, window or memory_limit, or listen to the topic with updates",
+                         topic().c_str(), fault.what());
+    }
+  }
+  /// Called instead of publish while nobody listens.
+  virtual void rest() { changed.clear(); }
+  /// The topics look different from now on, or somebody asks for all of it.
+  virtual void startOver() { changed.addAll(); }
+
+  ChangedBlocks changed;
+
+ protected:
+  virtual void publishNew(const MapSnapshot& snapshot) = 0;
+
+  ros::Publisher publisher_;
+};
+
+/// What a publisher is made from.
+struct PublisherContext {
+  ros::NodeHandle& node;
+  const ServerConfig& config;
+  std::function<MapSnapshot()> snapshot;  ///< the map as it is now
+
+  /// A topic with whole maps: whoever starts to listen makes `owner` publish again.
+  template <typename Message>
+  ros::Publisher advertiseWhole(const std::string& topic, MapPublisher& owner) const {
+    return advertise<Message>(
+        topic, [&owner](const ros::SingleSubscriberPublisher&) { owner.changed.addAll(); }, config.latch);
+  }
+  /// A topic with updates. `send(subscriber, snapshot)` gives the whole map to one new subscriber alone; what
+  /// was new is published before, so that the whole map is as new as the last update.
+  template <typename Message, typename Send>
+  ros::Publisher advertiseUpdates(const std::string& topic, MapPublisher& owner, Send&& send) const {
+    const auto connected = [&owner, send, make = snapshot](const ros::SingleSubscriberPublisher& subscriber) {
+      owner.tryTo([&] {
+        const MapSnapshot now = make();
+        if (!owner.changed.empty()) owner.publish(now);
+        send(subscriber, now);
+      });
+    };
+    return advertise<Message>(topic, connected, false);
+  }
+
+ private:
+  template <typename Message, typename Connected>
+  ros::Publisher advertise(const std::string& topic, const Connected& connected, bool latch) const {
+    return node.advertise<Message>(topic, 10, connected, ros::SubscriberStatusCallback(), ros::VoidConstPtr(),
+                                   latch);
+  }
+};
+
+/// One of each: the registry of publishers.
+std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context);
+
+std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeVoxelCloud(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,50 @@
+/// @file The mapper's health on /diagnostics.
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+
+#include <chrono>
+#include <string>
+
+#include "bki_mapping/mapping/mapper_config.h"
+#include "ros/health.h"
+#include "ros/scan_ledger.h"
+
+namespace bki_mapping::ros_shell {
+
+/// Judges the time between two reports.
+/// - ERROR: clouds came and none was integrated.
+/// - WARN: clouds were dropped, mapping is slower than clouds come, is paused, no cloud has come, or the map
+///   stays empty though points are used.
+/// - What judgePoints says of the points of integrated clouds.
+Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config,
+             const Health& points = {});
+
+/// Reports every `period`.
+class MappingDiagnostics {
+ public:
+  /// @param name of the diagnostic status, as rqt_robot_monitor shows it. @param period [s of wall time].
+  MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, double period);
+
+  /// Reports if it is time to.
+  /// @param status, points asked for only then: the status, and what is to be said of points since last time.
+  template <typename Status, typename Points>
+  void update(Status&& status, Points&& points, const MapperConfig& config) {
+    const auto now = std::chrono::steady_clock::now();
+    if (std::chrono::duration<double>(now - last_).count() < period_) return;
+    last_ = now;
+    report(status(), config, points());
+  }
+
+ private:
+  void report(const MappingStatus& status, const MapperConfig& config, const Health& points);
+  void fill(diagnostic_updater::DiagnosticStatusWrapper& out) const;
+
+  diagnostic_updater::Updater updater_;
+  double period_;
+  std::chrono::steady_clock::time_point last_;
+  MappingStatus before_, now_;
+  Health health_;
+};
+
+}  // namespace bki_mapping::ros_shell

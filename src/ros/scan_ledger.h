@@ -1,0 +1,75 @@
+/// @file The account of every cloud: received = integrated + dropped + waiting.
+#pragma once
+
+#include <bki_mapping/MappingStatus.h>
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "ros/rolling_statistics.h"
+
+namespace bki_mapping::ros_shell {
+
+/// Why a cloud is not in the map.
+enum class DropReason {
+  kNoTransform,
+  kTransformLate,
+  kTooOld,
+  kUnknownFrame,
+  kBadTransform,
+  kBadCloud,
+  kEmpty,
+  kQueueFull,
+  kTooLarge,
+  kMemory,
+  kPaused,
+  kTimeJump,
+};
+
+/// A reason's name, and its counter in the status.
+struct DropKind {
+  DropReason reason;
+  const char* name;
+  std::uint64_t MappingStatus::*count;
+};
+/// All reasons, in the order of the enumeration.
+const std::vector<DropKind>& dropKinds();
+
+/// Counts clouds and measures how long they took. Not for several threads at once.
+class ScanLedger {
+ public:
+  using Clock = RateMeter::Clock;
+
+  void received(Clock::time_point now);
+  /// @param latency from the reception to the map [s].
+  void integrated(const std_msgs::Header& header, const ScanStats& stats, double latency,
+                  Clock::time_point now);
+  /// @param why with the remedy.
+  void dropped(const std_msgs::Header& header, DropReason reason, const std::string& why);
+  /// Labels that are not in the class table.
+  void unknownLabels(const std::map<std::uint32_t, std::size_t>& counts);
+  void timeJumped() { ++status_.time_jumps; }
+
+  std::uint64_t droppedClouds() const;
+  const RollingStatistics& integration() const { return integration_; }  ///< [ms]
+
+  /// The status; rates and quantiles as of `now`. @param waiting clouds in the queue, as the queue counts
+  /// them.
+  MappingStatus status(Clock::time_point now, std::size_t waiting);
+  /// All counts in one line, for the log.
+  std::string summary(std::size_t waiting) const;
+
+ private:
+  /// Unknown labels are told apart up to this many values.
+  static constexpr std::size_t kMostUnknown = 64;
+
+  MappingStatus status_;
+  RollingStatistics latency_, integration_;
+  RateMeter received_rate_, integrated_rate_;
+  std::map<std::uint32_t, std::uint64_t> unknown_;
+};
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,63 @@
+/// @file Scans from clouds and tf.
+#pragma once
+
+#include <sensor_msgs/PointCloud2.h>
+
+#include <map>
+#include <variant>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/scan.h"
+#include "ros/input_config.h"
+#include "ros/pose_source.h"
+
+namespace bki_mapping::ros_shell {
+
+/// A scan, and where it was taken.
+struct PlacedScan {
+  Scan scan;
+  Eigen::Isometry3d T_map_sensor;                       ///< at the cloud's stamp
+  std::map<std::uint32_t, std::size_t> unknown_labels;  ///< values that mean no class, and points with them
+};
+
+/// Reads the clouds of one input.
+class ScanReader {
+ public:
+  /// @param classes must live as long as the reader.
+  ScanReader(const InputConfig& input, const std::string& map_frame, const ClassTable& classes,
+             LabelValues label_values)
+      : input_(input), map_frame_(map_frame), classes_(classes), label_values_(label_values) {}
+
+  /// The scan of a cloud, or why its pose is missing (perhaps only yet).
+  /// @throws std::invalid_argument in one sentence if the cloud does not have what the input's settings name.
+  std::variant<PlacedScan, MissingPose> read(const sensor_msgs::PointCloud2& cloud,
+                                             const PoseSource& poses) const;
+
+  /// Whether tf can tell by now where the cloud was taken; cheaper than read.
+  bool ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const;
+
+  /// Whether the cloud is in the map frame and no other frame is named for the beams' origin.
+  bool originDoubtful(const sensor_msgs::PointCloud2& cloud) const {
+    return input_.sensor_frame_id.empty() && cloud.header.frame_id == map_frame_;
+  }
+  const InputConfig& input() const { return input_; }
+
+ private:
+  std::string sensorFrame(const sensor_msgs::PointCloud2& cloud) const {
+    return input_.sensor_frame_id.empty() ? cloud.header.frame_id : input_.sensor_frame_id;
+  }
+
+  /// When the poses of a cloud are looked up: at its stamp, or, for a stamp of 0, at the latest time at which
+  /// both frames have one, so that both are of the same time. None while there is no such time.
+  std::optional<ros::Time> timeOf(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const {
+    if (!cloud.header.stamp.isZero()) return cloud.header.stamp;
+    return poses.latestCommon(map_frame_, sensorFrame(cloud), cloud.header.frame_id);
+  }
+
+  InputConfig input_;
+  std::string map_frame_;
+  const ClassTable& classes_;
+  LabelValues label_values_;
+};
+
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,53 @@
+/// @file A spinning lidar in a simulated scene.
+#pragma once
+
+#include "bki_mapping/io/sequence.h"
+#include "simulation/scene.h"
+
+namespace bki_mapping::simulation {
+
+struct LidarConfig {
+  int beams = 64;             ///< rows, spread evenly in elevation
+  int columns = 1800;         ///< azimuth steps a turn
+  double lowest = -0.43;      ///< elevation of the first row [rad]
+  double highest = 0.04;      ///< elevation of the last row [rad]
+  double max_range = 80.0;    ///< no return beyond this [m]
+  double range_noise = 0.02;  ///< standard deviation [m]
+  double label_noise = 0.0;   ///< share of points with the label of a random shape
+  double rate = 10.0;         ///< turns a second
+  std::uint64_t seed = 1;     ///< of the noise
+};
+
+/// One turn, taken at one moment (no motion within it).
+/// @param T_world_sensor pose at that moment. @param time [s]. @param scan number, a key of the noise.
+/// @return points in the sensor frame with raw SemanticKITTI labels; pose and stamp are left to the caller.
+SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
+                   double time, std::uint64_t scan);
+
+/// All that a drive depends on.
+struct DriveConfig {
+  int scans = 100;         ///< length of the drive
+  double speed = 8.0;      ///< [m/s]
+  std::uint64_t seed = 1;  ///< of the street
+  LidarConfig lidar;
+};
+
+/// A drive along the street of makeStreet.
+class Drive {
+ public:
+  /// @throws std::invalid_argument if a setting is out of its limits.
+  explicit Drive(const DriveConfig& config);
+
+  std::size_t size() const { return static_cast<std::size_t>(config_.scans); }
+  const Scene& scene() const { return scene_; }
+  double timeOf(std::size_t i) const { return static_cast<double>(i) / config_.lidar.rate; }  ///< [s]
+  Eigen::Isometry3d T_world_sensor(std::size_t i) const;
+  /// Frame i, with its pose in the map frame (the sensor's at frame 0) and its stamp.
+  SequenceFrame frame(std::size_t i) const;
+
+ private:
+  DriveConfig config_;
+  Scene scene_;
+};
+
+}  // namespace bki_mapping::simulation

@@ -1,0 +1,120 @@
+// The beam table and the R-tree find every beam that passes a ball: at the seam, at the poles, at the sensor.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "beams/beam_index.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+/// A table, and the order in which it wants its beams.
+struct SortedTable {
+  std::unique_ptr<BeamTable> table = std::make_unique<BeamTable>();
+  std::vector<std::uint32_t> order;
+};
+
+SortedTable sortedTable(const std::vector<Eigen::Vector3f>& directions) {
+  SortedTable result;
+  std::vector<std::uint32_t> cells;
+  for (const Eigen::Vector3f& u : directions) cells.push_back(BeamTable::cellOf(u));
+  result.table->build(cells, result.order);
+  return result;
+}
+
+std::unique_ptr<BeamIndex> makeBeamIndex(BeamIndexType type, const std::vector<Eigen::Vector3f>& directions) {
+  if (type == BeamIndexType::kRtree) return makeBeamRtree(directions);
+  return std::move(sortedTable(directions).table);
+}
+
+std::vector<Eigen::Vector3f> sorted(const std::vector<Eigen::Vector3f>& directions) {
+  std::vector<Eigen::Vector3f> result;
+  for (const std::uint32_t b : sortedTable(directions).order) result.push_back(directions[b]);
+  return result;
+}
+
+std::vector<std::uint32_t> query(const BeamIndex& index, const Eigen::Vector3f& centre, float radius) {
+  std::vector<BeamRange> ranges;
+  std::vector<std::uint32_t> beams;
+  index.query(centre, radius, ranges);
+  for (const BeamRange& range : ranges) {
+    for (std::uint32_t b = range.first; b < range.last; ++b) beams.push_back(b);
+  }
+  return beams;
+}
+
+std::vector<Eigen::Vector3f> directionsOf(const Scan& scan) {
+  std::vector<Eigen::Vector3f> directions;
+  for (const auto& point : scan.points) directions.push_back(point.normalized());
+  return sorted(directions);
+}
+
+/// The half-lines that pass a ball, one by one.
+std::set<std::uint32_t> bruteForce(const std::vector<Eigen::Vector3f>& directions,
+                                   const Eigen::Vector3d& centre, double radius) {
+  std::set<std::uint32_t> found;
+  for (std::uint32_t b = 0; b < directions.size(); ++b) {
+    const Eigen::Vector3d u = directions[b].cast<double>().normalized();
+    const double along = std::max(0.0, centre.dot(u));
+    if ((centre - along * u).norm() < radius - 1e-6) found.insert(b);
+  }
+  return found;
+}
+
+class BothIndices : public testing::TestWithParam<BeamIndexType> {};
+
+TEST_P(BothIndices, FindAllBeamsOfEveryBall) {
+  std::mt19937 random(9);
+  for (const reference::Scene& scene : reference::nastyScenes(400)) {
+    const auto directions = directionsOf(scene.scan);
+    const auto index = makeBeamIndex(GetParam(), directions);
+    for (int trial = 0; trial < 300; ++trial) {
+      // Balls about places on beams, about the axes and the seam, and everywhere.
+      const float scale = std::uniform_real_distribution<float>(0.0f, 1.5f)(random);
+      Eigen::Vector3f centre = scene.scan.points[random() % scene.scan.points.size()] * scale;
+      if (trial % 3 == 1) centre[static_cast<int>(random() % 3)] = 0.0f;
+      if (trial % 3 == 2) centre += Eigen::Vector3f::Random() * 0.5f;
+      const float radius = std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
+      const std::vector<std::uint32_t> beams = query(*index, centre, radius);
+      const std::set<std::uint32_t> found(beams.begin(), beams.end());
+      EXPECT_EQ(found.size(), beams.size()) << scene.name << ": a beam is named twice";
+      for (const std::uint32_t b : bruteForce(directions, centre.cast<double>(), radius)) {
+        ASSERT_TRUE(found.count(b)) << scene.name << ": beam " << b << " misses at " << centre.transpose();
+      }
+    }
+  }
+}
+
+TEST_P(BothIndices, NameFewOthers) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  std::vector<Eigen::Vector3f> directions;
+  for (int i = 0; i < 20000; ++i) {
+    directions.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
+  }
+  directions = sorted(directions);
+  const auto index = makeBeamIndex(GetParam(), directions);
+  std::size_t named = 0, needed = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Vector3f centre = 10.0f * directions[static_cast<std::size_t>(trial)];
+    named += query(*index, centre, 1.0f).size();
+    needed += bruteForce(directions, centre.cast<double>(), 1.0).size();
+  }
+  EXPECT_LT(named, 3 * needed);
+}
+
+TEST_P(BothIndices, AllBeamsAtTheSensorAndNoneOfNone) {
+  const auto directions = directionsOf(reference::nastyScenes(50)[0].scan);
+  const Eigen::Vector3f near(0.1f, 0.0f, 0.0f), far(1.0f, 0.0f, 0.0f);
+  EXPECT_EQ(query(*makeBeamIndex(GetParam(), directions), near, 0.2f).size(), directions.size());
+  EXPECT_TRUE(query(*makeBeamIndex(GetParam(), {}), far, 0.2f).empty());
+  EXPECT_TRUE(query(*makeBeamIndex(GetParam(), {}), near, 0.2f).empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Indices, BothIndices, testing::Values(BeamIndexType::kTable, BeamIndexType::kRtree));
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,107 @@
+// What tracks say of distances from a beam and of places along it is what geometry says.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "beams/raster/beam_tracks.h"
+#include "simd/inner_loops.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr double kResolution = 0.3;
+
+std::vector<Eigen::Vector3f> directions() {
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  std::vector<Eigen::Vector3f> all;
+  for (int n = 0; n < 3000; ++n) {
+    Eigen::Vector3f beam(normal(random), normal(random), n % 2 == 0 ? 0.1f * normal(random) : normal(random));
+    all.push_back(20.0f * beam.normalized());
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float sign : {-1.0f, 1.0f}) all.emplace_back(7.0f * sign * Eigen::Vector3f::Unit(axis));
+  }
+  all.emplace_back(5.0f, 5.0f, 0.0f);
+  all.emplace_back(-5.0f, 5.0f, 5.0f);
+  return all;
+}
+
+/// The slices of a track: a place in the slice through the sensor, one step to the next slice's.
+struct Basis {
+  Eigen::Vector3d side, height, across;  ///< across: 1 from slice to slice
+
+  explicit Basis(BeamSlicing slicing) {
+    const Eigen::Vector3d main = Eigen::Vector3d::Unit(slicing.axis),
+                          beside = Eigen::Vector3d::Unit(kSideAxis[slicing.axis]);
+    height = Eigen::Vector3d::Unit(kHeightAxis[slicing.axis]);
+    side = slicing.skew == 0 ? beside : Eigen::Vector3d(main - 2.0 * slicing.skew * beside);
+    across = slicing.skew == 0 ? main : Eigen::Vector3d(2.0 * main + slicing.skew * beside);
+  }
+};
+
+void expectTracksAgreeWithGeometry(const InnerLoops& loops) {
+  ThreadPool pool(2);
+  const double unit = static_cast<double>(loops.kernel_unit);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> uniform(-3.0, 3.0);
+  const std::vector<Eigen::Vector3f> ends = directions();
+  for (const double reach : {0.4, 1.0, 1.5, 4.0}) {  // [voxels]
+    BeamTracks tracks;
+    tracks.set({{}, ends}, kResolution, reach * kResolution, loops, pool);
+    int skews = 0, straights = 0;
+    for (std::size_t b = 0; b < ends.size(); ++b) {
+      const BeamTrack& track = tracks.arrays().tracks[b];
+      const BeamSlicing slicing = BeamSlicing::of(track.slicing);
+      ASSERT_EQ(slicing.number(), track.slicing);
+      EXPECT_EQ(static_cast<float>(slicing.skew), tracks.arrays().skew[b]);
+      (slicing.skew == 0 ? straights : skews) += 1;
+      const Basis basis(slicing);
+      const Eigen::Vector3d end = ends[b].cast<double>() / kResolution, u = end.normalized();
+      // On the beam in slice 1, as the track has it.
+      Eigen::Vector3d at = u / u.dot(basis.across);
+      EXPECT_NEAR(track.rho_slice, at.dot(u) / end.norm(), 1e-6);
+      Eigen::Vector3d place = track.slope_height * basis.height;
+      if (slicing.skew == 0) {
+        place += basis.across + track.slope_side * basis.side;
+      } else {
+        place +=
+            slicing.skew * Eigen::Vector3d::Unit(kSideAxis[slicing.axis]) + track.slope_side * basis.side;
+      }
+      EXPECT_LT((place - at).norm(), 1e-6);
+      for (int n = 0; n < 10; ++n) {
+        const double side = uniform(random), height = uniform(random);
+        const Eigen::Vector3d p = side * basis.side + height * basis.height;
+        const double distance = (p - p.dot(u) * u).norm() / reach * unit;
+        const double e = side * track.e_side + height * track.e_height, g = height * track.g_height;
+        EXPECT_NEAR(std::hypot(e, g), distance, unit * 5e-6 * (1.0 + 1.0 / reach)) << ends[b].transpose();
+        EXPECT_NEAR(side * track.rho_side + height * track.rho_height, p.dot(u) / end.norm(), 1e-6);
+        if (distance < unit * kReachThatCounts) {
+          EXPECT_LE(std::abs(side), track.half_side + 1e-5f);
+          EXPECT_LE(std::abs(height), track.half_height + 1e-5f);
+        }
+      }
+    }
+    EXPECT_EQ(skews > 0, reach <= 1.0) << reach;
+    EXPECT_EQ(straights > 0, reach > 1.0) << reach;
+  }
+}
+
+TEST(BeamTracks, AgreeWithGeometryOnEachInstructionSet) {
+  for (const std::string& set : instructionSets()) {
+    SCOPED_TRACE(set);
+    expectTracksAgreeWithGeometry(innerLoopsFor(set));
+  }
+}
+
+TEST(BeamTracks, KernelsOfMoreThan72VoxelsAreTooLong) {
+  ThreadPool pool(1);
+  BeamTracks tracks;
+  const InnerLoops& loops = innerLoopsFor("");
+  tracks.set({{}, directions()}, 0.1, 7.2, loops, pool);
+  EXPECT_THROW(tracks.set({{}, directions()}, 0.1, 7.21, loops, pool), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace bki_mapping

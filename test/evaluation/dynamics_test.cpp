@@ -1,0 +1,93 @@
+// SA, DA and AA on drives made by hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "evaluation/dynamics.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+Scan scanOf(const std::vector<std::pair<Eigen::Vector3f, std::uint32_t>>& points) {
+  Scan scan;
+  for (const auto& [point, label] : points) {
+    scan.points.push_back(point);
+    scan.labels.push_back(label);
+  }
+  return scan;
+}
+
+/// A map in which the voxels of these points are occupied; voxels of 1 m.
+SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
+  SemanticMap map(GridGeometry(1.0), 0.001, 4);
+  for (const Eigen::Vector3d& point : occupied) {
+    float plane[kBlockVoxels] = {};
+    const VoxelIndex voxel = map.geometry().voxelAt(point);
+    plane[GridGeometry::offsetInBlock(voxel)] = 1.0f;
+    map.getOrAllocate(GridGeometry::blockOf(voxel)).add(1, plane);
+  }
+  return map;
+}
+
+TEST(DynamicsQuality, CountsPointByPoint) {
+  // Label 10 stands, 20 moves, 0 is unlabelled, 99 is in no class. Four scans: two early, one late.
+  const auto classes = reference::smallTable();
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
+  evaluation.add(scanOf({{{0.5f, 0, 0}, 10}, {{0.6f, 0, 0}, 10}, {{5.5f, 0, 0}, 20}, {{7.5f, 0, 0}, 20}}),
+                 *classes);
+  evaluation.add(scanOf({{{2.5f, 0, 0}, 10}, {{5.6f, 0, 0}, 20}, {{9.5f, 0, 0}, 20}, {{9.5f, 0, 0}, 0}}),
+                 *classes);
+  evaluation.add(scanOf({{{11.5f, 0, 0}, 20}, {{3.5f, 0, 0}, 99}, {{NAN, 0, 0}, 10}}), *classes);
+  evaluation.add(scanOf({{{9.5f, 0, 0}, 10}}), *classes);
+  const SemanticMap map = mapOf({{0.5, 0, 0}, {7.5, 0, 0}, {9.5, 0, 0}});
+  std::map<int, VoxelFate> fates;
+  for (const auto& [voxel, fate] : evaluation.fates(map)) fates[voxel.x] = fate;
+  EXPECT_EQ(fates, (std::map<int, VoxelFate>{{0, VoxelFate::kKept},
+                                             {2, VoxelFate::kLost},
+                                             {5, VoxelFate::kForgotten},
+                                             {7, VoxelFate::kLeft},
+                                             {9, VoxelFate::kKept}}));
+  const DynamicsQuality quality = evaluation.compare(map);
+  EXPECT_EQ(quality.static_points, 4u);
+  EXPECT_EQ(quality.static_kept, 3u);    // two at 0.5, one at 9.5; 2.5 is lost
+  EXPECT_EQ(quality.moving_points, 3u);  // at 5.5, 5.6, 7.5; 9.5 is hit late, 11.5 is not early
+  EXPECT_EQ(quality.moving_removed, 2u);
+  EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.75);
+  EXPECT_DOUBLE_EQ(quality.dynamicAccuracy(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(quality.accuracy(), std::sqrt(0.5));
+  EXPECT_DOUBLE_EQ(quality.harmonicAccuracy(), 12.0 / 17.0);
+}
+
+TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
+  std::vector<SemanticClass> flagged = reference::smallTable()->classes();
+  flagged[1].ground = true;
+  flagged[2].dynamic = true;
+  const ClassTable classes("flags", flagged);
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {99}, 1, 1);
+  evaluation.add(scanOf({{{0.5f, 0, 0}, 10},
+                         {{0.6f, 0, 0}, 10},
+                         {{1.5f, 0, 0}, 10},
+                         {{2.5f, 0, 0}, 20},
+                         {{3.5f, 0, 0}, 20},
+                         {{4.5f, 0, 0}, 30}}),
+                 classes);
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}, {2.5, 0, 0}}));
+  EXPECT_DOUBLE_EQ(quality.groundAccuracy(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(quality.standingAccuracy(), 0.5);
+  EXPECT_DOUBLE_EQ(quality.otherAccuracy(), 0.0);
+  EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.5);
+  EXPECT_EQ(quality.floor_voxels, 2u);
+  EXPECT_DOUBLE_EQ(quality.holes(), 0.5);
+}
+
+TEST(DynamicsQuality, NothingToCountIsNoNumber) {
+  const DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}));
+  EXPECT_TRUE(std::isnan(quality.staticAccuracy()));
+  EXPECT_TRUE(std::isnan(quality.accuracy()));
+}
+
+}  // namespace
+}  // namespace bki_mapping

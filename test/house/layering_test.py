@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""Rooms include only rooms below them; the core knows neither ROS nor PCL."""
+import os
+import re
+import unittest
+
+ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
+LEVELS = [['core'], ['parallel', 'map'], ['simd', 'kernel', 'update', 'points', 'beams'], ['free_space'], ['mapping'],
+          ['io'], ['simulation'], ['evaluation'], ['ros', 'tools']]
+LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
+# What else a room may include, beside the standard library and Eigen.
+LIBRARIES = {
+    'beams/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
+    'mapping/semantic_mapper.cpp': ('malloc.h',),
+    'io': ('pcl/', 'yaml-cpp/'),
+    'evaluation': ('nlohmann/',),
+    'simulation': ('yaml-cpp/',),
+    'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
+    'tools': ('boost/program_options', 'nlohmann/', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
+}
+MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')
+POSIX = ('immintrin.h', 'dlfcn.h', 'fcntl.h', 'sys/', 'unistd.h')
+
+
+def sources():
+    for top in ('include/bki_mapping', 'src'):
+        for folder, _, files in os.walk(os.path.join(ROOT, top)):
+            for name in files:
+                path = os.path.join(folder, name)
+                yield os.path.relpath(path, os.path.join(ROOT, top)), path
+
+
+class Layering(unittest.TestCase):
+    def test_includes(self):
+        count = 0
+        for relative, path in sources():
+            room = relative.split(os.sep)[0]
+            self.assertIn(room, LEVEL, f'{path} is in no room')
+            with open(path) as file:
+                text = file.read()
+            for own in re.findall(r'#include "(?:bki_mapping/)?(\w+)/', text):
+                count += 1
+                self.assertLessEqual(LEVEL[own], LEVEL[room], f'{path} includes {own}')
+            allowed = LIBRARIES.get(room, ()) + LIBRARIES.get(relative, ())
+            for other in re.findall(r'#include <([^>]+)>', text):
+                if '/' not in other and not other.endswith('.h') or other.startswith('Eigen/'):
+                    continue
+                if room in ('ros', 'tools') and MESSAGES.match(other):
+                    continue
+                self.assertTrue(other.startswith(allowed + POSIX), f'{path} includes <{other}>')
+        self.assertGreater(count, 50)
+
+    def test_threads_start_in_one_place(self):
+        for relative, path in sources():
+            with open(path) as file:
+                starts = re.search(r'std::thread\b(?!::)|#pragma omp', file.read())
+            if starts:
+                self.assertIn(relative, ('parallel/thread_pool.h', 'parallel/thread_pool.cpp', 'ros/mapping_server.h', 'ros/mapping_server.cpp'))
+
+    def test_files_are_short(self):
+        for relative, path in sources():
+            with open(path) as file:
+                self.assertLessEqual(len(file.readlines()), 300, f'{relative}: look for the wall that is missing')
+
+
+if __name__ == '__main__':
+    unittest.main()

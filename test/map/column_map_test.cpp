@@ -1,0 +1,153 @@
+// The map from above: ground, clearance, occlusion and obstacles of columns built by hand; updates equal a
+// new look.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "bki_mapping/map/column_map.h"
+
+namespace bki_mapping {
+namespace {
+
+enum : ClassId { kRoad = 0, kCar = 1, kSky = 2 };
+
+ClassTable table() {
+  std::vector<SemanticClass> classes(3);
+  for (std::uint8_t id = 0; id < 3; ++id) {
+    classes[id].id = id;
+    classes[id].name = "class" + std::to_string(id);
+  }
+  classes[kRoad].ground = true;
+  classes[kSky].ignored = true;
+  return ClassTable("test", classes);
+}
+
+class Columns : public testing::Test {
+ protected:
+  Columns() : map_(GridGeometry(0.5), 0.001, 3) {}
+
+  void add(const VoxelIndex& voxel, ClassId id) {
+    std::vector<float> plane(kBlockVoxels, 0.0f);
+    plane[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] = 1.0f;
+    map_.getOrAllocate(GridGeometry::blockOf(voxel)).add(id, plane.data());
+  }
+  void occlude(const VoxelIndex& voxel) {
+    Block& block = map_.getOrAllocate(GridGeometry::blockOf(voxel));
+    Block::Occlusion occlusion = block.occlusion();
+    occlusion.set(static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel)));
+    block.setOcclusion(occlusion);
+  }
+  std::vector<GridIndex> allBlocks() const {
+    std::vector<GridIndex> blocks;
+    for (const auto& entry : map_.entries()) blocks.push_back(entry.index);
+    return blocks;
+  }
+  /// The column of voxels (0, 0).
+  ColumnView column(const ColumnRules& rules = {}) const {
+    ColumnMap columns;
+    columns.start(rules);
+    columns.update(map_, classes_, allBlocks());
+    return columns.columns().at({0, 0})[0];
+  }
+
+  SemanticMap map_;
+  ClassTable classes_ = table();
+};
+
+using Occupancy = ColumnView::Occupancy;
+
+TEST_F(Columns, KnowTheGroundAndWhatIsAboveIt) {
+  for (const int z : {-3, -2}) add({{0, 0, z}}, kRoad);
+  add({{0, 0, 0}}, kSky);
+  occlude({{0, 0, -5}});
+  for (const int z : {1, 2, 10}) occlude({{0, 0, z}});
+  for (const int z : {3, 4}) add({{0, 0, z}}, kCar);
+  add({{0, 0, 20}}, kRoad);  // a bridge
+  const ColumnView view = column();
+  EXPECT_EQ(view.ground, -0.5f);
+  EXPECT_EQ(view.ground_class, kRoad);
+  EXPECT_EQ(view.clearance, 2.0f);  // from -0.5 m to the car's bottom at 1.5 m
+  EXPECT_EQ(view.occluded, 1.5f);
+  EXPECT_EQ(view.occupancy, Occupancy::kOccupied);
+}
+
+TEST_F(Columns, TellFreeFromUnknownAndWhatIsInTheWay) {
+  add({{0, 0, 0}}, kSky);
+  EXPECT_EQ(column().occupancy, Occupancy::kUnknown);
+  EXPECT_TRUE(std::isnan(column().ground));
+  EXPECT_TRUE(std::isnan(column().clearance));
+  add({{0, 0, 4}}, kFreeClass);
+  EXPECT_EQ(column().occupancy, Occupancy::kFree);
+  add({{0, 0, -4}}, kRoad);
+  EXPECT_EQ(column().occupancy, Occupancy::kFree);
+  EXPECT_TRUE(std::isinf(column().clearance));
+  add({{0, 0, 6}}, kCar);
+  EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
+}
+
+TEST_F(Columns, HeightsAreThoseOfTheMapOrAboveTheGround) {
+  add({{0, 0, -10}}, kRoad);  // top at -4.5 m
+  add({{0, 0, -5}}, kCar);    // centre at -2.25 m, 2.25 m above the ground
+  ColumnRules rules;
+  rules.min_z = 2.0;
+  rules.max_z = 2.5;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kFree);
+  rules.reference = HeightReference::kGround;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kOccupied);
+  rules.max_z = 2.2;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kFree);
+  rules.reference = HeightReference::kMap;
+  rules.min_z = -2.5;
+  rules.max_z = -2.0;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kOccupied);
+}
+
+TEST_F(Columns, WithoutGroundBelowAnObstacleCountsAtAnyHeight) {
+  add({{0, 0, 30}}, kCar);
+  ColumnRules rules;
+  rules.max_z = 2.0;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kUnknown);
+  rules.reference = HeightReference::kGround;
+  EXPECT_EQ(column(rules).occupancy, Occupancy::kOccupied);
+}
+
+TEST_F(Columns, UpdatesEqualANewLook) {
+  std::mt19937 random(5);
+  const auto draw = [&](int edge) {
+    return static_cast<int>(random() % static_cast<unsigned>(2 * edge)) - edge;
+  };
+  ColumnMap kept;
+  for (int round = 0; round < 30; ++round) {
+    std::vector<GridIndex> changed;
+    for (int i = 0; i < 20; ++i) {
+      const VoxelIndex voxel{{draw(20), draw(20), draw(20)}};
+      const ClassId ids[] = {kRoad, kCar, kSky, kFreeClass};
+      add(voxel, ids[random() % 4]);
+      changed.push_back(GridGeometry::blockOf(voxel));
+    }
+    if (round % 5 == 4) {
+      for (const GridIndex& block : allBlocks()) {
+        if (block.x < 0) {
+          map_.erase({block});
+          changed.push_back(block);
+        }
+      }
+    }
+    kept.update(map_, classes_, changed);
+    ColumnMap fresh;
+    fresh.update(map_, classes_, allBlocks());
+    ASSERT_EQ(kept.columns().size(), fresh.columns().size());
+    const auto same = [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+    for (const auto& [place, columns] : fresh.columns()) {
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        const ColumnView &a = columns[c], &b = kept.columns().at(place)[c];
+        ASSERT_TRUE(same(a.ground, b.ground) && same(a.clearance, b.clearance) && a.occluded == b.occluded &&
+                    a.occupancy == b.occupancy && a.ground_class == b.ground_class);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,137 @@
+// What the map says of a voxel, on cases worked out by hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr double kPrior = 0.001;
+
+/// A map of 3 classes with the given evidence (class, value) at one voxel of block 0.
+SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offset) {
+  SemanticMap map(GridGeometry(1.0), kPrior, 3);
+  for (const auto& [label, value] : evidence) {
+    float plane[kBlockVoxels] = {};
+    plane[offset] = value;
+    map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(label), plane);
+  }
+  return map;
+}
+
+VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
+  const SemanticMap map = mapWith(evidence, 77);
+  const VoxelView view = viewVoxel(map, *map.find({{0, 0, 0}}), 77);
+  const VoxelView judged = judgeVoxel(map, *map.find({{0, 0, 0}}), 77);
+  EXPECT_EQ(judged.state, view.state);
+  EXPECT_EQ(judged.label, view.label);
+  EXPECT_EQ(judged.probability, view.probability);
+  EXPECT_EQ(judged.variance, view.variance);
+  EXPECT_EQ(judged.evidence, view.evidence);
+  EXPECT_EQ(judged.occupancy, view.occupancy);
+  EXPECT_EQ(judged.entropy, 0.0f);
+  return view;
+}
+
+TEST(MapQuery, OccupiedVoxel) {
+  const VoxelView view = viewOf({{2, 0.6f}, {kFreeClass, 0.2f}});
+  const double sum = 0.8 + 4 * kPrior, p = (0.6 + kPrior) / sum, f = (0.2 + kPrior) / sum, o = kPrior / sum;
+  EXPECT_EQ(view.state, VoxelState::kOccupied);
+  EXPECT_EQ(view.label, 2);
+  EXPECT_NEAR(view.probability, p, 1e-6);
+  EXPECT_NEAR(view.variance, p * (1 - p) / (sum + 1), 1e-6);
+  EXPECT_NEAR(view.entropy, -p * std::log(p) - f * std::log(f) - 2 * o * std::log(o), 1e-6);
+  EXPECT_NEAR(view.evidence, 0.8, 1e-6);
+  EXPECT_NEAR(view.occupancy, 1 - f, 1e-6);
+}
+
+TEST(MapQuery, FreeVoxelAndTies) {
+  EXPECT_EQ(viewOf({{1, 0.1f}, {kFreeClass, 0.2f}}).state, VoxelState::kFree);
+  EXPECT_EQ(viewOf({{1, 0.1f}, {kFreeClass, 0.2f}}).label, kFreeClass);
+  EXPECT_EQ(viewOf({{1, 0.2f}, {kFreeClass, 0.2f}}).state, VoxelState::kOccupied);  // a tie is occupied
+  EXPECT_EQ(viewOf({{2, 0.2f}, {1, 0.2f}}).label, 1);                               // the smaller id
+  EXPECT_EQ(viewOf({{1, 0.2f}, {2, 0.2f}}).label, 1);
+}
+
+TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
+  SemanticMap map = mapWith({{1, 0.4f}, {2, 0.3f}, {kFreeClass, 0.5f}}, 77);
+  const auto view = [&map] { return viewVoxel(map, *map.find({{0, 0, 0}}), 77); };
+  const double sum = 1.2 + 4 * kPrior;
+  EXPECT_EQ(view().state, VoxelState::kFree);
+  EXPECT_NEAR(view().probability, (0.5 + kPrior) / sum, 1e-6);
+  map.setFreeGain(1, 0.1);
+  EXPECT_EQ(view().state, VoxelState::kOccupied);
+  EXPECT_EQ(view().label, 1);
+  EXPECT_NEAR(view().probability, (0.4 + kPrior) / sum, 1e-6);
+  EXPECT_NEAR(view().occupancy, 1.0 - (0.5 + kPrior) / sum, 1e-6);
+  map.setFreeGain(1, 1.0);
+  map.setFreeGain(2, 0.1);  // not the likeliest class
+  EXPECT_EQ(view().state, VoxelState::kFree);
+}
+
+TEST(MapQuery, WhatIsHitAgainAndAgainStands) {
+  // Seen free as often as hit, or twice as often; a gain of 4, and a persistence of 1.
+  const auto state = [](float hits, float free, double persistence) {
+    SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
+    map.setFreeGain(1, 4.0);
+    map.setGainPersistence(persistence);
+    return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
+  };
+  EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
+  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have passed";  // gain 3.5
+  EXPECT_EQ(state(4.0f, 2.0f, 0.0), VoxelState::kFree);
+  EXPECT_EQ(state(4.0f, 2.0f, 1.0), VoxelState::kOccupied) << "twenty hits: it stands";  // gain 1.05
+  EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
+}
+
+TEST(MapQuery, GainsAloneMakeNothingFree) {
+  SemanticMap map = mapWith({{1, 0.4f}}, 77);
+  map.setFreeGain(1, 1000.0);
+  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
+}
+
+TEST(MapQuery, UnknownVoxelHasThePrior) {
+  const SemanticMap map = mapWith({{1, 1.0f}}, 0);
+  for (const VoxelView& view :
+       {viewVoxel(map, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
+    EXPECT_EQ(view.state, VoxelState::kUnknown);
+    EXPECT_NEAR(view.probability, 0.25, 1e-6);
+    EXPECT_NEAR(view.entropy, std::log(4.0), 1e-6);
+    EXPECT_EQ(view.evidence, 0.0f);
+  }
+}
+
+TEST(MapQuery, OccludedOnlyWithoutEvidence) {
+  SemanticMap map = mapWith({{1, 1.0f}}, 0);
+  Block::Occlusion marks;
+  marks.set(0).set(1);
+  map.getOrAllocate({{0, 0, 0}}).setOcclusion(marks);
+  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 0).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 1).state, VoxelState::kOccluded);
+  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
+}
+
+TEST(MapQuery, VisitsKnownVoxelsInSortedOrder) {
+  SemanticMap map(GridGeometry(1.0), kPrior, 3);
+  float plane[kBlockVoxels] = {};
+  plane[3] = 1.0f;
+  for (const int x : {4, -2, 0}) map.getOrAllocate({{x, 0, 0}}).add(0, plane);
+  std::vector<int> seen;
+  forEachKnownVoxel(map, [&](const VoxelIndex& v, const VoxelView&) { seen.push_back(v.x); });
+  EXPECT_EQ(seen, (std::vector<int>{-13, 3, 35}));
+}
+
+TEST(SemanticMap, ErasesAndKeepsTheRest) {
+  SemanticMap map(GridGeometry(1.0), kPrior, 3);
+  for (int x = 0; x < 5; ++x) map.getOrAllocate({{x, 0, 0}});
+  map.erase({{1, 0, 0}});
+  map.erase({{9, 9, 9}});
+  EXPECT_EQ(map.size(), 4u);
+  EXPECT_EQ(map.find({{1, 0, 0}}), nullptr);
+  for (const int x : {0, 2, 3, 4}) EXPECT_NE(map.find({{x, 0, 0}}), nullptr) << x;
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,289 @@
+// Laws of the map that need no reference: threads, order, sums, shifts, and what a mode may change.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <tuple>
+
+#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "reference/scenes.h"
+
+namespace bki_mapping {
+namespace {
+
+const std::vector<std::string> kModes = {"none", "even", "uniform", "linear", "line"};
+
+std::vector<Scan> someScans() {
+  std::vector<Scan> scans;
+  for (const reference::Scene& scene : reference::nastyScenes(200)) {
+    if (scene.name != "far from zero") scans.push_back(scene.scan);
+  }
+  return scans;
+}
+
+SemanticMap mapOf(const std::vector<Scan>& scans, MapperConfig config) {
+  SemanticMapper mapper(config, reference::smallTable());
+  SemanticMap map = SemanticMap(mapper.map().geometry(), config.prior, mapper.classes().size());
+  for (const Scan& scan : scans) mapper.integrate(scan);
+  map.add(mapper.map());
+  return map;
+}
+
+MapperConfig configOf(const std::string& mode, int threads = 2) {
+  MapperConfig config;
+  config.free_space.mode = mode;
+  config.free_space.gap = 0.5;
+  config.free_space.samples_per_beam = 2;
+  config.occlusion = OcclusionExtent::kMapped;
+  config.threads = threads;
+  return config;
+}
+
+/// Calls check(label, evidence in a, evidence in b, index, offset) for everything in a; a missing plane is 0.
+template <typename Check>
+void compare(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift, Check&& check) {
+  static const std::vector<float> kNothing(kBlockVoxels, 0.0f);
+  for (const auto& entry : a.entries()) {
+    const Block* other =
+        b.find({{entry.index.x + shift.x, entry.index.y + shift.y, entry.index.z + shift.z}});
+    for (const ClassId label : entry.block->classes()) {
+      const float* theirs = other ? other->evidence(label) : nullptr;
+      if (!theirs) theirs = kNothing.data();
+      for (int v = 0; v < kBlockVoxels; ++v) check(label, entry.block->evidence(label)[v], theirs[v]);
+    }
+  }
+}
+
+void expectNear(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift,
+                const std::string& what) {
+  std::size_t faults = 0;
+  const auto check = [&](ClassId, float x, float y) {
+    faults += std::abs(x - y) > 1e-5f + 1e-4f * std::abs(x);
+  };
+  compare(a, b, shift, check);
+  compare(b, a, {{-shift.x, -shift.y, -shift.z}}, check);
+  EXPECT_EQ(faults, 0u) << what;
+  EXPECT_GT(a.size(), 0u) << what;
+}
+
+TEST(Laws, ThreadCountChangesNoBit) {
+  for (const std::string& mode : kModes) {
+    const SemanticMap one = mapOf(someScans(), configOf(mode, 1));
+    for (const int threads : {2, 7}) {
+      const SemanticMap many = mapOf(someScans(), configOf(mode, threads));
+      ASSERT_EQ(one.size(), many.size()) << mode;
+      for (const auto& entry : one.entries()) {
+        const Block* other = many.find(entry.index);
+        ASSERT_NE(other, nullptr) << mode;
+        ASSERT_EQ(entry.block->classes(), other->classes()) << mode;
+        EXPECT_EQ(entry.block->occlusion(), other->occlusion()) << mode;
+        for (std::size_t p = 0; p < other->classes().size(); ++p) {
+          EXPECT_EQ(std::memcmp(entry.block->plane(p), other->plane(p), kBlockVoxels * sizeof(float)), 0)
+              << mode << " with " << threads << " threads";
+        }
+      }
+    }
+  }
+}
+
+TEST(Laws, ScansAddInAnyOrder) {
+  for (const std::string& mode : kModes) {
+    std::vector<Scan> scans = someScans();
+    const SemanticMap forth = mapOf(scans, configOf(mode));
+    const SemanticMap back = mapOf({scans.rbegin(), scans.rend()}, configOf(mode));
+    expectNear(forth, back, {}, mode + ", order");
+    SemanticMap sum = mapOf({scans.begin(), scans.begin() + 3}, configOf(mode));
+    sum.add(mapOf({scans.begin() + 3, scans.end()}, configOf(mode)));
+    expectNear(forth, sum, {}, mode + ", sum of two maps");
+  }
+}
+
+TEST(Laws, ShiftingTheSceneByBlocksShiftsTheMap) {
+  for (const std::string& mode : kModes) {
+    MapperConfig config = configOf(mode);
+    config.resolution = 0.25;  // so that 40 blocks are exactly 80 m
+    config.downsample_resolution = 0.125;
+    std::vector<Scan> scans = someScans(), shifted = scans;
+    for (Scan& scan : shifted) scan.origin += Eigen::Vector3d(80.0, -160.0, 2.0);
+    expectNear(mapOf(scans, config), mapOf(shifted, config), {{40, -80, 1}}, mode);
+  }
+}
+
+TEST(Laws, AModeChangesOnlyFree) {
+  const SemanticMap none = mapOf(someScans(), configOf("none"));
+  for (const std::string& mode : kModes) {
+    const SemanticMap other = mapOf(someScans(), configOf(mode));
+    std::size_t changed = 0;
+    float free = 0.0f;
+    compare(other, none, {}, [&](ClassId label, float x, float y) {
+      changed += label != kFreeClass && x != y;
+      if (label == kFreeClass) free += x;
+    });
+    compare(none, other, {},
+            [&](ClassId label, float x, float y) { changed += label != kFreeClass && x != y; });
+    EXPECT_EQ(changed, 0u) << mode;
+    EXPECT_EQ(free > 0.0f, mode != "none") << mode;
+  }
+}
+
+TEST(Laws, ModesDiffer) {
+  // Each mode, weight and extent gives a map of its own.
+  std::vector<SemanticMap> maps;
+  for (const std::string mode : {"none", "even", "uniform", "linear"})
+    maps.push_back(mapOf(someScans(), configOf(mode)));
+  for (const BeamWeight weight : {BeamWeight::kUniform, BeamWeight::kLinear, BeamWeight::kBilinear}) {
+    for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
+      MapperConfig config = configOf("line");
+      config.free_space.weight = weight;
+      config.free_space.extent = extent;
+      maps.push_back(mapOf(someScans(), config));
+    }
+  }
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      double difference = 0.0;
+      compare(maps[i], maps[j], {}, [&](ClassId, float x, float y) { difference += std::abs(x - y); });
+      EXPECT_GT(difference, 1e-3) << i << " and " << j;
+    }
+  }
+}
+
+TEST(Laws, ExtentsAgreeWhereBothClear) {
+  MapperConfig observed = configOf("line"), mapped = configOf("line");
+  mapped.free_space.extent = FreeSpaceExtent::kMapped;
+  const std::vector<Scan> scan = {someScans().front()};
+  const SemanticMap all = mapOf(scan, observed), some = mapOf(scan, mapped);
+  EXPECT_LT(some.size(), all.size());
+  compare(some, all, {}, [](ClassId, float x, float y) { ASSERT_EQ(x, y); });
+}
+
+TEST(Laws, EveryBlockKnowsSomething) {
+  for (const std::string& mode : kModes) {
+    const SemanticMap map = mapOf(someScans(), configOf(mode));
+    for (const auto& entry : map.entries()) EXPECT_FALSE(entry.block->empty()) << mode;
+  }
+}
+
+TEST(Laws, ProbabilitiesSumToOne) {
+  const SemanticMap map = mapOf(someScans(), configOf("line"));
+  for (const auto& entry : map.entries()) {
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelView view = viewVoxel(map, *entry.block, v);
+      double sum = 0.0;
+      for (const int label : {0, 1, 2, 3, 255}) {
+        const float* plane = entry.block->evidence(static_cast<ClassId>(label));
+        sum += (map.prior() + (plane ? plane[v] : 0.0f)) / (map.priorSum() + view.evidence);
+      }
+      ASSERT_NEAR(sum, 1.0, 1e-5);
+    }
+  }
+}
+
+TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
+  SemanticMapper mapper(configOf("line"), reference::smallTable());
+  const ScanStats stats = mapper.integrate(Scan());
+  EXPECT_EQ(stats.hits, 0u);
+  EXPECT_EQ(mapper.map().size(), 0u);
+  mapper.integrate(someScans().front());
+  EXPECT_GT(mapper.map().size(), 0u);
+  mapper.reset();
+  EXPECT_EQ(mapper.map().size(), 0u);
+}
+
+TEST(Laws, AKernelOfTooManyVoxelsIsRefused) {
+  MapperConfig config;
+  config.resolution = 0.1;
+  config.kernel.length = 7.1;
+  EXPECT_NO_THROW(SemanticMapper(config, reference::smallTable()));
+  config.kernel.length = 7.3;
+  EXPECT_THROW(SemanticMapper(config, reference::smallTable()), std::invalid_argument);
+}
+
+TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
+  const std::vector<Scan> scans = someScans();
+  MapperConfig other = configOf("linear");
+  other.sensor_model.max_range = 2.0;
+  other.free_space.hits_before_misses = true;
+  SemanticMapper changed(configOf("line"), reference::smallTable()), made(other, reference::smallTable());
+  changed.integrate(scans[0]);
+  changed.reset();
+  changed.reconfigure(other);
+  for (const Scan& scan : scans) {
+    changed.integrate(scan);
+    made.integrate(scan);
+  }
+  std::size_t differences = 0;
+  compare(made.map(), changed.map(), {{0, 0, 0}},
+          [&](ClassId, float x, float y) { differences += std::memcmp(&x, &y, sizeof(x)) != 0; });
+  EXPECT_EQ(differences, 0u);
+  EXPECT_EQ(made.map().size(), changed.map().size());
+
+  MapperConfig refused = other;
+  refused.resolution = 0.7;
+  EXPECT_THROW(changed.reconfigure(refused), std::invalid_argument);
+  refused = other;
+  refused.free_space.mode = "liner";
+  EXPECT_THROW(changed.reconfigure(refused), std::invalid_argument);
+  EXPECT_EQ(changed.config().resolution, other.resolution);
+  EXPECT_EQ(changed.config().free_space.mode, "linear");
+}
+
+TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
+  for (const std::string& mode : kModes) {
+    SemanticMapper mapper(configOf(mode), reference::smallTable());
+    SemanticMap before = mapOf({}, configOf(mode));
+    for (const Scan& scan : someScans()) {
+      mapper.integrate(scan);
+      EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes()) << mode;
+      std::set<std::tuple<int, int, int>> touched;
+      for (const GridIndex& b : mapper.touchedBlocks()) {
+        EXPECT_TRUE(touched.emplace(b.x, b.y, b.z).second) << "a block is named twice";
+      }
+      // What is not named is as it was.
+      for (const auto& entry : mapper.map().entries()) {
+        if (touched.count({entry.index.x, entry.index.y, entry.index.z}) > 0) continue;
+        const Block* old = before.find(entry.index);
+        ASSERT_TRUE(old) << mode;
+        ASSERT_EQ(old->classes(), entry.block->classes()) << mode;
+        for (std::size_t c = 0; c < old->classes().size(); ++c) {
+          ASSERT_EQ(0, std::memcmp(old->plane(c), entry.block->plane(c), kBlockVoxels * sizeof(float)));
+        }
+      }
+      before.clear();
+      before.add(mapper.map());
+    }
+    const std::size_t size = mapper.map().size();
+    const auto gone = mapper.eraseBlocks([](const BlockIndex& b) { return b.x < 0; });
+    EXPECT_GT(gone.size(), 0u);
+    EXPECT_EQ(mapper.map().size(), size - gone.size());
+    for (const auto& entry : mapper.map().entries()) EXPECT_GE(entry.index.x, 0);
+    EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes()) << mode;
+    mapper.reset();
+    EXPECT_EQ(mapper.mapBytes(), 0u);
+  }
+}
+
+TEST(Laws, GainsFollowTheFlagsOfClasses) {
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();
+  classes[2].dynamic = true;
+  MapperConfig config;
+  config.free_gain.dynamic_classes = 30.0;
+  config.free_gain.static_classes = 0.1;
+  const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
+  EXPECT_EQ(mapper.map().freeGain(0, 5.0f), 1.0f);  // unlabelled
+  EXPECT_EQ(mapper.map().freeGain(1, 5.0f), 0.1f);
+  EXPECT_EQ(mapper.map().freeGain(2, 5.0f), 30.0f);
+  EXPECT_EQ(mapper.map().freeGain(kFreeClass, 5.0f), 1.0f);
+  classes[2].free_gain = 7.0;
+  const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
+  EXPECT_EQ(own.map().freeGain(2, 5.0f), 7.0f);
+  config.free_gain.persistence = 2.0;
+  const SemanticMapper persistent(config, std::make_shared<ClassTable>("gains", classes));
+  EXPECT_FLOAT_EQ(persistent.map().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
+  EXPECT_EQ(persistent.map().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,133 @@
+// ThreadPool do every job once, pass on what jobs throw, and go on; what goes in turn goes in order.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "parallel/ordered_queue.h"
+#include "parallel/thread_pool.h"
+
+namespace bki_mapping {
+namespace {
+
+TEST(ThreadPool, DoEachJobOnceRoundAfterRound) {
+  for (const int threads : {1, 2, 5}) {
+    ThreadPool pool(threads);
+    EXPECT_EQ(pool.count(), static_cast<std::size_t>(threads));
+    for (std::size_t round = 0; round < 300; ++round) {
+      std::vector<std::atomic<int>> done(round % 70);
+      std::atomic<bool> known_worker{true};
+      pool.forEach(done.size(), [&](std::size_t job, std::size_t worker) {
+        ++done[job];
+        if (worker >= pool.count()) known_worker = false;
+      });
+      for (const auto& times : done) ASSERT_EQ(times, 1) << threads << " threads, round " << round;
+      ASSERT_TRUE(known_worker);
+    }
+  }
+}
+
+TEST(ThreadPool, BeginWithAShareOfTheirOwn) {
+  ThreadPool pool(2);
+  for (int round = 0; round < 50; ++round) {
+    std::atomic<int> begun{0};
+    std::vector<std::size_t> worker_of(4);
+    pool.forEach(4, [&](std::size_t job, std::size_t worker) {
+      worker_of[job] = worker;
+      for (++begun; begun < 2;) std::this_thread::yield();  // until both have a job
+    });
+    ASSERT_EQ(worker_of[0], 0u) << "round " << round;
+    ASSERT_EQ(worker_of[2], 1u) << "round " << round;
+  }
+}
+
+TEST(ThreadPool, TakeJobsInOrderWhereAsked) {
+  ThreadPool pool(2);
+  for (int round = 0; round < 50; ++round) {
+    std::vector<std::atomic<int>> times(40);
+    std::atomic<std::size_t> begun{0};
+    std::atomic<bool> in_order{true};
+    pool.forEachInOrder(times.size(), [&](std::size_t job, std::size_t) {
+      ++times[job];
+      if (job > begun++ + 1) in_order = false;  // the other thread may be about to begin one before it
+    });
+    ASSERT_TRUE(in_order);
+    for (const auto& each : times) ASSERT_EQ(each, 1);
+  }
+}
+
+TEST(ThreadPool, HelpThoseWhoHaveMoreToDo) {
+  ThreadPool pool(2);
+  std::atomic<bool> others_done{false};
+  std::atomic<int> done{0};
+  // The first job ends when all others have, those of its share among them.
+  pool.forEach(20, [&](std::size_t job, std::size_t) {
+    if (job == 0) {
+      while (!others_done) std::this_thread::yield();
+    } else if (++done == 19) {
+      others_done = true;
+    }
+  });
+  EXPECT_EQ(done, 19);
+}
+
+TEST(ThreadPool, PassOnWhatAJobThrowsAndGoOn) {
+  ThreadPool pool(3);
+  for (int time = 0; time < 20; ++time) {
+    const auto job = [](std::size_t j, std::size_t) {
+      if (j == 7) throw std::runtime_error("job 7");
+    };
+    EXPECT_THROW(pool.forEach(100, job), std::runtime_error);
+    std::atomic<int> done{0};
+    pool.forEach(50, [&](std::size_t, std::size_t) { ++done; });
+    EXPECT_EQ(done, 50);
+  }
+}
+
+TEST(ThreadPool, WakeFromSleep) {
+  ThreadPool pool(2);
+  for (int time = 0; time < 5; ++time) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::atomic<int> done{0};
+    pool.forEach(10, [&](std::size_t, std::size_t) { ++done; });
+    EXPECT_EQ(done, 10);
+  }
+}
+
+TEST(OrderedQueue, TakesEachPieceInOrderAsSoonAsItMay) {
+  OrderedQueue turns;
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::size_t> taken;
+    const auto take = [&](std::size_t piece) { taken.push_back(piece); };
+    turns.start(4);
+    turns.finish(1, take);
+    EXPECT_EQ(taken, std::vector<std::size_t>());
+    turns.finish(0, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
+    turns.finish(3, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
+    turns.finish(2, take);
+    EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1, 2, 3}));
+  }
+}
+
+TEST(OrderedQueue, KeepsTheOrderWhateverThreadsDo) {
+  ThreadPool pool(4);
+  OrderedQueue turns;
+  for (std::size_t round = 0; round < 200; ++round) {
+    const std::size_t pieces = round % 40;
+    std::vector<std::size_t> taken, all;
+    for (std::size_t p = 0; p < pieces; ++p) all.push_back(p);
+    turns.start(pieces);
+    pool.forEach(pieces, [&](std::size_t piece, std::size_t) {
+      turns.finish(piece, [&](std::size_t next) { taken.push_back(next); });
+    });
+    ASSERT_EQ(taken, all);
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping

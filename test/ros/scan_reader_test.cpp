@@ -1,0 +1,431 @@
+// Scans from clouds and tf: where beams start, when points were measured, labels in every encoding.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <tuple>
+
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "cloud_maker.h"
+#include "ros/pose_conversion.h"
+#include "ros/scan_reader.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+using sensor_msgs::PointField;
+
+const std::shared_ptr<const ClassTable>& classes() {
+  static const auto table = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
+  return table;
+}
+
+class Reader : public testing::Test {
+ protected:
+  void pose(const std::string& child, double seconds, const Eigen::Vector3d& position, double yaw = 0.0,
+            const std::string& parent = "map") {
+    geometry_msgs::TransformStamped t;
+    t.header.frame_id = parent;
+    t.header.stamp = ros::Time(seconds);
+    t.child_frame_id = child;
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.translate(position).rotate(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+    t.transform = toTransform(T);
+    poses_.add(t);
+  }
+
+  /// A cloud of cars in the frame `sensor` at 100 s.
+  static CloudMaker cloud(const std::vector<Eigen::Vector3f>& points) {
+    CloudMaker maker(points);
+    maker.add("label", PointField::UINT32, std::vector<double>(points.size(), 10.0));
+    return maker;
+  }
+
+  std::variant<PlacedScan, MissingPose> read(const sensor_msgs::PointCloud2& cloud) const {
+    return ScanReader(input_, "map", *classes(), LabelValues::kRaw).read(cloud, poses_);
+  }
+  bool ready(const sensor_msgs::PointCloud2& cloud) const {
+    return ScanReader(input_, "map", *classes(), LabelValues::kRaw).ready(cloud, poses_);
+  }
+  PlacedScan placed(const sensor_msgs::PointCloud2& cloud) const { return std::get<PlacedScan>(read(cloud)); }
+  DropReason reason(const sensor_msgs::PointCloud2& cloud) const {
+    EXPECT_FALSE(ready(cloud));
+    return std::get<MissingPose>(read(cloud)).reason;
+  }
+
+  InputConfig input_;
+  PoseSource poses_;
+};
+
+TEST_F(Reader, MissingPosesAreToldApart) {
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  EXPECT_EQ(reason(scan), DropReason::kUnknownFrame);
+  pose("other", 100.0, {0, 0, 0});
+  for (const double t : {90.0, 100.0}) pose("sensor", t, {0, 0, 0}, 0.0, "island");
+  EXPECT_EQ(reason(scan), DropReason::kNoTransform);
+  pose("island", 90.0, {0, 0, 0});
+  pose("island", 95.0, {0, 0, 0});
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  pose("island", 101.0, {0, 0, 0});
+  EXPECT_TRUE(ready(scan));
+  EXPECT_TRUE(std::holds_alternative<PlacedScan>(read(scan)));
+  scan.header.stamp = ros::Time(80.0);
+  EXPECT_EQ(reason(scan), DropReason::kTooOld);
+  scan.header.stamp = ros::Time(4294967295u, 0u);  // as far away as a stamp can be
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  scan.header.frame_id = "";
+  EXPECT_EQ(reason(scan), DropReason::kUnknownFrame);
+}
+
+TEST_F(Reader, NonsenseFromTfIsNoPose) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  pose("sensor", 100.0, {NAN, 0, 0});
+  EXPECT_FALSE(ready(scan));
+  geometry_msgs::TransformStamped t;
+  t.header.frame_id = "map";
+  t.header.stamp = ros::Time(100.0);
+  t.child_frame_id = "sensor";
+  t.transform.rotation.w = 2.0;  // not a rotation
+  poses_.add(t);
+  EXPECT_FALSE(ready(scan));
+}
+
+TEST_F(Reader, TimesAtTheEndOfTimeDoNoHarm) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  pose("sensor", 100.0, {5, 0, 0});
+  pose("sensor", 4294967295.0, {9, 0, 0});  // in 2106: tf2 cannot add 10 s to it
+  poses_.restart(ros::Time(4294967290.0));  // puts in again what it has kept
+  pose("sensor", 100.0, {5, 0, 0});
+  EXPECT_TRUE(ready(scan));
+  EXPECT_EQ(placed(scan).scan.origin.x(), 5.0);
+}
+
+TEST_F(Reader, NobodyChoosesHowMuchIsSaidOfAName) {
+  for (const std::string& frame : {std::string(1000000, 'f'), std::string("f\n\0\033[2J", 7)}) {
+    pose("sensor", 100.0, {0, 0, 0});
+    CloudMaker maker = cloud({{1, 0, 0}});
+    maker.frame = frame;
+    std::string why = std::get<MissingPose>(read(maker.message())).why;
+    EXPECT_LT(why.size(), 1000u);
+    EXPECT_EQ(std::count_if(why.begin(), why.end(), [](unsigned char c) { return c < 0x20; }), 0) << why;
+    pose(std::string(1000000, 'c'), 100.0, {0, 0, 0}, 0.0, frame);  // nothing connects it
+    maker.frame = std::string(1000000, 'c');
+    why = std::get<MissingPose>(read(maker.message())).why;
+    EXPECT_LT(why.size(), 1000u);
+  }
+}
+
+geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, double seconds,
+                                          double x, double w) {
+  geometry_msgs::TransformStamped t;
+  t.header.frame_id = parent;
+  t.header.stamp = ros::Time(seconds);
+  t.child_frame_id = child;
+  t.transform.translation.x = x;
+  t.transform.rotation.w = w;
+  return t;
+}
+
+TEST_F(Reader, ATransformThatIsNoPoseIsNamed) {
+  const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  const auto expectNamed = [&](const std::string& words) {
+    EXPECT_FALSE(ready(scan));
+    const auto placed = read(scan);
+    ASSERT_TRUE(std::holds_alternative<MissingPose>(placed)) << words;
+    const MissingPose missing = std::get<MissingPose>(placed);
+    EXPECT_EQ(missing.reason, DropReason::kBadTransform) << missing.why;
+    EXPECT_NE(missing.why.find(words), std::string::npos) << missing.why;
+  };
+  for (const auto& [x, w, words] : std::vector<std::tuple<double, double, std::string>>{
+           {0.0, 5.0, "the norm of its quaternion is 5, not 1"},
+           {0.0, 0.0, "the norm of its quaternion is 0, not 1"},
+           {0.0, NAN, "its quaternion is not finite"},
+           {NAN, 1.0, "its translation is not finite"},
+           {INFINITY, 1.0, "its translation is not finite"}}) {
+    poses_.add(transform("/map", "/sensor", 100.0, x, w));
+    expectNamed(words);
+    expectNamed("the transform from 'map' to 'sensor' of time 100 is no pose");
+  }
+  pose("sensor", 100.0, {1, 2, 3});  // a good one, at last
+  EXPECT_TRUE(ready(scan));
+}
+
+TEST_F(Reader, ARefusedTransformIsBlamedForWhatItCaused) {
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  poses_.add(transform("base", "sensor", 0.0, 1.0, 1.0), true);
+  for (const double t : {96.0, 98.0}) poses_.add(transform("map", "base", t, t, 1.0));
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate);
+  poses_.add(transform("map", "base", 100.0, 100.0, 2.0));
+  EXPECT_EQ(reason(scan), DropReason::kBadTransform) << "also in the middle of the way";
+  scan.header.stamp = ros::Time(90.0);
+  EXPECT_EQ(reason(scan), DropReason::kTooOld) << "whatever came later";
+  scan.header.stamp = ros::Time(100.5);
+  poses_.add(transform("map", "base", 100.2, 100.2, 1.0));
+  EXPECT_EQ(reason(scan), DropReason::kTransformLate) << "a good one came since";
+  // Nonsense of many frames is not kept for ever, but what is wrong now is known.
+  for (int i = 0; i < 100000; ++i) {
+    poses_.add(transform("map", "frame_" + std::to_string(i), 100.0, 0.0, 2.0));
+  }
+  poses_.add(transform("map", "base", 100.3, 0.0, 2.0));
+  EXPECT_EQ(reason(scan), DropReason::kBadTransform);
+}
+
+TEST_F(Reader, BothPosesOfAStampOfZeroAreOfOneTime) {
+  for (const double t : {98.0, 99.0, 100.0}) pose("sensor", t, {t, 0, 0});
+  for (const double t : {98.0, 99.5}) pose("merger", t, {0, t, 0});
+  CloudMaker maker = cloud({{1, 0, 0}});
+  maker.frame = "merger";
+  maker.stamp = 0.0;
+  input_.sensor_frame_id = "sensor";
+  EXPECT_TRUE(ready(maker.message()));
+  const Scan scan = placed(maker.message()).scan;
+  EXPECT_TRUE(scan.origin.isApprox(Eigen::Vector3d(99.5, 0, 0), 1e-9)) << scan.origin;
+  EXPECT_TRUE(scan.points[0].isApprox(Eigen::Vector3f(1.0f - 99.5f, 99.5f, 0.0f), 1e-5f));
+  EXPECT_EQ(scan.stamp, 99500000000u);
+  poses_.add(transform("map", "still", 0.0, 7.0, 1.0), true);
+  input_.sensor_frame_id = "still";
+  EXPECT_EQ(placed(maker.message()).scan.origin.x(), 7.0);
+  EXPECT_EQ(placed(maker.message()).scan.points[0].y(), 99.5f);
+}
+
+TEST_F(Reader, WhenTimeJumpsBackTransformsOfTheNewTimeAreKept) {
+  for (const double t : {98.0, 99.0, 100.0}) pose("sensor", t, {t, 0, 0});
+  for (const double t : {20.0, 20.5})
+    pose("sensor", t, {t, 0, 0});  // before the jump is known; tf2 refuses them
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  scan.header.stamp = ros::Time(20.25);
+  EXPECT_FALSE(ready(scan));
+  poses_.restart(scan.header.stamp);
+  EXPECT_NEAR(placed(scan).scan.origin.x(), 20.25, 1e-9);
+  scan.header.stamp = ros::Time(99.5);
+  EXPECT_FALSE(ready(scan));
+}
+
+TEST_F(Reader, AStampOfZeroMeansTheLatestPose) {
+  pose("sensor", 99.0, {1, 0, 0});
+  pose("sensor", 100.0, {2, 0, 0});
+  sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
+  scan.header.stamp = ros::Time();
+  EXPECT_EQ(placed(scan).scan.origin, Eigen::Vector3d(2, 0, 0));
+  EXPECT_EQ(placed(scan).scan.stamp, 100000000000u);
+}
+
+TEST_F(Reader, BeamsStartWhereTheSensorIs) {
+  pose("sensor", 100.0, {3, 4, 5}, 1.0);
+  input_.sensor_frame_id = "sensor";
+  CloudMaker maker = cloud({{10, 4, 5}});
+  maker.frame = "map";
+  const Scan scan = placed(maker.message()).scan;
+  EXPECT_EQ(scan.origin, Eigen::Vector3d(3, 4, 5));
+  EXPECT_TRUE(scan.points[0].isApprox(Eigen::Vector3f(7, 0, 0), 1e-6f));
+  const ScanReader reader(input_, "map", *classes(), LabelValues::kRaw);
+  EXPECT_FALSE(reader.originDoubtful(maker.message()));
+  EXPECT_TRUE(
+      ScanReader(InputConfig(), "map", *classes(), LabelValues::kRaw).originDoubtful(maker.message()));
+}
+
+TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
+  // 10 m/s ahead: a wall at x = 20 is seen 1 m nearer after 0.1 s.
+  pose("sensor", 99.0, {-10, 0, 0});
+  pose("sensor", 101.0, {10, 0, 0});
+  const std::vector<Eigen::Vector3f> points = {{20, 0, 0}, {19.5f, 1, 0}, {19, 2, 0}};
+  for (const bool nanoseconds : {false, true}) {
+    CloudMaker maker = cloud(points);
+    if (nanoseconds) {
+      maker.add("t", PointField::UINT32, {0, 50e6, 100e6});
+    } else {
+      maker.add("t", PointField::FLOAT32, {0.0, 0.05, 0.1});
+    }
+    input_.time_field = "";
+    EXPECT_NEAR(placed(maker.message()).scan.points[2].x(), 19.0, 1e-4);
+    input_.time_field = "t";
+    const Scan scan = placed(maker.message()).scan;
+    EXPECT_TRUE(scan.origin.isZero(1e-9));
+    for (const auto& point : scan.points) EXPECT_NEAR(point.x(), 20.0, 0.011);  // half a time slice
+  }
+  // The end of the scan must be in tf, too.
+  CloudMaker maker = cloud(points);
+  maker.add("t", PointField::FLOAT64, {0.0, 0.5, 1.5});
+  EXPECT_EQ(reason(maker.message()), DropReason::kTransformLate);
+  CloudMaker nonsense = cloud(points);
+  nonsense.add("t", PointField::FLOAT64, {0.0, 0.5, NAN});
+  EXPECT_THROW(read(nonsense.message()), std::invalid_argument);
+  input_.time_field = "no such field";
+  EXPECT_THROW(read(maker.message()), std::invalid_argument);
+}
+
+TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {
+  pose("sensor", 100.0, {0, 0, 0});
+  MapperConfig config;
+  config.free_space.mode = "none";
+  SemanticMapper mapper(config, classes());
+  EXPECT_EQ(mapper.integrate(placed(cloud({{1, 2, 3}}).message()).scan).counts.used, 1u);
+  std::vector<Eigen::Vector3f> many;
+  for (int i = 0; i < 2000000; ++i) {
+    const float a = 1e-4f * static_cast<float>(i);
+    many.emplace_back(30.0f * std::cos(a), 30.0f * std::sin(a), 1e-6f * static_cast<float>(i));
+  }
+  const ScanStats stats = mapper.integrate(placed(cloud(many).message()).scan);
+  EXPECT_EQ(stats.counts.used, 2000000u);
+  EXPECT_GT(stats.hits, 1000u);
+}
+
+/// Values that sensors and networks do not give, but broken ones do.
+std::vector<double> extremes() {
+  using F = std::numeric_limits<float>;
+  using D = std::numeric_limits<double>;
+  std::vector<double> values = {0.0, 0.1, 1.0, 10.0, 255.0, 4294967295.0, NAN, 1e39};
+  for (const double x : {static_cast<double>(F::denorm_min()), static_cast<double>(F::min()),
+                         static_cast<double>(F::max()), D::denorm_min(), D::max(), D::infinity()}) {
+    values.push_back(x);
+  }
+  for (std::size_t i = 0, n = values.size(); i < n; ++i) values.push_back(-values[i]);
+  return values;
+}
+
+/// Every share is positive and finite, and those of a point add up to 1, or it has none.
+void expectShares(const SoftLabels& soft) {
+  for (std::size_t i = 0; i < soft.size(); ++i) {
+    double sum = 0.0;
+    for (const ClassShare* s = soft.begin(i); s != soft.end(i); ++s) {
+      ASSERT_TRUE(std::isfinite(s->share) && s->share > 0.0f) << s->share;
+      sum += s->share;
+    }
+    if (soft.begin(i) != soft.end(i)) {
+      ASSERT_NEAR(sum, 1.0, 1e-6);
+    }
+  }
+}
+
+void expectSaneEvidence(const SemanticMap& map) {
+  for (const auto& entry : map.entries()) {
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelView view = judgeVoxel(map, *entry.block, v);
+      ASSERT_TRUE(std::isfinite(view.probability) && std::isfinite(view.variance));
+      for (const ClassId id : entry.block->classes()) {
+        const float evidence = entry.block->evidence(id)[v];
+        ASSERT_TRUE(std::isfinite(evidence) && evidence >= 0.0f) << evidence << " of class " << int{id};
+      }
+    }
+  }
+}
+
+TEST_F(Reader, NoLabelOrScoreBringsNonsenseIntoTheMap) {
+  pose("sensor", 100.0, {0, 0, 0});
+  // A point for each pair of extreme values, 1 m from one another.
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> a, b, car, road;
+  for (const double x : extremes()) {
+    for (const double y : extremes()) {
+      const auto n = static_cast<float>(points.size());
+      points.emplace_back(3.5f + std::fmod(n, 30.0f), 0.5f + std::floor(n / 30.0f), 0.5f);
+      a.push_back(x);
+      b.push_back(y);
+      car.push_back(10.0);
+      road.push_back(40.0);
+    }
+  }
+  for (const std::uint8_t type :
+       {PointField::INT8, PointField::UINT8, PointField::INT16, PointField::UINT16, PointField::INT32,
+        PointField::UINT32, PointField::FLOAT32, PointField::FLOAT64}) {
+    CloudMaker maker(points);
+    maker.add("a", type, a).add("b", type, b);
+    maker.add("car", PointField::UINT8, car).add("road", PointField::UINT8, road);
+    const sensor_msgs::PointCloud2 message = maker.message();
+    const auto flood = [&](LabelEncoding encoding, const std::string& labels, const std::string& scores) {
+      input_.label_encoding = encoding;
+      input_.label_field = labels;
+      input_.score_fields = scores;
+      for (const ScoreType score : {ScoreType::kProbability, ScoreType::kLogit}) {
+        for (const ColorMatch match : {ColorMatch::kExact, ColorMatch::kNearest}) {
+          input_.score_type = score;
+          input_.color_match = match;
+          SCOPED_TRACE("datatype " + std::to_string(type) + ", labels " + labels + ", scores " + scores);
+          const Scan scan = placed(message).scan;
+          expectShares(scan.soft);
+          SemanticMapper mapper(MapperConfig(), classes());
+          const PointCounts counts = mapper.integrate(scan).counts;
+          EXPECT_EQ(counts.points, counts.used + counts.unknown_label);
+          expectSaneEvidence(mapper.map());
+        }
+      }
+    };
+    flood(LabelEncoding::kNumber, "a", "");
+    for (const auto encoding : {LabelEncoding::kRgb, LabelEncoding::kBgr}) {
+      flood(encoding, "a", "");
+      flood(encoding, "a,b,a", "");
+    }
+    flood(LabelEncoding::kScores, "", "car=a,road=b");
+    flood(LabelEncoding::kTopK, "car,road", "a,b");  // scores at the edge
+    flood(LabelEncoding::kTopK, "a,b", "car,road");  // labels at the edge
+    flood(LabelEncoding::kTopK, "car,car", "a,b");   // the same label twice
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST_F(Reader, SureLabelsGiveTheSameMapInEveryEncoding) {
+  pose("sensor", 100.0, {0.3, 0.2, 0.1}, 0.4);
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> raw, color, car, road, first, sure, second, unsure;
+  for (int i = 0; i < 3000; ++i) {
+    const float a = 0.01f * static_cast<float>(i);
+    points.emplace_back(5.0f * std::cos(a), 5.0f * std::sin(a), 0.0005f * static_cast<float>(i % 700));
+    const bool is_car = i % 3 == 0;
+    const SemanticClass& c = *classes()->find(is_car ? 1 : 9);
+    raw.push_back(is_car ? 10 : 40);
+    color.push_back(c.color[0] << 16 | c.color[1] << 8 | c.color[2]);
+    car.push_back(is_car);
+    road.push_back(!is_car);
+    first.push_back(raw.back());
+    sure.push_back(1.0);
+    second.push_back(is_car ? 40 : 10);
+    unsure.push_back(0.0);
+  }
+  const auto mapOf = [&](const CloudMaker& maker) {
+    auto mapper = std::make_unique<SemanticMapper>(MapperConfig(), classes());
+    mapper->integrate(placed(maker.message()).scan);
+    return mapper;
+  };
+  CloudMaker numbers(points);
+  numbers.add("label", PointField::UINT16, raw);
+  const auto expected = mapOf(numbers);
+  ASSERT_GT(expected->map().size(), 20u);
+  const auto expectSame = [&](const CloudMaker& maker, const std::string& what) {
+    const auto mapper = mapOf(maker);
+    ASSERT_EQ(mapper->map().size(), expected->map().size()) << what;
+    for (const auto& entry : expected->map().entries()) {
+      const Block* block = mapper->map().find(entry.index);
+      ASSERT_TRUE(block) << what;
+      for (const ClassId id : entry.block->classes()) {
+        ASSERT_EQ(0, std::memcmp(block->evidence(id), entry.block->evidence(id), 4 * kBlockVoxels)) << what;
+      }
+    }
+  };
+  CloudMaker floats(points);
+  floats.add("label", PointField::FLOAT32, raw);
+  expectSame(floats, "float");
+  CloudMaker colors(points);
+  colors.add("rgb", PointField::UINT32, color);
+  input_.label_field = "rgb";
+  input_.label_encoding = LabelEncoding::kRgb;
+  expectSame(colors, "rgb");
+  CloudMaker scores(points);
+  scores.add("a", PointField::FLOAT32, car).add("b", PointField::FLOAT32, road);
+  input_.label_encoding = LabelEncoding::kScores;
+  input_.score_fields = "car=a,road=b";
+  expectSame(scores, "scores");
+  CloudMaker top(points);
+  top.add("l1", PointField::UINT8, first).add("p1", PointField::FLOAT32, sure);
+  top.add("l2", PointField::UINT8, second).add("p2", PointField::FLOAT32, unsure);
+  input_.label_encoding = LabelEncoding::kTopK;
+  input_.label_field = "l1,l2";
+  input_.score_fields = "p1,p2";
+  expectSame(top, "top_k");
+}
+
+}  // namespace
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,211 @@
+// The server's parameters, and that the documents name every one, and every topic, service and field.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "bki_mapping/mapping/parameters.h"
+#include "ros/live_settings.h"
+#include "ros/point_account.h"
+#include "ros/scan_ledger.h"
+#include "ros/server_config.h"
+
+namespace bki_mapping::ros_shell {
+namespace {
+
+namespace fs = std::filesystem;
+const fs::path kRoot = BKI_MAPPING_SOURCE_DIR;
+
+std::string textOf(const fs::path& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+TEST(ServerConfig, SetsBothKindsAndRefusesBothKinds) {
+  ServerConfig server;
+  MapperConfig mapper;
+  setParameters({{"frame_id", "odom"}, {"prior", "0.5"}, {"color_mode", "height"}, {"latch", "true"}}, server,
+                mapper);
+  EXPECT_EQ(server.frame_id, "odom");
+  EXPECT_EQ(server.color_mode, ColorMode::kHeight);
+  EXPECT_TRUE(server.latch);
+  EXPECT_EQ(mapper.prior, 0.5);
+  try {
+    setParameters({{"frame", "odom"}, {"queue_size", "0"}, {"prior", "x"}}, server, mapper);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    const std::string text = fault.what();
+    for (const char* words : {"'frame' is unknown", "queue_size is '0'", "prior is 'x'"}) {
+      EXPECT_NE(text.find(words), std::string::npos) << text;
+    }
+  }
+  EXPECT_EQ(mapper.prior, 0.5);
+  EXPECT_THROW(setParameters({{"occupancy_min_z", "2"}, {"occupancy_max_z", "1"}}, server, mapper),
+               std::invalid_argument);
+}
+
+TEST(Documents, HaveARowForEachServerParameter) {
+  const std::string document = textOf(kRoot / "docs/parameters.md");
+  const auto expectRow = [&](const auto& p, const std::string& value) {
+    const std::string row = "| `" + p.name + "` | `" + value + "` | " + p.unit + " | " + p.values + " | " +
+                            p.description + " |\n";
+    EXPECT_NE(document.find(row), std::string::npos) << "docs/parameters.md lacks\n" << row;
+  };
+  for (const auto& p : serverParameters()) expectRow(p, p.get(ServerConfig()));
+  for (const auto& p : inputParameters()) expectRow(p, p.get(InputConfig()));
+}
+
+TEST(ServerConfig, InputsTakeOverWhatTheyDoNotSet) {
+  ServerConfig server;
+  MapperConfig mapper;
+  setParameters({{"label_field", "class"}, {"sensor_model/max_range", "50"}}, server, mapper);
+  ASSERT_EQ(allInputs(server, mapper).size(), 1u);
+  EXPECT_EQ(allInputs(server, mapper)[0].topic, "cloud_in");
+  EXPECT_EQ(allInputs(server, mapper)[0].label_field, "class");
+  setParameters({{"inputs/front/topic", "/front/points"},
+                 {"inputs/front/max_range", "20"},
+                 {"inputs/rear/label_encoding", "bgr"},
+                 {"clear_no_returns", "true"}},
+                server, mapper);
+  const std::vector<InputConfig> inputs = allInputs(server, mapper);
+  ASSERT_EQ(inputs.size(), 2u);
+  EXPECT_EQ(inputs[0].topic, "/front/points");
+  EXPECT_EQ(inputs[0].sensor_model.max_range, 20.0);
+  EXPECT_EQ(inputs[0].label_field, "class");
+  EXPECT_EQ(inputs[1].topic, "rear");
+  EXPECT_EQ(inputs[1].sensor_model.max_range, 50.0);
+  EXPECT_EQ(inputs[1].label_encoding, LabelEncoding::kBgr);
+  EXPECT_TRUE(inputs[1].clear_no_returns);
+  try {
+    setParameters({{"inputs/front/label_encodin", "rgb"}, {"inputs/rear/max_range", "-2"}}, server, mapper);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    const std::string text = fault.what();
+    EXPECT_NE(text.find("did you mean 'inputs/front/label_encoding'"), std::string::npos) << text;
+    EXPECT_NE(text.find("-2"), std::string::npos) << text;
+  }
+  ServerConfig unlimited;
+  EXPECT_THROW(
+      setParameters({{"clear_no_returns", "true"}, {"sensor_model/max_range", "-1"}}, unlimited, mapper),
+      std::invalid_argument);
+}
+
+TEST(LiveSettings, HaveTheNamesDefaultsAndDescriptionsOfTheParameters) {
+  dynamic_reconfigure::Config defaults, expected;
+  MappingConfig::__getDefault__().__toMessage__(defaults);
+  LiveSettings::show(ServerConfig(), MapperConfig()).__toMessage__(expected);
+  const auto same = [](const auto& a, const auto& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].value, b[i].value) << a[i].name;
+  };
+  same(defaults.bools, expected.bools);
+  same(defaults.ints, expected.ints);
+  same(defaults.doubles, expected.doubles);
+  same(defaults.strs, expected.strs);
+  std::map<std::string, std::string> descriptions;
+  const auto collect = [&](const auto& table) {
+    for (const auto& p : table) {
+      std::string name = p.name;
+      std::replace(name.begin(), name.end(), '/', '_');
+      descriptions[name] = p.description;
+    }
+  };
+  collect(serverParameters());
+  collect(mapperParameters());
+  EXPECT_GT(MappingConfig::__getParamDescriptions__().size(), 20u);
+  for (const auto& p : MappingConfig::__getParamDescriptions__()) {
+    if (p->name == "last_refusal") continue;  // an answer, no parameter
+    EXPECT_EQ(p->description, descriptions[p->name]) << p->name;
+  }
+}
+
+TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
+  ServerConfig server;
+  MapperConfig mapper;
+  MappingConfig config = LiveSettings::show(server, mapper);
+  config.free_space_mode = "linear";
+  config.sensor_model_max_range = 40.0;
+  config.color_mode = "height";
+  config.free_space_hits_before_misses = true;
+  LiveSettings::take(config, server, mapper);
+  EXPECT_EQ(mapper.free_space.mode, "linear");
+  EXPECT_EQ(mapper.sensor_model.max_range, 40.0);
+  EXPECT_TRUE(mapper.free_space.hits_before_misses);
+  EXPECT_EQ(server.color_mode, ColorMode::kHeight);
+  config.resolution = 0.1;
+  config.view_range = 7.0;
+  try {
+    LiveSettings::take(config, server, mapper);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_NE(std::string(fault.what()).find("resolution cannot change"), std::string::npos) << fault.what();
+  }
+  EXPECT_EQ(server.view_range, 0.0);
+}
+
+/// Topics and services as the code names them: the first text in advertise, advertiseService and subscribe.
+std::set<std::string> namesInCode() {
+  std::set<std::string> names;
+  const std::regex call(
+      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>|UpdatePublisher)\( ?(?:context, )?"([\w/]+)")re");
+  for (const auto& entry : fs::recursive_directory_iterator(kRoot / "src/ros")) {
+    if (!entry.is_regular_file()) continue;
+    const std::string text = std::regex_replace(textOf(entry.path()), std::regex("\\s+"), " ");
+    for (std::sregex_iterator i(text.begin(), text.end(), call), end; i != end; ++i) names.insert((*i)[1]);
+  }
+  return names;
+}
+
+TEST(Documents, NameEveryTopicAndService) {
+  const std::string document = textOf(kRoot / "docs/ros.md");
+  std::set<std::string> names = namesInCode();
+  EXPECT_EQ(names,
+            (std::set<std::string>{"elevation_map", "free_cells_vis_array", "occupancy", "occupancy_updates",
+                                   "occupied_cells_vis_array", "pause", "projected_map",
+                                   "projected_map_updates", "publish_map", "reset", "resume", "save_map",
+                                   "status", "trajectory", "voxel_cloud", "voxel_cloud_updates"}));
+  names.insert(InputConfig().topic);
+  for (const std::string& name : names) {
+    const bool known = document.find("| `" + name + "` |") != std::string::npos ||
+                       document.find("| `~" + name + "` |") != std::string::npos;
+    EXPECT_TRUE(known) << "docs/ros.md lacks " << name;
+  }
+}
+
+TEST(Documents, HaveARowForEachReasonOfTheStatus) {
+  const std::string document = textOf(kRoot / "docs/ros.md"),
+                    message = textOf(kRoot / "msg/MappingStatus.msg");
+  const std::regex field("uint64 ((dropped|points)_\\w+)");
+  std::map<std::string, std::size_t> counts;
+  for (std::sregex_iterator i(message.begin(), message.end(), field), end; i != end; ++i) {
+    EXPECT_NE(document.find("\n| `" + (*i)[1].str() + "` |"), std::string::npos)
+        << "docs/ros.md lacks " << (*i)[1];
+    ++counts[(*i)[2]];
+  }
+  EXPECT_EQ(counts["dropped"], dropKinds().size());
+  EXPECT_EQ(counts["points"], pointKinds().size() + 3);  // and received, used, no_returns
+}
+
+TEST(Documents, EveryMessageFieldIsExplained) {
+  for (const char* folder : {"msg", "srv"}) {
+    for (const auto& entry : fs::directory_iterator(kRoot / folder)) {
+      std::istringstream lines(textOf(entry.path()));
+      for (std::string line; std::getline(lines, line);) {
+        if (line.empty() || line == "---") continue;
+        const bool comment = line.front() == '#';
+        EXPECT_TRUE(comment || line.find('#') != std::string::npos) << entry.path() << ": " << line;
+      }
+      const std::string name = entry.path().stem().string();
+      EXPECT_NE(textOf(kRoot / "docs/ros.md").find("`bki_mapping/" + name + "`"), std::string::npos)
+          << "docs/ros.md lacks " << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping::ros_shell

@@ -1,0 +1,100 @@
+// The simulated world: beams end on surfaces, labels are what is there, and everything is repeatable.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "simulation/lidar.h"
+
+namespace bki_mapping::simulation {
+namespace {
+
+LidarConfig smallLidar() {
+  LidarConfig lidar;
+  lidar.beams = 16;
+  lidar.columns = 360;
+  lidar.range_noise = 0.0;
+  return lidar;
+}
+
+TEST(Shape, HitsOfABoxACylinderAndAnEllipsoid) {
+  const Eigen::Vector3d forward = Eigen::Vector3d::UnitX();
+  Shape box{ShapeType::kBox, {10, 0, 0}, {1, 2, 3}};
+  EXPECT_NEAR(*box.hit({0, 0, 0}, forward, 0.0), 9.0, 1e-12);
+  EXPECT_FALSE(box.hit({0, 2.1, 0}, forward, 0.0));
+  EXPECT_FALSE(box.hit({20, 0, 0}, forward, 0.0)) << "nothing behind the sensor";
+  box.yaw = M_PI / 2;
+  EXPECT_NEAR(*box.hit({0, 0, 0}, forward, 0.0), 8.0, 1e-9);
+  Shape pillar{ShapeType::kCylinder, {10, 0, 1}, {0.5, 0.5, 1}};
+  EXPECT_NEAR(*pillar.hit({0, 0, 1}, forward, 0.0), 9.5, 1e-12);
+  EXPECT_FALSE(pillar.hit({0, 0, 2.1}, forward, 0.0));
+  Shape ball{ShapeType::kEllipsoid, {10, 0, 0}, {2, 1, 1}};
+  EXPECT_NEAR(*ball.hit({0, 0, 0}, forward, 0.0), 8.0, 1e-12);
+  ball.velocity = {1, 0, 0};
+  EXPECT_NEAR(*ball.hit({0, 0, 0}, forward, 3.0), 11.0, 1e-12);
+  EXPECT_TRUE(ball.contains({13, 0, 0}, 3.0));
+  EXPECT_FALSE(ball.contains({10, 0, 0}, 3.0));
+}
+
+TEST(Lidar, BeamsEndWhereTheWorldBegins) {
+  const Drive drive({5, 8.0, 3, smallLidar()});
+  const SequenceFrame frame = drive.frame(4);
+  ASSERT_GT(frame.points.size(), 1000u);
+  std::size_t checked = 0;
+  for (std::size_t i = 0; i < frame.points.size(); ++i) {
+    const Eigen::Vector3d p = frame.points[i].cast<double>(), u = p.normalized();
+    const Eigen::Isometry3d T = drive.T_world_sensor(4);
+    const double time = drive.timeOf(4);
+    EXPECT_EQ(drive.scene().labelAt(T * (p + 0.002 * u), time), frame.labels[i]) << i;
+    EXPECT_FALSE(drive.scene().labelAt(T * (p - 0.002 * u), time).has_value()) << i;
+    ++checked;
+  }
+  EXPECT_EQ(checked, frame.labels.size());
+}
+
+TEST(Lidar, SeesAllKindsOfThings) {
+  std::set<std::uint32_t> labels;
+  const Drive drive({20, 8.0, 1, LidarConfig()});
+  for (const std::size_t i : {0u, 19u}) {
+    const SequenceFrame frame = drive.frame(i);
+    labels.insert(frame.labels.begin(), frame.labels.end());
+  }
+  for (const std::uint32_t raw : {10u, 252u, 254u, 40u, 48u, 50u, 51u, 70u, 71u, 72u, 80u, 81u}) {
+    EXPECT_TRUE(labels.count(raw)) << raw;
+  }
+}
+
+TEST(Lidar, NoiseIsAsAsked) {
+  LidarConfig noisy = smallLidar();
+  noisy.range_noise = 0.05;
+  noisy.label_noise = 0.3;
+  const SequenceFrame clean = Drive({1, 8.0, 1, smallLidar()}).frame(0),
+                      other = Drive({1, 8.0, 1, noisy}).frame(0);
+  ASSERT_EQ(clean.points.size(), other.points.size());
+  double squares = 0.0, wrong = 0.0;
+  for (std::size_t i = 0; i < clean.points.size(); ++i) {
+    squares += std::pow(clean.points[i].norm() - other.points[i].norm(), 2);
+    wrong += clean.labels[i] != other.labels[i];
+  }
+  const auto n = static_cast<double>(clean.points.size());
+  EXPECT_NEAR(std::sqrt(squares / n), 0.05, 0.005);
+  EXPECT_GT(wrong / n, 0.2);
+  EXPECT_LT(wrong / n, 0.35);
+}
+
+TEST(Drive, RefusesAStreetWithoutEnd) {
+  DriveConfig config{100, 8.0, 1, smallLidar()};
+  config.lidar.rate = 1e-9;
+  EXPECT_THROW(Drive{config}, std::invalid_argument);
+}
+
+TEST(Drive, IsRepeatableAndStartsAtTheMapsOrigin) {
+  const Drive a({3, 8.0, 5, smallLidar()}), b({3, 8.0, 5, smallLidar()}), c({3, 8.0, 6, smallLidar()});
+  EXPECT_EQ(a.frame(2).points, b.frame(2).points);
+  EXPECT_NE(a.frame(2).points, c.frame(2).points);
+  EXPECT_TRUE(a.frame(0).T_map_sensor.isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_EQ(a.frame(2).stamp, Sequence::kFirstStamp + 200000000);
+}
+
+}  // namespace
+}  // namespace bki_mapping::simulation
