@@ -55,7 +55,7 @@ void binning(benchmark::State& state) {
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
-  PointEvidence evidence(f.geometry, f.config.kernel, instruction_set);
+  PointEvidence evidence(f.geometry, f.config.kernel, false, instruction_set);
   evidence.setPoints(f.scan.origin, f.observer.hits(), f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
@@ -75,11 +75,11 @@ void retrieval(benchmark::State& state, BeamIndexType index) {
   Fixture& f = fixture();
   BeamField field(f.geometry, f.config.kernel, index);
   field.setBeams(f.seen.beams, f.pool);
-  EvidenceScratch scratch;
+  NearBeams near;
   for (auto _ : state) {
     for (const auto& entry : f.mapper.map().entries()) {
-      field.findRangesNear(entry.index, scratch);
-      benchmark::DoNotOptimize(scratch.ranges.data());
+      field.findRangesNear(entry.index, near);
+      benchmark::DoNotOptimize(near.ranges.data());
     }
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.mapper.map().size()));
@@ -93,7 +93,7 @@ void lines(benchmark::State& state, BeamIndexType index, const std::string& inst
   evidence.setField(field, f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
-  for (auto _ : state) updater.update(map, {&evidence}, f.pool);
+  for (auto _ : state) updater.update(map, {nullptr, &evidence}, f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
 }
 

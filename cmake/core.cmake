@@ -30,7 +30,7 @@ bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp
     raster/beam_tracks.cpp raster/group_sums.cpp
-    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp ../update/map_updater.cpp
+    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp ../update/map_updater.cpp ../update/sum_sink.cpp ../update/update_rules.cpp
     ../points/cell_merger.cpp ../points/downsample.cpp ../points/point_bins.cpp ../points/point_evidence.cpp
     ../points/soft_point_evidence.cpp ../points/tile_grid.cpp
   LINK bki_mapping_parallel bki_mapping_kernel bki_mapping_map)

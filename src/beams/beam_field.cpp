@@ -47,10 +47,10 @@ void BeamField::setBeams(const Beams& beams, ThreadPool& pool) {
   }
 }
 
-void BeamField::reserve(EvidenceScratch& scratch) const {
+void BeamField::reserve(NearBeams& near) const {
   const std::size_t count = beams_.ends.size();
-  scratch.ranges.reserve(rtree_ ? count : std::min(count, BeamTable::kMostRanges));
-  if (kernel_.type == KernelType::kCounting) scratch.beams.reserve(count);
+  near.ranges.reserve(rtree_ ? count : std::min(count, BeamTable::kMostRanges));
+  if (kernel_.type == KernelType::kCounting) near.beams.reserve(count);
 }
 
 BeamBox BeamField::boxOf(const BlockGroup& group) const {
@@ -61,33 +61,31 @@ BeamBox BeamField::boxOf(const BlockGroup& group) const {
   return {{corner.x(), corner.y(), corner.z()}, static_cast<double>(reach_), group.blocks};
 }
 
-void BeamField::findRangesNear(const BlockGroup& group, EvidenceScratch& scratch) const {
+void BeamField::findRangesNear(const BlockGroup& group, NearBeams& near) const {
   // A ball about the blocks that matter.
   Eigen::Array3d low = Eigen::Array3d::Constant(kGroupEdge), high = Eigen::Array3d::Zero();
   for (std::uint64_t left = group.blocks; left != 0; left &= left - 1) {
     const int n = __builtin_ctzll(left);
-    const Eigen::Array3d place(n % kGroupEdge, n / kGroupEdge % kGroupEdge, n / (kGroupEdge * kGroupEdge));
-    low = low.min(place);
-    high = high.max(place + 1.0);
+    const Eigen::Array3d block(n % kGroupEdge, n / kGroupEdge % kGroupEdge, n / (kGroupEdge * kGroupEdge));
+    low = low.min(block);
+    high = high.max(block + 1.0);
   }
   const BeamBox box = boxOf(group);
   const Eigen::Array3d first = Eigen::Array3d(box.first[0], box.first[1], box.first[2]) - 0.5;
   const Eigen::Vector3d centre = first + 0.5 * kBlockEdge * (low + high);
   const double half_diagonal = 0.5 * kBlockEdge * (high - low).matrix().norm();
-  findRangesNear(centre * geometry_.resolution(), (half_diagonal + box.reach) * geometry_.resolution(),
-                 scratch);
+  findRangesNear(centre * geometry_.resolution(), (half_diagonal + box.reach) * geometry_.resolution(), near);
 }
 
-void BeamField::findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const {
+void BeamField::findRangesNear(const BlockIndex& index, NearBeams& near) const {
   const Eigen::Vector3d centre = geometry_.blockCentre(index) - beams_.origin;
-  findRangesNear(centre, (kLatticeRadius + static_cast<double>(reach_)) * geometry_.resolution(), scratch);
+  findRangesNear(centre, (kLatticeRadius + static_cast<double>(reach_)) * geometry_.resolution(), near);
 }
 
-void BeamField::findRangesNear(const Eigen::Vector3d& centre, double radius_metres,
-                               EvidenceScratch& scratch) const {
+void BeamField::findRangesNear(const Eigen::Vector3d& centre, double radius_metres, NearBeams& near) const {
   const auto radius = static_cast<float>(radius_metres);
-  if (!rtree_) return table_.query(centre.cast<float>(), radius, scratch.ranges);
-  auto& ranges = scratch.ranges;
+  if (!rtree_) return table_.query(centre.cast<float>(), radius, near.ranges);
+  auto& ranges = near.ranges;
   rtree_->query(centre.cast<float>(), radius, ranges);
   std::sort(ranges.begin(), ranges.end(),
             [](const BeamRange& a, const BeamRange& b) { return a.first < b.first; });
@@ -118,20 +116,20 @@ LocalBeam BeamField::localBeam(std::size_t b, const BlockIndex& index) const {
           f(n.z()), f(g),     f(1.0 / g), f(along / length), f(resolution / length)};
 }
 
-void BeamField::findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const {
-  findRangesNear(index, scratch);
+void BeamField::findBeamsNear(const BlockIndex& index, double follow, NearBeams& near) const {
+  findRangesNear(index, near);
   // A first look in single precision, with room for its rounding.
   const Eigen::Vector3f c = (geometry_.blockCentre(index) - beams_.origin).cast<float>();
   const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
   const float distance2 = c.squaredNorm(), limit2 = radius * radius + 1e-5f * distance2;
   const auto follow_to = static_cast<float>(follow);
-  scratch.beams.clear();
-  for (const BeamRange& range : scratch.ranges) {
+  near.beams.clear();
+  for (const BeamRange& range : near.ranges) {
     for (std::uint32_t b = range.first; b < range.last; ++b) {
       const float length = 1.0f / inverse_length_[b];
       const Eigen::Vector3f u = beams_.ends[b] * inverse_length_[b];
       const float along = c.dot(u), end = std::max(length, follow_to) + radius;
-      if (distance2 - along * along < limit2 && along > -radius && along < end) scratch.beams.push_back(b);
+      if (distance2 - along * along < limit2 && along > -radius && along < end) near.beams.push_back(b);
     }
   }
 }

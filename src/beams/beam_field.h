@@ -6,12 +6,19 @@
 
 #include "beams/beam_index.h"
 #include "beams/beams.h"
+#include "beams/raster/beam_box.h"
 #include "beams/row_walk.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "kernel/sparse_kernel.h"
-#include "update/evidence.h"
+#include "update/block_group.h"
 
 namespace bki_mapping {
+
+/// Working memory of one thread: beams near a block or a group.
+struct NearBeams {
+  std::vector<BeamRange> ranges;
+  std::vector<std::uint32_t> beams;
+};
 
 /// What line evidence and occlusion share: the beams, their index, and how near a voxel must be. With the
 /// sparse kernel a beam reaches the voxels whose centre is within its length; with the counting kernel those
@@ -34,29 +41,28 @@ class BeamField {
   double reachMetres() const { return reach_ * geometry_.resolution(); }
   double longest() const { return longest_; }  ///< length of the longest beam [m]
 
-  /// Takes the working memory that the finding of beams can need.
-  void reserve(EvidenceScratch& scratch) const;
+  /// Takes the memory that finding beams can need.
+  void reserve(NearBeams& near) const;
 
-  /// Names beams, among them all whose half-lines reach the block, as numbers in scratch.ranges: sorted, and
-  /// none twice.
-  void findRangesNear(const BlockIndex& index, EvidenceScratch& scratch) const;
+  /// Sets near.ranges to ranges of beams, among them all whose half-lines reach the block: sorted, and no
+  /// beam twice.
+  void findRangesNear(const BlockIndex& index, NearBeams& near) const;
 
   /// The same of a group.
-  void findRangesNear(const BlockGroup& group, EvidenceScratch& scratch) const;
+  void findRangesNear(const BlockGroup& group, NearBeams& near) const;
 
   /// Calls visit(offset, rho, length) for every voxel of the block that the line of a beam reaches, with rho
   /// the projection of the voxel's centre on the beam / beam length [m]. Beams that end more than `follow`
   /// before the block are left out. @param follow how far from the sensor beams matter, if that is farther
   /// than their end [m].
   template <typename Visit>
-  void forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
-                        Visit&& visit) const;
+  void forEachVoxelNear(const BlockIndex& index, double follow, NearBeams& near, Visit&& visit) const;
 
  private:
   /// @param centre of a ball, relative to the sensor [m]. @param radius [m].
-  void findRangesNear(const Eigen::Vector3d& centre, double radius, EvidenceScratch& scratch) const;
-  /// Finds the beams that may reach the block: their numbers in scratch.beams.
-  void findBeamsNear(const BlockIndex& index, double follow, EvidenceScratch& scratch) const;
+  void findRangesNear(const Eigen::Vector3d& centre, double radius, NearBeams& near) const;
+  /// Finds the beams that may reach the block: near.beams.
+  void findBeamsNear(const BlockIndex& index, double follow, NearBeams& near) const;
   LocalBeam localBeam(std::size_t beam, const BlockIndex& index) const;
   /// Whether a beam's line crosses a voxel of a block (the counting kernel's reach).
   bool crosses(const BlockIndex& index, int offset, const Eigen::Vector3f& end) const;
@@ -98,11 +104,11 @@ class LazyBeamField {
 };
 
 template <typename Visit>
-void BeamField::forEachVoxelNear(const BlockIndex& index, double follow, EvidenceScratch& scratch,
+void BeamField::forEachVoxelNear(const BlockIndex& index, double follow, NearBeams& near,
                                  Visit&& visit) const {
   const bool counting = kernel_.type == KernelType::kCounting;
-  findBeamsNear(index, follow, scratch);
-  for (const std::uint32_t b : scratch.beams) {
+  findBeamsNear(index, follow, near);
+  for (const std::uint32_t b : near.beams) {
     const LocalBeam local = localBeam(b, index);
     const Eigen::Vector3f& end = beams_.ends[b];
     const float length = end.norm();

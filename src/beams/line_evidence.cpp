@@ -17,13 +17,13 @@ float weightAt(BeamWeight weight, float rho) {
   }
 }
 
-/// @return whether anything is left. (Written so that compilers use vector instructions.)
-bool scaleAndLimit(float scale, float limit, float* sums) {
+/// @return whether any sum is above 0. (Written so that compilers use vector instructions.)
+bool scaleSums(float scale, float* sums) {
   unsigned some = 0;
   for (int v = 0; v < kBlockVoxels; ++v) {
-    const float sum = sums[v] * scale, limited = sum < limit ? sum : limit;
-    sums[v] = limited > 0.0f ? limited : 0.0f;  // the kernel's tail may be a little below 0
-    some |= limited > 0.0f ? 1u : 0u;
+    const float sum = sums[v] * scale;
+    sums[v] = sum > 0.0f ? sum : 0.0f;  // the kernel's tail may be a little below 0
+    some |= sum > 0.0f ? 1u : 0u;
   }
   return some != 0;
 }
@@ -36,7 +36,7 @@ void LineEvidence::setField(const BeamField& field, ThreadPool& pool) {
   tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), loops_, pool);
 }
 
-const std::vector<GridIndex>& LineEvidence::collectBlocks(const SemanticMap& map, std::size_t most,
+const std::vector<GridIndex>& LineEvidence::touchedBlocks(const SemanticMap& map, std::size_t most,
                                                           ThreadPool& pool) {
   const double reach = field_->reachMetres();
   touched_.clear();
@@ -48,35 +48,46 @@ const std::vector<GridIndex>& LineEvidence::collectBlocks(const SemanticMap& map
   return touched_.members();
 }
 
-void LineEvidence::reserve(EvidenceScratch& scratch) const {
-  field_->reserve(scratch);
-  if (field_->kernel().type == KernelType::kSparse) scratch.group.reserve(field_->beams().ends.size());
+void LineEvidence::reserve(std::size_t workers) {
+  workspaces_.resize(workers);
+  for (Workspace& each : workspaces_) {
+    field_->reserve(each.near);
+    if (field_->kernel().type == KernelType::kSparse) each.group.reserve(field_->beams().ends.size());
+  }
 }
 
-double LineEvidence::effort(const BlockGroup& group) const {
+double LineEvidence::cost(const BlockGroup& group) const {
   // As many beams as the group is large, seen from the sensor.
   return 1.0 / std::max(field_->boxOf(group).centre().squaredNorm(), BeamBox::kHalf * BeamBox::kHalf);
 }
 
-void LineEvidence::enter(const BlockGroup& group, EvidenceScratch& scratch) const {
-  if (field_->kernel().type == KernelType::kCounting) return;
-  field_->findRangesNear(group, scratch);
-  loops_.trace_beams(tracks_.arrays(), scratch.ranges.data(), scratch.ranges.size(), field_->boxOf(group),
-                     weight_, scratch.group);
+void LineEvidence::countCrossings(const BlockIndex& index, NearBeams& near, float* sums) const {
+  std::fill_n(sums, kBlockVoxels, 0.0f);
+  field_->forEachVoxelNear(index, 0.0, near,
+                           [&](int offset, float rho, float) { sums[offset] += weightAt(weight_, rho); });
 }
 
-void LineEvidence::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
-  float* sums = scratch.sums.data();
-  if (field_->kernel().type == KernelType::kCounting) {
-    scratch.sums.fill(0.0f);
-    field_->forEachVoxelNear(index, 0.0, scratch,
-                             [&](int offset, float rho, float) { sums[offset] += weightAt(weight_, rho); });
-  } else {
-    scratch.group.sumsOf({placeInGroup(index.x), placeInGroup(index.y), placeInGroup(index.z)}, sums);
+void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks,
+                              std::size_t worker, SumSink& sink) {
+  Workspace& own = workspaces_[worker];
+  const bool counting = field_->kernel().type == KernelType::kCounting;
+  if (!counting) {
+    field_->findRangesNear(group, own.near);
+    loops_.trace_beams(tracks_.arrays(), own.near.ranges.data(), own.near.ranges.size(), field_->boxOf(group),
+                       weight_, own.group);
   }
-  scratch.leaveHeldAlone();
-  if (scaleAndLimit(field_->kernel().scale, scratch.limits.free, sums)) {
-    scratch.not_finite += block.add(kFreeClass, sums);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const BlockIndex& index = blocks[b].index;
+    BlockSums& sums = sink.open(b);
+    float* const values = sums.open(kFreeClass).values;
+    if (counting) {
+      countCrossings(index, own.near, values);
+    } else {
+      own.group.sumsOf({coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)},
+                       values);
+    }
+    if (!scaleSums(field_->kernel().scale, values)) sums.drop();
+    sink.close();
   }
 }
 

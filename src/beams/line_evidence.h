@@ -5,7 +5,9 @@
 
 #include "beams/beam_field.h"
 #include "beams/block_walk.h"
+#include "beams/raster/group_sums.h"
 #include "simd/inner_loops.h"
+#include "update/evidence.h"
 
 namespace bki_mapping {
 
@@ -20,16 +22,24 @@ class LineEvidence : public Evidence {
   /// Replaces the beams. @param field must stay where it is until the scan is done.
   void setField(const BeamField& field, ThreadPool& pool);
 
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+  const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
   void markClasses(std::size_t, ClassSet& classes) const override { classes.set(kFreeClass); }
-  void reserve(EvidenceScratch& scratch) const override;
-  double effort(const BlockGroup& group) const override;
-  void enter(const BlockGroup& group, EvidenceScratch& scratch) const override;
-  void addTo(std::size_t number, const BlockIndex& index, Block& block,
-             EvidenceScratch& scratch) const override;
+  void reserve(std::size_t workers) override;
+  double cost(const BlockGroup& group) const override;
+  /// Finds the beams near the group, adds them to its voxels, and hands over block by block.
+  void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
+                  SumSink& sink) override;
 
  private:
+  /// Working memory of one thread.
+  struct alignas(kThreadsApart) Workspace {
+    NearBeams near;
+    GroupSums group;
+  };
+  /// The same for the counting kernel: a beam adds to the voxels that it crosses.
+  void countCrossings(const BlockIndex& index, NearBeams& near, float* sums) const;
+
   const BeamField* field_ = nullptr;
   BeamWeight weight_;
   FreeSpaceExtent extent_;
@@ -37,6 +47,7 @@ class LineEvidence : public Evidence {
   BeamTracks tracks_;
   BlockWalk walk_;
   IndexNumbering touched_;
+  std::vector<Workspace> workspaces_;
 };
 
 }  // namespace bki_mapping

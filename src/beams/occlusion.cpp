@@ -2,7 +2,7 @@
 
 namespace bki_mapping {
 
-const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, std::size_t most,
+const std::vector<GridIndex>& Occlusion::touchedBlocks(const SemanticMap& map, std::size_t most,
                                                        ThreadPool& pool) {
   const double reach = field_->reachMetres();
   touched_.clear();
@@ -13,20 +13,24 @@ const std::vector<GridIndex>& Occlusion::collectBlocks(const SemanticMap& map, s
   return touched_.members();
 }
 
-void Occlusion::reserve(EvidenceScratch& scratch) const {
-  field_->reserve(scratch);
-  scratch.beams.reserve(field_->beams().ends.size());
+void Occlusion::reserve(std::size_t workers) {
+  workspaces_.resize(workers);
+  for (Workspace& each : workspaces_) {
+    field_->reserve(each.near);
+    each.near.beams.reserve(field_->beams().ends.size());
+  }
 }
 
-void Occlusion::addTo(std::size_t, const BlockIndex& index, Block& block, EvidenceScratch& scratch) const {
+void Occlusion::apply(const GroupBlock& block, std::size_t worker, Block& to) {
   Block::Occlusion behind, crossed;
   const auto range = static_cast<float>(range_);
-  field_->forEachVoxelNear(index, range_, scratch, [&](int offset, float rho, float length) {
-    const auto voxel = static_cast<std::size_t>(offset);
-    if (rho >= 1.0f && rho * length <= range) behind.set(voxel);
-    if (rho > 0.0f && rho < 1.0f) crossed.set(voxel);
-  });
-  block.setOcclusion((block.occlusion() | behind) & ~crossed);
+  field_->forEachVoxelNear(block.index, range_, workspaces_[worker].near,
+                           [&](int offset, float rho, float length) {
+                             const auto voxel = static_cast<std::size_t>(offset);
+                             if (rho >= 1.0f && rho * length <= range) behind.set(voxel);
+                             if (rho > 0.0f && rho < 1.0f) crossed.set(voxel);
+                           });
+  to.setOcclusion((to.occlusion() | behind) & ~crossed);
 }
 
 }  // namespace bki_mapping

@@ -3,12 +3,13 @@
 
 #include "beams/beam_field.h"
 #include "beams/block_walk.h"
+#include "update/evidence.h"
 
 namespace bki_mapping {
 
 /// Marks the voxels that lie behind the end of some beam (rho >= 1) and that no beam of this scan crosses
 /// (0 < rho < 1). Voxels that this scan does not reach keep the mark of an earlier one.
-class Occlusion : public Evidence {
+class Occlusion : public BlockPass {
  public:
   explicit Occlusion(OcclusionExtent extent) : extent_(extent) {}
 
@@ -19,19 +20,23 @@ class Occlusion : public Evidence {
     range_ = range;
   }
 
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+  const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
-  void markClasses(std::size_t, ClassSet&) const override {}
-  void reserve(EvidenceScratch& scratch) const override;
-  void addTo(std::size_t number, const BlockIndex& index, Block& block,
-             EvidenceScratch& scratch) const override;
+  void reserve(std::size_t workers) override;
+  void apply(const GroupBlock& block, std::size_t worker, Block& to) override;
 
  private:
+  /// Working memory of one thread.
+  struct alignas(kThreadsApart) Workspace {
+    NearBeams near;
+  };
+
   OcclusionExtent extent_;
   const BeamField* field_ = nullptr;
   double range_ = 0.0;
   BlockWalk walk_;
   IndexNumbering touched_;
+  std::vector<Workspace> workspaces_;
 };
 
 }  // namespace bki_mapping

@@ -3,6 +3,7 @@
 
 #include "beams/beam_field.h"
 #include "bki_mapping/free_space/free_space_config.h"
+#include "update/evidence.h"
 
 namespace bki_mapping {
 

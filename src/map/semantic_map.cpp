@@ -74,11 +74,11 @@ void SemanticMap::append(const BlockIndex& index) {
   region.push_back(static_cast<std::uint32_t>(entries_.size() - 1));
 }
 
-SemanticMap::Entry& SemanticMap::entry(const BlockIndex& index) {
+std::size_t SemanticMap::positionOf(const BlockIndex& index) {
   const std::uint32_t place = place_.find(index);
-  if (place != GridTable::kNone) return entries_[place];
+  if (place != GridTable::kNone) return place;
   append(index);
-  return entries_.back();
+  return entries_.size() - 1;
 }
 
 void SemanticMap::erase(const BlockIndex& index) noexcept {

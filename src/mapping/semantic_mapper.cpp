@@ -56,12 +56,19 @@ std::string megabytes(double bytes) {
   return numberText(std::round(bytes / 1e6)) + " MB";
 }
 
+UpdateRules rulesOf(const MapperConfig& config) {
+  UpdateRules rules;
+  rules.hits_before_misses = config.free_space.hits_before_misses;
+  rules.evidence_before_misses = config.free_space.evidence_before_misses;
+  if (config.scan_limit.hits > 0.0) rules.most_hits = static_cast<float>(config.scan_limit.hits);
+  if (config.scan_limit.free > 0.0) rules.most_free = static_cast<float>(config.scan_limit.free);
+  return rules;
+}
+
 /// What the update of a scan may take. @param map_bytes that the map takes already.
 UpdateLimits limitsFor(const Scan& scan, const MapperConfig& config, const GridGeometry& geometry,
                        std::size_t map_bytes) {
   UpdateLimits limits;
-  if (config.scan_limit.hits > 0.0) limits.evidence.hits = static_cast<float>(config.scan_limit.hits);
-  if (config.scan_limit.free > 0.0) limits.evidence.free = static_cast<float>(config.scan_limit.free);
   if (config.scan_limit.blocks > 0) {
     limits.blocks = static_cast<std::size_t>(config.scan_limit.blocks);
   } else {
@@ -117,21 +124,15 @@ struct SemanticMapper::Pipeline {
   std::unique_ptr<FreeSpaceModel> free_space;
   Occlusion occlusion;
   MapUpdater updater;
-  std::vector<Evidence*> evidence;
 
   Pipeline(const MapperConfig& config, const GridGeometry& geometry)
       : observer(config),
-        hits(geometry, config.kernel),
-        soft_hits(geometry, config.kernel),
+        hits(geometry, config.kernel, config.free_space.hits_before_misses),
+        soft_hits(geometry, config.kernel, config.free_space.hits_before_misses),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
-        occlusion(config.occlusion) {
-    hits.protectVoxels(config.free_space.hits_before_misses);
-    soft_hits.protectVoxels(config.free_space.hits_before_misses);
-    hits.protectEvidence(config.free_space.evidence_before_misses);
-    soft_hits.protectEvidence(config.free_space.evidence_before_misses);
-  }
+        occlusion(config.occlusion) {}
 };
 
 SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
@@ -228,21 +229,22 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   }
   p.beams.setBeams(seen.beams);
   const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
-  p.evidence.assign(1, soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits);
-  if (free.evidence) p.evidence.push_back(free.evidence);
+  ScanEvidence evidence;
+  evidence.hits = soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits;
+  evidence.free = free.evidence;
   if (occludes) {
     const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
     const BeamField& field = p.beams.field(*pool_);
     const double range = sensor.knowsRange() ? sensor.max_range : field.longest();
     const auto edge = static_cast<double>(map_.geometry().safeRange(scan.origin));  // voxels end there
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
-    p.evidence.push_back(&p.occlusion);
+    evidence.occlusion = &p.occlusion;
   }
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  const MapUpdateStats update =
-      p.updater.update(map_, p.evidence, *pool_, limitsFor(scan, config_, map_.geometry(), mapBytes()));
+  const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, rulesOf(config_),
+                                                 limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
   stats.not_finite = update.not_finite;
   block_bytes_ += static_cast<std::size_t>(update.bytes);  // two's complement: may be negative

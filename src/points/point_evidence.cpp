@@ -1,29 +1,22 @@
 #include "points/point_evidence.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace bki_mapping {
-namespace {
 
-bool isZero(float x) {
-  return x == 0.0f;
-}
-
-}  // namespace
-
-PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
+PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels,
                              const std::string& instruction_set)
     : kernel_(kernel, geometry.resolution()),
       loops_(innerLoopsFor(instruction_set)),
-      bins_(geometry, kernel_, loops_) {}
+      bins_(geometry, kernel_, loops_),
+      reports_voxels_(reports_voxels) {}
 
 void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool) {
   size_ = points.size();
-  bins_.setPoints(origin, points, protect_, pool);
+  bins_.setPoints(origin, points, reports_voxels_, pool);
 }
 
-const std::vector<GridIndex>& PointEvidence::collectBlocks(const SemanticMap&, std::size_t most,
+const std::vector<GridIndex>& PointEvidence::touchedBlocks(const SemanticMap&, std::size_t most,
                                                            ThreadPool&) {
   limitBlocks(bins_.blocks().size(), most);
   return bins_.blocks().members();
@@ -46,29 +39,31 @@ void PointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
   }
 }
 
-void PointEvidence::reserve(EvidenceScratch& scratch) const {
-  std::size_t most = scratch.points.size();
+void PointEvidence::reserve(std::size_t workers) {
+  std::size_t most = 0;
+  for (const Workspace& each : workspaces_) most = std::max(most, each.points.size());
   for (std::size_t block = 0; block < bins_.blocks().size() && !bins_.oneClass(); ++block) {
     std::size_t count = 0;
     for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) count += run->count;
     most = std::max(most, count);
   }
-  scratch.points.resize(most);
+  workspaces_.resize(workers);
+  for (Workspace& each : workspaces_) each.points.resize(most);
 }
 
-Block::Layers PointEvidence::sumPoints(const PointRun* runs, std::size_t count,
-                                       EvidenceScratch& scratch) const {
+void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const {
+  BlockSums::Plane& plane = sums.open(label);
   if (kernel_.type == KernelType::kSparse) {
-    return loops_.sum_points(runs, count, kernel_.reach, kernel_.scale, scratch.sums.data());
+    plane.layers = loops_.sum_points(runs, count, kernel_.reach, kernel_.scale, plane.values);
+    return;
   }
-  scratch.sums.fill(0.0f);
+  std::fill_n(plane.values, kBlockVoxels, 0.0f);
   for (const PointRun* run = runs; run != runs + count; ++run) {
-    for (std::size_t i = 0; i < run->count; ++i) scratch.sums[run->points[i].voxel] += 1.0f;
+    for (std::size_t i = 0; i < run->count; ++i) plane.values[run->points[i].voxel] += 1.0f;
   }
-  return {};
 }
 
-std::size_t PointEvidence::sortByClass(std::size_t block, EvidenceScratch& scratch, ClassEnds& end) const {
+std::size_t PointEvidence::sortByClass(std::size_t block, Workspace& workspace, ClassEnds& end) const {
   end.fill(0);
   std::size_t count = 0, last = 0;
   for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
@@ -83,60 +78,48 @@ std::size_t PointEvidence::sortByClass(std::size_t block, EvidenceScratch& scrat
   for (std::size_t label = 1; label <= last; ++label) end[label] += end[label - 1];
   for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
-      scratch.points[end[run->points[i].label]++] = run->points[i];
+      workspace.points[end[run->points[i].label]++] = run->points[i];
     }
   }
   return count;
 }
 
-void PointEvidence::addClass(ClassId label, const PointRun* runs, std::size_t count, bool limited,
-                             Block& block, EvidenceScratch& scratch) const {
-  const Block::Layers layers = sumPoints(runs, count, scratch);
-  if (protect_evidence_) scratch.holdSums();
-  if (label == kFreeClass) {
-    scratch.leaveHeldAlone();
-    scratch.limitFree();
-  } else if (limited) {
-    scratch.limitHits();
+void PointEvidence::sumBlock(std::size_t block, Workspace& workspace, BlockSums& sums) const {
+  const PointRun* const runs = bins_.begin(block);
+  const auto run_count = static_cast<std::size_t>(bins_.end(block) - runs);
+  for (const PointRun* run = runs; reports_voxels_ && run != runs + run_count; ++run) {
+    for (std::size_t i = 0; i < run->count; ++i) {
+      if (run->points[i].voxel != LocalPoint::kOutside) sums.occupied.set(run->points[i].voxel);
+    }
   }
-  const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(), isZero);
-  if (!nothing) scratch.not_finite += block.add(label, scratch.sums.data(), layers);
+  if (bins_.oneClass()) {
+    sumClass(static_cast<ClassId>(runs->points->label), runs, run_count, sums);
+    return;
+  }
+  ClassEnds end;
+  const std::size_t count = sortByClass(block, workspace, end);
+  for (std::size_t i = 0; i < count;) {
+    const auto label = static_cast<ClassId>(workspace.points[i].label);
+    const PointRun run{workspace.points.data() + i, end[label] - i, 0};
+    sumClass(label, &run, 1, sums);
+    i = end[label];
+  }
 }
 
-void PointEvidence::prefetch(std::size_t number) const {
+void PointEvidence::prefetch(std::size_t block) const {
   constexpr std::size_t kPointsALine = 64 / sizeof(LocalPoint), kMostLines = 16;
-  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) {
+  for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
     const std::size_t end = std::min(run->count, kMostLines * kPointsALine);
     for (std::size_t i = 0; i < end; i += kPointsALine) __builtin_prefetch(run->points + i);
   }
 }
 
-void PointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
-                          EvidenceScratch& scratch) const {
-  const PointRun* const runs = bins_.begin(number);
-  const auto run_count = static_cast<std::size_t>(bins_.end(number) - runs);
-  for (const PointRun* run = runs; protect_ && run != runs + run_count; ++run) {
-    for (std::size_t i = 0; i < run->count; ++i) {
-      if (run->points[i].voxel != LocalPoint::kOutside) scratch.held.set(run->points[i].voxel);
-    }
-  }
-  const auto first_class = static_cast<ClassId>(runs->points->label);
-  const bool limited = std::isfinite(scratch.limits.hits) && first_class != kFreeClass;
-  if (limited) {
-    sumPoints(runs, run_count, scratch);
-    scratch.shareHits();
-  }
-  if (bins_.oneClass()) {
-    addClass(first_class, runs, run_count, limited, block, scratch);
-    return;
-  }
-  ClassEnds end;
-  const std::size_t count = sortByClass(number, scratch, end);
-  for (std::size_t i = 0; i < count;) {
-    const auto label = static_cast<ClassId>(scratch.points[i].label);
-    const PointRun run{scratch.points.data() + i, end[label] - i, 0};
-    addClass(label, &run, 1, limited, block, scratch);
-    i = end[label];
+void PointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t worker,
+                               SumSink& sink) {
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (b + 1 < blocks.size()) prefetch(blocks[b + 1].number);
+    sumBlock(blocks[b].number, workspaces_[worker], sink.open(b));
+    sink.close();
   }
 }
 

@@ -13,9 +13,10 @@ namespace bki_mapping {
 /// the counting kernel 1 for the voxel that holds the point. Keeps its memory from scan to scan.
 class PointEvidence : public Evidence {
  public:
+  /// @param reports_voxels whether the voxels that hold a point are reported (BlockSums::occupied).
   /// @param instruction_set one of instructionSets(); the best there is if empty.
   /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
-  PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel,
+  PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels = false,
                 const std::string& instruction_set = "");
 
   /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
@@ -23,35 +24,37 @@ class PointEvidence : public Evidence {
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool);
   std::size_t size() const { return size_; }  ///< number of points
 
-  /// Whether evidence for `free` that stands behind this one leaves the voxels alone that hold a point.
-  void protectVoxels(bool protect) { protect_ = protect; }
-  /// The same for voxels to which a point adds evidence.
-  void protectEvidence(bool protect) { protect_evidence_ = protect; }
-
-  /// Exactly the blocks with a voxel centre within reach of a point.
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+  /// Exactly the blocks with a voxel centre within reach of a point, or, if voxels are reported, with a
+  /// point.
+  const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
   void markClasses(std::size_t number, ClassSet& classes) const override;
-  void reserve(EvidenceScratch& scratch) const override;
-  void prefetch(std::size_t number) const override;
-  void addTo(std::size_t number, const BlockIndex& index, Block& block,
-             EvidenceScratch& scratch) const override;
+  void reserve(std::size_t workers) override;
+  void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
+                  SumSink& sink) override;
 
  private:
+  /// Working memory of one thread: the points of a block, class by class.
+  struct alignas(kThreadsApart) Workspace {
+    std::vector<LocalPoint> points;
+  };
   /// Where the points of each class end.
   using ClassEnds = std::array<std::uint32_t, kMaxClasses + 3>;
-  /// Brings the points of a block into `scratch.points`, class by class. @return how many they are.
-  std::size_t sortByClass(std::size_t block, EvidenceScratch& scratch, ClassEnds& end) const;
-  void addClass(ClassId label, const PointRun* runs, std::size_t count, bool limited, Block& block,
-                EvidenceScratch& scratch) const;
-  /// Sets `scratch.sums` to those of the points. @return the layers outside of which all are 0.
-  Block::Layers sumPoints(const PointRun* runs, std::size_t count, EvidenceScratch& scratch) const;
+
+  /// Brings the points of a block into the workspace, class by class. @return how many they are.
+  std::size_t sortByClass(std::size_t block, Workspace& workspace, ClassEnds& end) const;
+  void sumBlock(std::size_t block, Workspace& workspace, BlockSums& sums) const;
+  /// Opens the plane of a class and sets it to the sums of the points.
+  void sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const;
+  /// Fetches the points of a block.
+  void prefetch(std::size_t block) const;
 
   VoxelKernel kernel_;
   const InnerLoops& loops_;
   PointBins bins_;
-  bool protect_ = false, protect_evidence_ = false;
+  bool reports_voxels_;
   std::size_t size_ = 0;
+  std::vector<Workspace> workspaces_;
 };
 
 }  // namespace bki_mapping

@@ -1,7 +1,6 @@
 #include "points/soft_point_evidence.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "points/axis_blocks.h"
 
@@ -37,7 +36,7 @@ void SoftPointEvidence::bin(const Eigen::Vector3d& point, const ClassShare* begi
       }
     }
   }
-  if (!at_home && (protect_ || kernel_.type == KernelType::kCounting)) append(home, x, y, z);
+  if (!at_home && (reports_voxels_ || kernel_.type == KernelType::kCounting)) append(home, x, y, z);
 }
 
 void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points,
@@ -53,7 +52,7 @@ void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledP
   }
 }
 
-const std::vector<GridIndex>& SoftPointEvidence::collectBlocks(const SemanticMap&, std::size_t most,
+const std::vector<GridIndex>& SoftPointEvidence::touchedBlocks(const SemanticMap&, std::size_t most,
                                                                ThreadPool&) {
   limitBlocks(blocks_.size(), most);
   return blocks_.members();
@@ -63,7 +62,7 @@ void SoftPointEvidence::markClasses(std::size_t number, ClassSet& classes) const
   for (const Record& record : records_[number]) classes.set(record.point.label);
 }
 
-void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
+void SoftPointEvidence::sumRecord(const Record& record, float* sums) const {
   const LocalPoint& point = record.point;
   if (kernel_.type == KernelType::kCounting) {
     sums[point.voxel] += record.share;
@@ -79,28 +78,24 @@ void SoftPointEvidence::addRecord(const Record& record, float* sums) const {
   }
 }
 
-void SoftPointEvidence::addTo(std::size_t number, const BlockIndex&, Block& block,
-                              EvidenceScratch& scratch) const {
-  const std::vector<Record>& records = records_[number];
-  const bool limited = std::isfinite(scratch.limits.hits);
-  if (limited) {
-    scratch.sums.fill(0.0f);
-    for (const Record& record : records) addRecord(record, scratch.sums.data());
-    scratch.shareHits();
-  }
+void SoftPointEvidence::sumBlock(const std::vector<Record>& records, BlockSums& sums) const {
   for (std::size_t i = 0; i < records.size();) {
     const auto label = static_cast<ClassId>(records[i].point.label);
-    scratch.sums.fill(0.0f);
+    float* const values = sums.open(label).values;
+    std::fill_n(values, kBlockVoxels, 0.0f);
     for (; i < records.size() && records[i].point.label == label; ++i) {
       const std::uint16_t voxel = records[i].point.voxel;
-      if (protect_ && voxel != LocalPoint::kOutside) scratch.held.set(voxel);
-      addRecord(records[i], scratch.sums.data());
+      if (reports_voxels_ && voxel != LocalPoint::kOutside) sums.occupied.set(voxel);
+      sumRecord(records[i], values);
     }
-    if (protect_evidence_) scratch.holdSums();
-    if (limited) scratch.limitHits();
-    const bool nothing = protect_ && std::all_of(scratch.sums.begin(), scratch.sums.end(),
-                                                 [](float sum) { return sum == 0.0f; });
-    if (!nothing) scratch.not_finite += block.add(label, scratch.sums.data());
+  }
+}
+
+void SoftPointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t,
+                                   SumSink& sink) {
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    sumBlock(records_[blocks[b].number], sink.open(b));
+    sink.close();
   }
 }
 

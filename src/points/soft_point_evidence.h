@@ -14,23 +14,21 @@ namespace bki_mapping {
 /// fast.
 class SoftPointEvidence : public Evidence {
  public:
-  SoftPointEvidence(const GridGeometry& geometry, const KernelConfig& kernel)
-      : geometry_(geometry), kernel_(kernel, geometry.resolution()) {}
+  /// @param reports_voxels as in PointEvidence.
+  SoftPointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels)
+      : geometry_(geometry), kernel_(kernel, geometry.resolution()), reports_voxels_(reports_voxels) {}
 
   /// Replaces the points. @param origin of the points in the map frame [m]. @param soft one set a point.
   void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, const SoftLabels& soft);
-  /// Whether evidence for `free` that stands behind this one leaves the voxels alone that hold a point.
-  void protectVoxels(bool protect) { protect_ = protect; }
-  /// The same for voxels to which a point adds evidence.
-  void protectEvidence(bool protect) { protect_evidence_ = protect; }
 
-  /// Exactly the blocks with a voxel centre within reach of a point, or, if protected, with a point.
-  const std::vector<GridIndex>& collectBlocks(const SemanticMap& map, std::size_t most,
+  /// Exactly the blocks with a voxel centre within reach of a point, or, if voxels are reported, with a
+  /// point.
+  const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
   void markClasses(std::size_t number, ClassSet& classes) const override;
-  void reserve(EvidenceScratch&) const override {}
-  void addTo(std::size_t number, const BlockIndex& index, Block& block,
-             EvidenceScratch& scratch) const override;
+  void reserve(std::size_t) override {}
+  void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
+                  SumSink& sink) override;
 
  private:
   struct Record {
@@ -39,11 +37,12 @@ class SoftPointEvidence : public Evidence {
   };
 
   void bin(const Eigen::Vector3d& point, const ClassShare* begin, const ClassShare* end);
-  void addRecord(const Record& record, float* sums) const;
+  void sumRecord(const Record& record, float* sums) const;
+  void sumBlock(const std::vector<Record>& records, BlockSums& sums) const;
 
   GridGeometry geometry_;
   VoxelKernel kernel_;
-  bool protect_ = false, protect_evidence_ = false;
+  bool reports_voxels_;
   IndexNumbering blocks_;
   std::vector<std::vector<Record>> records_;  ///< of each block, by class
 };

@@ -1,4 +1,4 @@
-/// @file Cubes of blocks, which one thread updates in one go.
+/// @file Cubes of blocks, each updated by one thread in one go.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +10,27 @@ namespace bki_mapping {
 /// A group has 4 x 4 x 4 blocks, 32 x 32 x 32 voxels.
 constexpr int kGroupEdge = 4;                          ///< [blocks]
 constexpr int kGroupVoxels = kGroupEdge * kBlockEdge;  ///< of an edge
+constexpr int kGroupBlocks = kGroupEdge * kGroupEdge * kGroupEdge;
 
+/// Some blocks of a group: bit n is the block in slot n.
 struct BlockGroup {
   GridIndex index;
-  std::uint64_t blocks = 0;  ///< those that matter, each the bit of its place
+  std::uint64_t blocks = 0;
 };
 
-/// The group in which a block lies.
+/// The group that contains a block.
 inline GridIndex groupOf(const BlockIndex& block) {
   static_assert(kGroupEdge == 4 && -1 >> 2 == -1, "a shift divides by the edge, towards minus infinity");
   return {block.x >> 2, block.y >> 2, block.z >> 2};
 }
-/// The place of a block in its group, from 0 on, along one axis.
-inline int placeInGroup(std::int32_t coordinate) {
+/// The coordinate of a block from its group's first block on, along one axis.
+inline int coordinateInGroup(std::int32_t coordinate) {
   return coordinate & (kGroupEdge - 1);
 }
-/// The number of a place.
-inline int numberInGroup(int x, int y, int z) {
-  return x + kGroupEdge * (y + kGroupEdge * z);
-}
-inline int numberInGroup(const BlockIndex& block) {
-  return numberInGroup(placeInGroup(block.x), placeInGroup(block.y), placeInGroup(block.z));
+/// The slot of a block in its group, 0 to 63: x runs fastest.
+inline int slotInGroup(const BlockIndex& block) {
+  return coordinateInGroup(block.x) +
+         kGroupEdge * (coordinateInGroup(block.y) + kGroupEdge * coordinateInGroup(block.z));
 }
 
 }  // namespace bki_mapping

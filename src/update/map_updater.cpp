@@ -7,62 +7,52 @@
 
 namespace bki_mapping {
 
+void MapUpdater::setTasks(const ScanEvidence& scan) {
+  tasks_.resize(3);
+  task_count_ = 0;
+  for (Evidence* evidence : {scan.hits, scan.free}) {
+    if (!evidence) continue;
+    tasks_[task_count_].kind = evidence == scan.hits ? SumSink::Kind::kHits : SumSink::Kind::kFree;
+    tasks_[task_count_].evidence = evidence;
+    tasks_[task_count_++].work = evidence;
+  }
+  if (!scan.occlusion) return;
+  tasks_[task_count_].evidence = nullptr;
+  tasks_[task_count_].pass = scan.occlusion;
+  tasks_[task_count_++].work = scan.occlusion;
+}
+
 std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
   const std::size_t size = map.size();
-  SemanticMap::Entry& entry = map.entry(index);
-  // What an earlier update wrote there is the number of no job now, or of another block's.
-  if (entry.job < jobs_.size() && jobs_[entry.job].index == index) return entry.job;
-  entry.job = static_cast<std::uint32_t>(jobs_.size());
+  const std::size_t entry = map.positionOf(index);
   const bool is_new = map.size() > size;
   try {
+    if (job_of_entry_.size() <= entry) job_of_entry_.resize(std::max(entry + 1, 2 * job_of_entry_.size()));
+    const std::uint32_t known = job_of_entry_[entry];
+    if (known < jobs_.size() && jobs_[known].index == index) return known;
     touched_.push_back(index);
-    jobs_.push_back({index, entry.block.get(), is_new, 0, false, 0});
+    jobs_.push_back({index, map.entries()[entry].block.get(), is_new, 0, false, 0});
   } catch (...) {
     if (is_new) map.erase(index);
     throw;
   }
-  return entry.job;
+  return job_of_entry_[entry] = static_cast<std::uint32_t>(jobs_.size() - 1);
 }
 
-void MapUpdater::collectJobs(SemanticMap& map, const std::vector<Evidence*>& evidence,
-                             const UpdateLimits& limits, ThreadPool& pool) {
-  if (number_of_.size() < evidence.size()) number_of_.resize(evidence.size());
-  for (std::size_t e = 0; e < evidence.size(); ++e) {
-    const std::vector<GridIndex>& blocks = evidence[e]->collectBlocks(map, limits.blocks, pool);
-    std::vector<std::uint32_t>& number_of = number_of_[e];
-    number_of.assign(jobs_.size(), kNone);
+void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {
+  for (std::size_t t = 0; t < task_count_; ++t) {
+    const std::vector<GridIndex>& blocks = tasks_[t].work->touchedBlocks(map, limits.blocks, pool);
+    std::vector<std::uint32_t>& numbers = tasks_[t].numbers;
+    numbers.assign(jobs_.size(), kNone);
     for (std::size_t number = 0; number < blocks.size(); ++number) {
       const std::uint32_t job = jobOf(map, {blocks[number]});
-      if (job == number_of.size()) number_of.push_back(kNone);
-      number_of[job] = static_cast<std::uint32_t>(number);
+      if (job == numbers.size()) numbers.push_back(kNone);
+      numbers[job] = static_cast<std::uint32_t>(number);
     }
   }
 }
 
-std::uint32_t MapUpdater::numberIn(std::size_t evidence, std::size_t job) const {
-  return job < number_of_[evidence].size() ? number_of_[evidence][job] : kNone;
-}
-
-void MapUpdater::prefetch(const std::vector<Evidence*>& evidence, std::size_t number) const {
-  jobs_[number].block->prefetch();
-  for (std::size_t e = 0; e < evidence.size(); ++e) {
-    if (numberIn(e, number) != kNone) evidence[e]->prefetch(numberIn(e, number));
-  }
-}
-
-void MapUpdater::work(const std::vector<Evidence*>& evidence, std::size_t number, EvidenceScratch& scratch) {
-  Job& job = jobs_[number];
-  scratch.held.reset();
-  for (std::size_t e = 0; e < evidence.size(); ++e) {
-    const std::uint32_t number_there = numberIn(e, number);
-    if (number_there != kNone) evidence[e]->addTo(number_there, job.index, *job.block, scratch);
-  }
-  job.empty = job.block->empty();
-  const std::size_t after = job.empty ? 0 : job.block->bytes();
-  job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
-}
-
-void MapUpdater::groupJobs(const std::vector<Evidence*>& evidence) {
+void MapUpdater::groupJobs() {
   group_jobs_.clear();
   for (std::size_t n = 0; n < jobs_.size(); ++n) {
     group_jobs_.add(groupOf(jobs_[n].index), static_cast<std::uint32_t>(n));
@@ -70,64 +60,62 @@ void MapUpdater::groupJobs(const std::vector<Evidence*>& evidence) {
   group_jobs_.sort();
   groups_.clear();
   for (std::size_t n = 0; n < group_jobs_.indices().size(); ++n) {
-    Group each = {{group_jobs_.indices().members()[n]}, n, 0.0};
+    Group group = {{group_jobs_.indices().members()[n]}, n, 0.0};
     for (const std::uint32_t* job = group_jobs_.begin(n); job != group_jobs_.end(n); ++job) {
-      each.group.blocks |= std::uint64_t{1} << numberInGroup(jobs_[*job].index);
+      group.blocks.blocks |= std::uint64_t{1} << slotInGroup(jobs_[*job].index);
     }
-    for (const Evidence* piece : evidence) each.effort += piece->effort(each.group);
-    groups_.push_back(each);
+    for (std::size_t t = 0; t < task_count_; ++t) group.cost += tasks_[t].work->cost(group.blocks);
+    groups_.push_back(group);
   }
   std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
-    return a.effort != b.effort ? a.effort > b.effort : a.number < b.number;
+    return a.cost != b.cost ? a.cost > b.cost : a.number < b.number;
   });
 }
 
-void MapUpdater::work(const std::vector<Evidence*>& evidence, const Group& group, EvidenceScratch& scratch) {
-  for (const Evidence* piece : evidence) piece->enter(group.group, scratch);
-  for (const std::uint32_t* job = group_jobs_.begin(group.number); job != group_jobs_.end(group.number);
-       ++job) {
-    if (job + 1 != group_jobs_.end(group.number)) prefetch(evidence, job[1]);
-    work(evidence, *job, scratch);
-  }
-}
-
-std::size_t MapUpdater::reservePlanes(const std::vector<Evidence*>& evidence, std::size_t number) {
+std::size_t MapUpdater::reservePlanes(Job& job, std::size_t number) {
   ClassSet classes;
-  for (std::size_t e = 0; e < evidence.size(); ++e) {
-    const std::uint32_t number_there = numberIn(e, number);
-    if (number_there != kNone) evidence[e]->markClasses(number_there, classes);
+  for (std::size_t t = 0; t < task_count_; ++t) {
+    const std::uint32_t there = tasks_[t].numberOf(number);
+    if (there != kNone && tasks_[t].evidence) tasks_[t].evidence->markClasses(there, classes);
   }
-  Job& job = jobs_[number];
-  Block& block = *job.block;
-  const std::size_t bytes = block.bytes();
-  job.bytes_before = job.is_new ? 0 : bytes;
-  for (const ClassId known : block.classes()) classes.reset(known);
-  block.reserve(classes.count());
-  return block.bytes() - job.bytes_before;
+  const std::size_t count = classes.count();
+  job.bytes_before = job.is_new ? 0 : job.block->bytes();
+  for (const ClassId known : job.block->classes()) classes.reset(known);
+  job.block->reserve(classes.count());
+  return count;
 }
 
-void MapUpdater::reserve(const std::vector<Evidence*>& evidence, const UpdateLimits& limits,
-                         std::ptrdiff_t index_bytes, ThreadPool& pool) {
-  scratch_.resize(pool.count());
-  for (EvidenceScratch& scratch : scratch_) {
-    scratch.limits = limits.evidence;
-    scratch.not_finite = 0;
-    for (const Evidence* piece : evidence) piece->reserve(scratch);
-  }
+void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
+                         ThreadPool& pool) {
+  for (std::size_t t = 0; t < task_count_; ++t) tasks_[t].work->reserve(pool.count());
   std::atomic<std::ptrdiff_t> bytes{index_bytes};
+  std::atomic<std::size_t> most_classes{0};
   const auto most = static_cast<std::ptrdiff_t>(
       std::min<std::size_t>(limits.bytes, std::numeric_limits<std::ptrdiff_t>::max()));
   pool.forEach(groups_.size(), [&](std::size_t g, std::size_t) {
     std::ptrdiff_t of_group = 0;
+    std::size_t classes = 0;
     const std::size_t number = groups_[g].number;
     constexpr std::ptrdiff_t kAhead = 4;
     for (const std::uint32_t* job = group_jobs_.begin(number); job != group_jobs_.end(number); ++job) {
       if (group_jobs_.end(number) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
-      of_group += static_cast<std::ptrdiff_t>(reservePlanes(evidence, *job));
+      Job& each = jobs_[*job];
+      classes = std::max(classes, reservePlanes(each, *job));
+      of_group += static_cast<std::ptrdiff_t>(each.block->bytes() - each.bytes_before);
+    }
+    for (std::size_t known = most_classes; known < classes;) {
+      if (most_classes.compare_exchange_weak(known, classes)) break;
     }
     const std::ptrdiff_t sum = bytes += of_group;
     if (sum > most) throw TooMuchWork(TooMuchWork::What::kBytes, static_cast<double>(sum));
   });
+  workers_.resize(pool.count());
+  for (Worker& worker : workers_) {
+    worker.sink.reserve(rules, most_classes);
+    worker.blocks.reserve(kGroupBlocks);
+    worker.slots.reserve(kGroupBlocks);
+    worker.targets.reserve(kGroupBlocks);
+  }
 }
 
 void MapUpdater::rollBack(SemanticMap& map) noexcept {
@@ -139,8 +127,50 @@ void MapUpdater::rollBack(SemanticMap& map) noexcept {
   touched_.clear();
 }
 
-MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>& evidence, ThreadPool& pool,
-                                  const UpdateLimits& limits) {
+BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker& to) const {
+  BlockGroup selected = {group.blocks.index, 0};
+  to.blocks.clear();
+  to.slots.clear();
+  to.targets.clear();
+  for (const std::uint32_t* job = group_jobs_.begin(group.number); job != group_jobs_.end(group.number);
+       ++job) {
+    const std::uint32_t number = task.numberOf(*job);
+    if (number == kNone) continue;
+    const int slot = slotInGroup(jobs_[*job].index);
+    selected.blocks |= std::uint64_t{1} << slot;
+    to.blocks.push_back({jobs_[*job].index, number});
+    to.slots.push_back(slot);
+    to.targets.push_back(jobs_[*job].block);
+  }
+  return selected;
+}
+
+void MapUpdater::addGroup(const Group& group, std::size_t worker) {
+  Worker& own = workers_[worker];
+  own.sink.startGroup();
+  for (std::size_t t = 0; t < task_count_; ++t) {
+    const Task& task = tasks_[t];
+    const BlockGroup selected = selectBlocks(task, group, own);
+    if (own.blocks.empty()) continue;
+    if (task.evidence) {
+      own.sink.startEvidence(task.kind, own.slots, own.targets);
+      task.evidence->accumulate(selected, own.blocks, worker, own.sink);
+    } else {
+      for (std::size_t b = 0; b < own.blocks.size(); ++b)
+        task.pass->apply(own.blocks[b], worker, *own.targets[b]);
+    }
+  }
+  for (const std::uint32_t* number = group_jobs_.begin(group.number); number != group_jobs_.end(group.number);
+       ++number) {
+    Job& job = jobs_[*number];
+    job.empty = job.block->empty();
+    const std::size_t after = job.empty ? 0 : job.block->bytes();
+    job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
+  }
+}
+
+MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, ThreadPool& pool,
+                                  const UpdateRules& rules, const UpdateLimits& limits) {
   MapUpdateStats stats;
   Stopwatch watch;
   touched_.clear();
@@ -148,9 +178,10 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
   const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
   const std::ptrdiff_t index_before = indexBytes();
   try {
-    collectJobs(map, evidence, limits, pool);
-    groupJobs(evidence);
-    reserve(evidence, limits, indexBytes() - index_before, pool);
+    setTasks(scan);
+    collectJobs(map, limits, pool);
+    groupJobs();
+    reserve(rules, limits, indexBytes() - index_before, pool);
   } catch (...) {
     rollBack(map);
     throw;
@@ -159,17 +190,17 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const std::vector<Evidence*>
   stats.collect_ms = watch.lap();
 
   // From here on nothing takes memory, so that nothing can fail.
-  const auto each = [&](std::size_t g, std::size_t worker) { work(evidence, groups_[g], scratch_[worker]); };
-  if (!groups_.empty() && groups_.front().effort > 0.0) {
-    pool.forEachInOrder(groups_.size(), each);
+  const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], worker); };
+  if (!groups_.empty() && groups_.front().cost > 0.0) {
+    pool.forEachInOrder(groups_.size(), add);
   } else {
-    pool.forEach(groups_.size(), each);
+    pool.forEach(groups_.size(), add);
   }
   for (const Job& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
-  for (const EvidenceScratch& scratch : scratch_) stats.not_finite += scratch.not_finite;
+  for (const Worker& worker : workers_) stats.not_finite += worker.sink.notFinite();
   stats.update_ms = watch.lap();
   return stats;
 }

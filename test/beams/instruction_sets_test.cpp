@@ -52,7 +52,7 @@ TEST(InstructionSets, LinesEqualBruteForceOnEach) {
           LineEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
           evidence.setField(field, pool);
           SemanticMap map(geometry, config.prior, 4);
-          MapUpdater().update(map, {&evidence}, pool);
+          MapUpdater().update(map, {nullptr, &evidence}, pool);
           ASSERT_GT(map.size(), 0u);
           const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
           EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u) << set << ", " << scene.name;
@@ -88,7 +88,7 @@ TEST(InstructionSets, LinesOfAnyKernelEqualBruteForceOnEach) {
         LineEvidence evidence(BeamWeight::kLinear, FreeSpaceExtent::kObserved, set);
         evidence.setField(field, pool);
         SemanticMap map(geometry, config.prior, 4);
-        MapUpdater().update(map, {&evidence}, pool);
+        MapUpdater().update(map, {nullptr, &evidence}, pool);
         blocks += map.size();
         EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u)
             << set << ", " << scene.name << ", " << size.length << " m in voxels of " << size.resolution
@@ -127,7 +127,7 @@ TEST(InstructionSets, LinesFarFromTheSensorEqualBruteForceOnEach) {
       for (int n = 0; n < 27; ++n) {
         map.getOrAllocate({{middle.x + n % 3 - 1, middle.y + n / 3 % 3 - 1, middle.z + n / 9 - 1}});
       }
-      MapUpdater().update(map, {&evidence}, pool);
+      MapUpdater().update(map, {nullptr, &evidence}, pool);
       ASSERT_GT(map.size(), 0u) << set;  // those without evidence are not kept
       EXPECT_EQ(faultsOf(map, brute, kFreeClass, config), 0u) << set;
     }
@@ -147,7 +147,7 @@ TEST(InstructionSets, BeamsWithoutLengthReachNothing) {
       LineEvidence evidence(BeamWeight::kUniform, FreeSpaceExtent::kObserved, set);
       evidence.setField(field, pool);
       auto map = std::make_unique<SemanticMap>(geometry, config.prior, 4);
-      MapUpdater().update(*map, {&evidence}, pool);
+      MapUpdater().update(*map, {nullptr, &evidence}, pool);
       return map;
     };
     const auto with = mapOf({Eigen::Vector3f::Zero(), beam}), without = mapOf({beam});
@@ -175,7 +175,7 @@ TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
       field.setBeams({{0.1, 0.2, 0.05}, {{anywhere(random), anywhere(random), anywhere(random)}}}, pool);
       evidence.setField(field, pool);
       SemanticMap map(geometry, config.prior, 4);
-      MapUpdater().update(map, {&evidence}, pool);
+      MapUpdater().update(map, {nullptr, &evidence}, pool);
       for (const auto& entry : map.entries()) {
         const float* plane = entry.block->evidence(kFreeClass);
         ASSERT_GE(*std::min_element(plane, plane + kBlockVoxels), 0.0f) << set << ", beam " << n;
@@ -198,7 +198,7 @@ void expectLinesOfManyBeams(const reference::Scene& scene, BeamWeight weight, Be
     LineEvidence evidence(weight, FreeSpaceExtent::kObserved, set);
     evidence.setField(field, pool);
     SemanticMap map(geometry, config.prior, 4);
-    MapUpdater().update(map, {&evidence}, pool);
+    MapUpdater().update(map, {nullptr, &evidence}, pool);
     ASSERT_GT(map.size(), 0u);
     // Kernel values are right to 1e-6 of their scale: far less than one beam's own value.
     const double room = 1e-6 * config.kernel.scale * static_cast<double>(scene.scan.points.size());
@@ -247,7 +247,7 @@ TEST(InstructionSets, PointsEqualBruteForceOnEach) {
         }
         points.close(0, 0);
         points.finish(pool);
-        PointEvidence evidence(geometry, config.kernel, set);
+        PointEvidence evidence(geometry, config.kernel, false, set);
         evidence.setPoints(scene.scan.origin, points, pool);
         SemanticMap map(geometry, config.prior, 4);
         MapUpdater().update(map, {&evidence}, pool);

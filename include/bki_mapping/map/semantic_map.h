@@ -21,7 +21,6 @@ class SemanticMap {
     BlockIndex index;
     std::unique_ptr<Block> block;
     std::uint32_t place_in_region;
-    std::uint32_t job = 0;  ///< for who updates the map: number of the block's job, or any other
   };
 
   /// @param prior concentration alpha0 of each class before any scan, > 0.
@@ -56,10 +55,10 @@ class SemanticMap {
 
   /// @return nullptr where no block is.
   const Block* find(const BlockIndex& index) const;
-  Block& getOrAllocate(const BlockIndex& index) { return *entry(index).block; }
-  /// The entry of a block, which is made where missing. It may move with the next one made or erased.
+  Block& getOrAllocate(const BlockIndex& index) { return *entries_[positionOf(index)].block; }
+  /// The position in entries() of a block, which is created where missing. It holds until a block is erased.
   /// @throws std::bad_alloc; the map is then as it was.
-  Entry& entry(const BlockIndex& index);
+  std::size_t positionOf(const BlockIndex& index);
   void erase(const BlockIndex& index) noexcept;
   /// Erases all blocks, and gives back their memory and that of the index.
   void clear() noexcept;

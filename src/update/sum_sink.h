@@ -1,0 +1,51 @@
+/// @file Where evidence hands over its sums.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "parallel/thread_pool.h"
+#include "update/block_group.h"
+#include "update/update_rules.h"
+
+namespace bki_mapping {
+
+/// Takes the sums of the blocks of one group, applies the rules, and adds the result to the map's blocks:
+/// first the hits of all blocks, then their free space. One for each thread.
+class alignas(kThreadsApart) SumSink {
+ public:
+  /// Before an update. @param classes that a block may have at most: their memory is taken here.
+  void reserve(const UpdateRules& rules, std::size_t classes);
+  /// Before a group.
+  void startGroup();
+  enum class Kind { kHits, kFree };
+  /// Before a piece of evidence. @param slots of its blocks in the group, @param targets those blocks, in the
+  /// same order; both stay until the evidence is done.
+  void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets);
+
+  /// For the evidence: the sums of its i-th block, which are empty.
+  BlockSums& open(std::size_t i) {
+    // The next block's planes come from memory while this one's sums are computed.
+    if (i + 1 < targets_->size()) (*targets_)[i + 1]->prefetch();
+    current_ = i;
+    sums_.clear();
+    return sums_;
+  }
+  /// For the evidence: adds the sums to the block.
+  void close();
+
+  /// Voxels and classes for which evidence would not have stayed finite, since reserve().
+  std::size_t notFinite() const { return not_finite_; }
+
+ private:
+  UpdateRules rules_;
+  Kind kind_ = Kind::kHits;
+  const std::vector<int>* slots_ = nullptr;
+  const std::vector<Block*>* targets_ = nullptr;
+  std::size_t current_ = 0;
+  BlockSums sums_;
+  std::array<VoxelMask, kGroupBlocks> protected_;  ///< voxels that take no evidence for `free`, by slot
+  std::size_t not_finite_ = 0;
+};
+
+}  // namespace bki_mapping
