@@ -27,15 +27,16 @@ bki_mapping_core_room(core SOURCES class_table.cpp named_parameter.cpp LINK Eige
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(map SOURCES column_map.cpp map_query.cpp semantic_map.cpp LINK bki_mapping_core)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core)
+bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.cpp LINK bki_mapping_parallel bki_mapping_map)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp
     raster/beam_tracks.cpp raster/group_sums.cpp
-    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp ../update/map_updater.cpp ../update/sum_sink.cpp ../update/update_rules.cpp
+    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp
     ../points/cell_merger.cpp ../points/downsample.cpp ../points/point_bins.cpp ../points/point_evidence.cpp
     ../points/soft_point_evidence.cpp ../points/tile_grid.cpp
-  LINK bki_mapping_parallel bki_mapping_kernel bki_mapping_map)
+  LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
-foreach(room points update simd)  # of which the beams' library holds all
+foreach(room points simd)  # of which the beams' library holds all
   add_library(bki_mapping_${room} ALIAS bki_mapping_beams)
 endforeach()
 bki_mapping_core_room(free_space SOURCES

@@ -5,7 +5,7 @@ import re
 import unittest
 
 ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
-LEVELS = [['core'], ['parallel', 'map'], ['simd', 'kernel', 'update', 'points', 'beams'], ['free_space'], ['mapping'],
+LEVELS = [['core'], ['parallel', 'map'], ['update'], ['simd', 'kernel', 'points', 'beams'], ['free_space'], ['mapping'],
           ['io'], ['simulation'], ['evaluation'], ['ros', 'tools']]
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 # What else a room may include, beside the standard library and Eigen.
