@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The figures of scripts/reproduce: on small cases, each is drawn, and its table says what it must."""
 import csv
+import math
 import os
 import re
 import sys
@@ -14,7 +15,7 @@ sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
 import matplotlib  # noqa: E402
 matplotlib.use('Agg')
 
-from figures import complexity, frontier, plane, tradeoff  # noqa: E402
+from figures import complexity, frontier, method, plane, tradeoff  # noqa: E402
 from figures.programs import Programs  # noqa: E402
 
 
@@ -73,6 +74,21 @@ class Figures(unittest.TestCase):
         curves = {(row['preset'], row['of']) for row in self.rows('calibration_small.csv')}
         self.assertEqual(curves, {(os.path.splitext(p)[0], of) for p in os.listdir(presets) for of in ('class', 'occupancy')})
         self.assertGreater(float(rows['line, bilinear, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
+
+    def test_method(self):
+        method.draw(self.output)
+        names = sorted(name for name in os.listdir(self.output) if name.startswith('method_'))
+        self.assertEqual(names, sorted(n for n in os.listdir(f'{SOURCE}/docs/images') if n.startswith('method_')))
+        self.expect_pictures(''.join(f'![]({name})' for name in names), 3)
+
+    def test_balls_lie_within_their_extent(self):
+        for azimuth, elevation in ((0.3, 0.0), (-2.0, 1.2), (1.0, -0.9)):
+            outline = method.ball_outline(azimuth, elevation, 0.25)
+            half_elevation, half_azimuth = method.ball_extent(elevation, 1.0, math.sin(0.25))
+            turned = [math.remainder(math.atan2(y, x) - azimuth, 2 * math.pi) for x, y, _ in outline]
+            self.assertAlmostEqual(max(turned), half_azimuth, places=4)
+            self.assertAlmostEqual(max(abs(math.asin(z) - elevation) for _, _, z in outline), half_elevation, places=4)
+        self.assertIsNone(method.ball_extent(1.4, 1.0, math.sin(0.25))[1])
 
     def test_complexity(self):
         self.assertAlmostEqual(complexity.exponent([1, 2, 4], [3, 12, 48]), 2.0)
