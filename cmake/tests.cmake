@@ -48,6 +48,7 @@ function(bki_mapping_script_test room name)
 endfunction()
 bki_mapping_script_test(scripts figures_test)
 bki_mapping_script_test(house layering_test)
+bki_mapping_script_test(house links_test)
 bki_mapping_script_test(house skip_test)
 bki_mapping_script_test(tools tools_test)
 add_test(NAME vector_symbols_test
