@@ -52,7 +52,7 @@ void expectTracksAgreeWithGeometry(const InnerLoops& loops) {
     tracks.set({{}, ends}, kResolution, reach * kResolution, loops, pool);
     int skews = 0, straights = 0;
     for (std::size_t b = 0; b < ends.size(); ++b) {
-      const BeamTrack& track = tracks.arrays().tracks[b];
+      const BeamTrack track = tracks.arrays().tracks[b];
       const BeamSlicing slicing = BeamSlicing::of(track.slicing);
       ASSERT_EQ(slicing.number(), track.slicing);
       EXPECT_EQ(static_cast<float>(slicing.skew), tracks.arrays().skew[b]);
