@@ -2,7 +2,22 @@
 if(NOT BUILD_TESTING AND NOT CATKIN_ENABLE_TESTING)
   return()
 endif()
-find_package(GTest REQUIRED CONFIG)
+# GoogleTest as GTest::gtest and GTest::gtest_main: those of catkin, which in ROS Noetic builds it from its sources under
+# names of its own, or else the system's, which CMake before 3.20 names in its own way.
+if(NOT TARGET GTest::gtest AND NOT TARGET gtest)
+  find_package(GTest REQUIRED)
+endif()
+if(NOT TARGET GTest::gtest)
+  add_library(GTest::gtest INTERFACE IMPORTED)
+  add_library(GTest::gtest_main INTERFACE IMPORTED)
+  if(TARGET gtest)
+    target_link_libraries(GTest::gtest INTERFACE gtest)
+    target_link_libraries(GTest::gtest_main INTERFACE gtest_main)
+  else()
+    target_link_libraries(GTest::gtest INTERFACE GTest::GTest)
+    target_link_libraries(GTest::gtest_main INTERFACE GTest::Main)
+  endif()
+endif()
 
 add_library(bki_mapping_reference STATIC test/reference/reference.cpp)
 target_include_directories(bki_mapping_reference PUBLIC test)
