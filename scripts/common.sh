@@ -17,6 +17,17 @@ step() {
 current_step=
 trap 'if [ -n "$current_step" ]; then echo "FAILED: $current_step" >&2; fi' ERR
 
+# What a script leaves out on this system: said at once and again by what_was_skipped, at the end.
+skipped=()
+skip() {
+  skipped+=("$1")
+  echo "    SKIPPED: $1" >&2
+}
+what_was_skipped() {
+  local each
+  for each in "${skipped[@]}"; do echo "SKIPPED: $each" >&2; done
+}
+
 # Installs with apt what is missing.
 install_dependencies() {
   local list=$root/scripts/dependencies.debian.txt missing=() package
@@ -49,6 +60,11 @@ source_build() {
   set +u
   source "$1/devel/setup.bash"
   set -u
+}
+
+# ctest with the arguments after the first. $1: build folder; before CMake 3.20 ctest itself takes none.
+run_ctest() {
+  (cd "$1" && ctest --no-tests=error --output-on-failure "${@:2}")
 }
 
 # A program of the package with a ROS master of its own, so that its exit status counts. $1: build folder, $2: program.

@@ -12,7 +12,7 @@ ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
 class Skips(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        listed = subprocess.run(['ctest', '--test-dir', os.environ['BKI_MAPPING_BUILD'], '--show-only=json-v1'],
+        listed = subprocess.run(['ctest', '--show-only=json-v1'], cwd=os.environ['BKI_MAPPING_BUILD'],
                                 capture_output=True, text=True, timeout=60, check=True)
         cls.tests = {test['name']: test for test in json.loads(listed.stdout)['tests']}
 
