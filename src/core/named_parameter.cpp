@@ -1,6 +1,7 @@
 #include "bki_mapping/core/named_parameter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <sstream>
@@ -23,13 +24,93 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+/// A limit as people write it: "1e9", not a one and nine zeros to count.
+std::string limitText(double limit) {
+  const std::string digits = numberText(limit);
+  const std::size_t last = digits.find_last_not_of('0');
+  const std::size_t zeros = digits.size() - 1 - last;
+  const bool round = zeros >= 6 && digits.find_first_of(".e") == std::string::npos;
+  return round ? digits.substr(0, last + 1) + "e" + std::to_string(zeros) : digits;
+}
+
 }  // namespace
 
+NumberRange NumberRange::atLeast(double least) {
+  NumberRange range;
+  range.least_ = least;
+  return range;
+}
+
+NumberRange NumberRange::above(double least) {
+  NumberRange range = atLeast(least);
+  range.open_ = true;
+  return range;
+}
+
+NumberRange NumberRange::upTo(double most) const {
+  NumberRange range = *this;
+  range.most_ = most;
+  return range;
+}
+
+NumberRange NumberRange::orElse(double value, const std::string& meaning) const {
+  NumberRange range = *this;
+  range.else_ = value;
+  range.else_meaning_ = meaning;
+  return range;
+}
+
+NumberRange NumberRange::slider(double least, double most) const {
+  NumberRange range = *this;
+  range.slider_least_ = least;
+  range.slider_most_ = most;
+  return range;
+}
+
+bool NumberRange::allows(double value) const {
+  if (!std::isfinite(value)) return false;
+  if (else_ && value == *else_) return true;
+  return (open_ ? value > least_ : value >= least_) && value <= most_;
+}
+
+std::string NumberRange::text(const std::string& kind) const {
+  std::string text = kind;
+  if (open_) {
+    text += " > " + limitText(least_) + (std::isfinite(most_) ? ", at most " + limitText(most_) : "");
+  } else if (std::isfinite(most_)) {
+    text += " from " + limitText(least_) + " to " + limitText(most_);
+  } else if (std::isfinite(least_)) {
+    text += " >= " + limitText(least_);
+  }
+  if (!else_) return text;
+  return text + ", or " + limitText(*else_) + (else_meaning_.empty() ? "" : " for " + else_meaning_);
+}
+
+std::string wordsText(const std::vector<std::string>& words) {
+  if (words == std::vector<std::string>{"false", "true"}) return "true or false";
+  std::string text = "one of";
+  for (const std::string& word : words) text += (&word == &words.front() ? " " : ", ") + word;
+  return text;
+}
+
+std::optional<std::size_t> indexOf(const std::vector<std::string>& words, const std::string& word) {
+  const auto found = std::find(words.begin(), words.end(), word);
+  if (found == words.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - words.begin());
+}
+
 std::string numberText(double value) {
+  constexpr double kExact = 1ll << std::numeric_limits<double>::digits;  // all integers below are doubles
   std::ostringstream out;
-  out.precision(std::numeric_limits<double>::digits10);
+  const bool integer = std::abs(value) <= kExact && value == std::trunc(value);
+  out.precision(integer ? std::numeric_limits<double>::max_digits10 : std::numeric_limits<double>::digits10);
   out << value;
-  return out.str();
+  std::string text = out.str();
+  const std::size_t exponent = text.find('e');
+  if (exponent != std::string::npos) {  // "1e-6" for "1e-06", "1e20" for "1e+20"
+    text.replace(exponent + 1, std::string::npos, std::to_string(std::stoi(text.substr(exponent + 1))));
+  }
+  return text;
 }
 
 double parseNumber(const std::string& text) {
@@ -46,8 +127,14 @@ std::string shortText(const std::string& text, std::size_t most) {
   return out;
 }
 
-void refuseValue(const std::string& name, const std::string& value, const std::string& values) {
-  throw std::invalid_argument("parameter " + name + " is '" + shortText(value) + "', but must be " + values);
+void refuseValue(const ParameterFacts& parameter, const std::string& value) {
+  throw std::invalid_argument("parameter " + parameter.name + " is '" + shortText(value) + "', but must be " +
+                              parameter.values + nearestWord(value, parameter.words));
+}
+
+void refuseChange(const ParameterFacts& parameter) {
+  throw std::invalid_argument("parameter " + parameter.name +
+                              " cannot change while mapping; set it and start again");
 }
 
 std::string nearestWord(const std::string& word, const std::vector<std::string>& known) {

@@ -1,5 +1,6 @@
 #include "bki_mapping/io/config_yaml.h"
 
+#include <sstream>
 #include <stdexcept>
 
 #include "bki_mapping/mapping/parameters.h"
@@ -24,6 +25,20 @@ void flatten(const YAML::Node& node, const std::string& name, std::map<std::stri
   }
 }
 
+/// A sentence as lines of comment, of at most 100 characters.
+std::string comment(const std::string& sentence, const std::string& indent) {
+  std::istringstream words(sentence);
+  std::string text, line = indent + "#";
+  for (std::string word; words >> word;) {
+    if (line.size() + 1 + word.size() > 100) {
+      text += line + "\n";
+      line = indent + "#";
+    }
+    line += " " + word;
+  }
+  return text + line + "\n";
+}
+
 }  // namespace
 
 std::map<std::string, std::string> loadParameterFile(const std::string& file) {
@@ -45,7 +60,7 @@ std::string parameterYaml(const MapperConfig& config) {
     group = new_group;
     const std::string indent = group.empty() ? "" : "  ";
     const std::string unit = p.unit.empty() ? "" : " [" + p.unit + "]";
-    text += indent + "# " + p.description + "\n" + indent + "# " + p.values + unit + "\n";
+    text += comment(p.description, indent) + comment(p.values + unit, indent);
     text += indent + (group.empty() ? p.name : p.name.substr(slash + 1)) + ": " + p.get(config) + "\n";
   }
   return text;

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -24,12 +23,9 @@
 namespace bki_mapping {
 namespace {
 
-/// Checks every setting as if it were set by name.
+/// Checks every setting.
 MapperConfig checked(const MapperConfig& config, const ClassTable& classes) {
-  std::map<std::string, std::string> values;
-  for (const Parameter& p : mapperParameters()) values[p.name] = p.get(config);
-  MapperConfig copy = config;
-  setParameters(copy, values);
+  checkParameters(config);
   if (config.unknown_labels == UnknownLabels::kUnlabelled && !classes.unlabelled()) {
     throw std::invalid_argument("unknown_labels is 'unlabelled', but class table '" + classes.name() +
                                 "' flags no class as unlabelled; flag one, or set unknown_labels to ignore");
@@ -157,12 +153,7 @@ void SemanticMapper::setGains() {
 
 void SemanticMapper::reconfigure(const MapperConfig& config) {
   const MapperConfig allowed = checked(config, *classes_);
-  for (const Parameter& p : mapperParameters()) {
-    if (p.get(allowed) != p.get(config_) && !changesWhileMapping(p.name)) {
-      throw std::invalid_argument("parameter " + p.name +
-                                  " cannot change while mapping; set it and start again");
-    }
-  }
+  checkChanges(config_, allowed);
   pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry());
   config_ = allowed;
   setGains();

@@ -9,7 +9,7 @@
 
 namespace bki_mapping::ros_shell {
 
-/// How a cloud tells the class of a point.
+/// How a cloud carries the class of a point.
 enum class LabelEncoding {
   kNumber,  ///< a field with the label number
   kRgb,     ///< colours of the class table: one field 0x00RRGGBB, as PCL packs it, or three fields r,g,b
@@ -35,9 +35,9 @@ struct InputConfig {
   SensorModelConfig sensor_model;
 };
 
-/// The parameters that each input may have of its own, but for topic and ranges.
+/// What an input may set for itself, or all inputs have in common.
 std::vector<NamedParameter<InputConfig>> inputParameters();
-/// All parameters below `inputs/NAME/`.
+/// All parameters below `inputs/NAME/`: the above, `topic`, `min_range` and `max_range`.
 std::vector<NamedParameter<InputConfig>> ownInputParameters();
 
 }  // namespace bki_mapping::ros_shell

@@ -11,7 +11,7 @@
 namespace bki_mapping::ros_shell {
 namespace {
 
-/// dynamic_reconfigure wants identifiers.
+/// dynamic_reconfigure requires identifiers.
 std::string identifierOf(std::string name) {
   std::replace(name.begin(), name.end(), '/', '_');
   return name;
@@ -37,18 +37,13 @@ std::map<std::string, std::string> valuesOf(const ServerConfig& server, const Ma
   return values;
 }
 
-/// The protocol has no place for a refusal but the configuration that it returns.
-const char* const kLastRefusal = "last_refusal";
-
-const char* const kFixed[] = {"resolution", "frame_id", "classes"};
-
 }  // namespace
 
 LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server,
                            const MapperConfig& mapper, Apply apply, std::function<void()> answered)
     : server_(server), mapper_(mapper), apply_(std::move(apply)), answered_(std::move(answered)) {
   ros::NodeHandle node(private_node, "reconfigure");
-  ros::param::del(node.getNamespace());  // what an earlier run left there is not what this one was told
+  ros::param::del(node.getNamespace());  // what an earlier run left there
   offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(mutex_, node);
   offered_->updateConfig(show(server_, mapper_));
   offered_->setCallback([this](MappingConfig& config, std::uint32_t) { onChange(config); });
@@ -70,17 +65,18 @@ MappingConfig LiveSettings::show(const ServerConfig& server, const MapperConfig&
 }
 
 void LiveSettings::take(const MappingConfig& from, ServerConfig& server, MapperConfig& mapper) {
-  const std::map<std::string, std::string> before = valuesOf(server, mapper), now = valuesOf(from);
+  const std::map<std::string, std::string> now = valuesOf(from);
   std::map<std::string, std::string> changed;
-  for (const auto& [name, value] : before) {
-    const auto found = now.find(identifierOf(name));
-    if (found == now.end() || found->second == value) continue;
-    if (std::find(std::begin(kFixed), std::end(kFixed), name) != std::end(kFixed)) {
-      throw std::invalid_argument("parameter " + name +
-                                  " cannot change while mapping; set it and start again");
+  const auto collect = [&](const auto& parameters, const auto& config) {
+    for (const auto& p : parameters) {
+      const auto found = now.find(identifierOf(p.name));
+      if (found == now.end() || found->second == p.get(config)) continue;
+      if (!p.changesWhileMapping()) refuseChange(p);
+      changed[p.name] = found->second;
     }
-    changed[name] = found->second;
-  }
+  };
+  collect(serverParameters(), server);
+  collect(mapperParameters(), mapper);
   setParameters(changed, server, mapper);
 }
 

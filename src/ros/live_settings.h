@@ -7,10 +7,20 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_shell {
+
+/// Parameters that clients see beside those that change while mapping; a change of one is refused.
+inline const std::vector<std::string>& shownAtStart() {
+  static const std::vector<std::string> names = {"resolution", "frame_id", "classes"};
+  return names;
+}
+
+/// Name of the setting that holds lastRefusal: a server of dynamic_reconfigure can refuse in no other way.
+constexpr char kLastRefusal[] = "last_refusal";
 
 /// Offers the parameters of cfg/Mapping.cfg in the namespace `~reconfigure`, so that what dynamic_reconfigure
 /// writes to the parameter server does not mix with parameters read at the start.

@@ -25,13 +25,6 @@ std::string textOf(const std::string& name, XmlRpc::XmlRpcValue value) {
   }
 }
 
-bool notNegative(double x) {
-  return x >= 0.0;
-}
-bool positive(double x) {
-  return x > 0.0;
-}
-
 /// What dynamic_reconfigure writes.
 const std::string kLive = "reconfigure/";
 
@@ -50,77 +43,87 @@ std::set<std::string> inputNames(const std::map<std::string, std::string>& value
   return names;
 }
 
+/// What setParameters sets: one table of all kinds, so that one message lists every fault, and names near to
+/// a misspelt one.
+struct Both {
+  ServerConfig server;
+  MapperConfig mapper;
+};
+
+/// inputParameters of all inputs.
+std::vector<NamedParameter<ServerConfig>> inputParametersOfServer() {
+  std::vector<NamedParameter<ServerConfig>> parameters;
+  appendParameters(parameters, "", &ServerConfig::input, inputParameters());
+  return parameters;
+}
+
 }  // namespace
 
 std::vector<NamedParameter<ServerConfig>> serverParameters() {
   using C = ServerConfig;
+  const NumberRange height = NumberRange::any().slider(-1e6, 1e6);
+  const NumberRange length = NumberRange::atLeast(0.0).slider(0.0, 1e4);
   return {
-      textParameter<C>(
-          "frame_id", "a frame of tf", "The map frame.", [](C & c) -> auto& { return c.frame_id; }),
-      textParameter<C>(
-          "classes", "a name of config/classes, or a YAML file", "The class table.",
-          [](C & c) -> auto& { return c.classes; }),
-      realParameter<C>(
-          "tf_timeout", "a number >= 0", "s", "How long a cloud waits for its transform, in wall time.",
-          [](C & c) -> auto& { return c.tf_timeout; }, notNegative),
-      integerParameter<C>(
-          "queue_size", 1, 10000, "Clouds that may wait.", [](C & c) -> auto& { return c.queue_size; }),
-      choiceParameter<C>(
-          "queue_policy", {"drop_oldest", "drop_newest"}, "Which cloud is dropped when the queue is full.",
-          [](C & c) -> auto& { return c.queue_policy; }),
-      choiceParameter<C>(
-          "on_time_jump", {"keep", "reset"},
-          "What becomes of the map when time jumps back, as it does when a bag starts again.",
-          [](C & c) -> auto& { return c.on_time_jump; }),
-      realParameter<C>(
-          "window", "a number >= 0", "m",
-          "Edge of the cube about the sensor outside of which blocks and poses of the trajectory are "
-          "forgotten; 0: nothing is forgotten.",
-          [](C & c) -> auto& { return c.window; }, notNegative),
-      realParameter<C>(
-          "diagnostic_period", "a number > 0", "s", "Time between reports on /diagnostics.",
-          [](C & c) -> auto& { return c.diagnostic_period; }, positive),
-      realParameter<C>(
-          "publish_rate", "a number > 0", "Hz",
-          "Each map topic is published at most this often, and less often if it would take more than a tenth "
-          "of "
-          "the time.",
-          [](C & c) -> auto& { return c.publish_rate; }, positive),
-      realParameter<C>(
-          "view_range", "a number >= 0", "m",
-          "How far around the sensor markers and voxel_cloud show the map, on each axis; 0: all of it.",
-          [](C & c) -> auto& { return c.view_range; }, notNegative),
-      realParameter<C>(
-          "view_min_z", "a number", "m",
-          "Lower end of the heights that markers and voxel_cloud show, in the map frame.",
-          [](C & c) -> auto& { return c.view_min_z; }, [](double) { return true; }),
-      realParameter<C>(
-          "view_max_z", "a number", "m",
-          "Upper end of the heights that markers and voxel_cloud show, in the map frame.",
-          [](C & c) -> auto& { return c.view_max_z; }, [](double) { return true; }),
-      choiceParameter<C>(
-          "latch", {"false", "true"}, "Whether map topics are latched.",
-          [](C & c) -> auto& { return c.latch; }),
-      choiceParameter<C>(
-          "color_mode", {"semantics", "probability", "variance", "height"},
-          "What the colours of occupied_cells_vis_array show.", [](C & c) -> auto& { return c.color_mode; }),
-      realParameter<C>(
-          "occupancy_min_z", "a number", "m", "Lower end of the space that projected_map shows.",
-          [](C & c) -> auto& { return c.occupancy_min_z; }, [](double) { return true; }),
-      realParameter<C>(
-          "occupancy_max_z", "a number", "m", "Upper end of the space that projected_map shows.",
-          [](C & c) -> auto& { return c.occupancy_max_z; }, [](double) { return true; }),
-      choiceParameter<C>(
-          "occupancy_height", {"map", "ground"},
-          "From where occupancy_min_z and occupancy_max_z are measured: the map frame's origin, or the "
-          "ground "
-          "below; obstacles without known ground below count at any height then.",
-          [](C & c) -> auto& { return c.occupancy_height; }),
-      choiceParameter<C>(
-          "full_projected_map", {"false", "true"},
-          "Whether projected_map is sent whole each time, for listeners that leave projected_map_updates "
-          "out.",
-          [](C & c) -> auto& { return c.full_projected_map; }),
+      textParameter("frame_id", &C::frame_id, "a frame of tf", Changes::kAtStart,
+                    "Name of the map frame. Set it to a frame that does not move with the robot."),
+      textParameter("classes", &C::classes, "a name of config/classes, or a YAML file", Changes::kAtStart,
+                    "Class table: the names, colours and flags of the labels. Set it to the table of the "
+                    "network that labels the points."),
+      realParameter(
+          "tf_timeout", &C::tf_timeout, NumberRange::atLeast(0.0).slider(0.0, 60.0), "s",
+          Changes::kWhileMapping,
+          "How long a cloud waits for its transform, in wall time, before it is dropped. Raise it if "
+          "poses arrive late."),
+      integerParameter("queue_size", &C::queue_size, NumberRange::atLeast(1).upTo(10000),
+                       Changes::kWhileMapping,
+                       "Number of clouds that may wait to be mapped. Raise it to map every cloud of a burst, "
+                       "lower it to keep the map recent."),
+      choiceParameter(
+          "queue_policy", &C::queue_policy, {"drop_oldest", "drop_newest"}, Changes::kWhileMapping,
+          "Which cloud is dropped when the queue is full. Use drop_oldest to keep the map recent."),
+      choiceParameter(
+          "on_time_jump", &C::on_time_jump, {"keep", "reset"}, Changes::kWhileMapping,
+          "What happens to the map when time jumps back, for example when a bag starts again: keep "
+          "continues it, reset starts an empty one."),
+      realParameter(
+          "window", &C::window, length, "m", Changes::kWhileMapping,
+          "Edge length of a cube around the sensor. Blocks and poses of the trajectory outside it are "
+          "removed. Set it to bound memory on long drives; 0 keeps everything."),
+      realParameter("diagnostic_period", &C::diagnostic_period, NumberRange::above(0.0), "s",
+                    Changes::kAtStart, "Time between two reports on /diagnostics."),
+      realParameter(
+          "publish_rate", &C::publish_rate, NumberRange::above(0.0).slider(0.001, 1000.0), "Hz",
+          Changes::kWhileMapping,
+          "Highest rate at which each map topic is published. The rate falls where publishing would "
+          "take more than a tenth of the time."),
+      realParameter("view_range", &C::view_range, length, "m", Changes::kWhileMapping,
+                    "Distance from the sensor, along each axis, up to which the markers and voxel_cloud show "
+                    "the map. Set it to keep rviz fast; 0 shows all."),
+      realParameter("view_min_z", &C::view_min_z, height, "m", Changes::kWhileMapping,
+                    "Lowest height in the map frame that the markers and voxel_cloud show."),
+      realParameter(
+          "view_max_z", &C::view_max_z, height, "m", Changes::kWhileMapping,
+          "Greatest height in the map frame that the markers and voxel_cloud show. Lower it to look "
+          "under ceilings and trees."),
+      truthParameter("latch", &C::latch, Changes::kAtStart,
+                     "Latch the map topics: a new subscriber receives the last message at once."),
+      choiceParameter("color_mode", &C::color_mode, {"semantics", "probability", "variance", "height"},
+                      Changes::kWhileMapping,
+                      "Property of a voxel that the colours of occupied_cells_vis_array show."),
+      realParameter("occupancy_min_z", &C::occupancy_min_z, height, "m", Changes::kWhileMapping,
+                    "Lowest height at which projected_map looks for obstacles. Set it to what the robot can "
+                    "drive over."),
+      realParameter("occupancy_max_z", &C::occupancy_max_z, height, "m", Changes::kWhileMapping,
+                    "Greatest height at which projected_map looks for obstacles. Set it to the height of the "
+                    "robot."),
+      choiceParameter(
+          "occupancy_height", &C::occupancy_height, {"map", "ground"}, Changes::kAtStart,
+          "Zero of occupancy_min_z and occupancy_max_z: the origin of the map frame, or the ground "
+          "below. Use ground on slopes; where no ground is known, obstacles then count at any "
+          "height."),
+      truthParameter("full_projected_map", &C::full_projected_map, Changes::kAtStart,
+                     "Publish projected_map whole each time instead of its changes on projected_map_updates. "
+                     "Set true for listeners that do not read the updates."),
   };
 }
 
@@ -156,48 +159,39 @@ std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfi
 
 void setParameters(const std::map<std::string, std::string>& values, ServerConfig& server,
                    MapperConfig& mapper) {
-  // One table of all kinds, so that one message lists every fault, and names near to a misspelt one.
-  using Both = std::pair<ServerConfig, MapperConfig>;
   std::vector<NamedParameter<Both>> parameters;
-  const auto append = [&](const auto& table, auto part) {
-    for (const auto& p : table) {
-      parameters.push_back({p.name, p.values, p.unit, p.description,
-                            [p, part](Both& both, const std::string& value) { p.set(part(both), value); },
-                            [p, part](const Both& both) { return p.get(part(const_cast<Both&>(both))); }});
-    }
-  };
-  append(
-      serverParameters(), [](Both & both) -> auto& { return both.first; });
-  append(
-      inputParameters(), [](Both & both) -> auto& { return both.first.input; });
-  append(
-      mapperParameters(), [](Both & both) -> auto& { return both.second; });
+  appendParameters(parameters, "", &Both::server, serverParameters());
+  appendParameters(parameters, "", &Both::server, inputParametersOfServer());
+  appendParameters(parameters, "", &Both::mapper, mapperParameters());
   for (const std::string& name : inputNames(values)) {
     for (const auto& p : ownInputParameters()) {
-      const auto set = [p, name](Both& both, const std::string& value) {
+      ParameterFacts facts = p;
+      facts.name = kInputs + name + "/" + p.name;
+      const auto assign = [p, name](Both& both, const std::string& value) {
         InputConfig checked;
-        p.set(checked, value);
-        both.first.inputs[name][p.name] = value;
+        const bool allowed = p.assign(checked, value);
+        if (allowed) both.server.inputs[name][p.name] = value;
+        return allowed;
       };
-      parameters.push_back({kInputs + name + "/" + p.name, p.values, p.unit, p.description, set, nullptr});
+      parameters.push_back({facts, assign, nullptr, nullptr, nullptr});
     }
   }
-  Both both(server, mapper);
+  Both both = {server, mapper};
   setNamedParameters(parameters, both, values);
-  if (both.first.occupancy_min_z > both.first.occupancy_max_z) {
+  if (both.server.occupancy_min_z > both.server.occupancy_max_z) {
     throw std::invalid_argument("parameter occupancy_min_z must not be above occupancy_max_z");
   }
-  if (both.first.view_min_z > both.first.view_max_z) {
+  if (both.server.view_min_z > both.server.view_max_z) {
     throw std::invalid_argument("parameter view_min_z must not be above view_max_z");
   }
-  for (const InputConfig& input : allInputs(both.first, both.second)) {
+  for (const InputConfig& input : allInputs(both.server, both.mapper)) {
     if (input.clear_no_returns && input.sensor_model.max_range <= 0.0) {
       throw std::invalid_argument(
           "clear_no_returns needs to know how far beams reach; set sensor_model/max_range");
     }
   }
-  server = both.first;
-  mapper = both.second;
+  server = both.server;
+  mapper = both.mapper;
 }
 
 }  // namespace bki_mapping::ros_shell

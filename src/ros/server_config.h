@@ -23,32 +23,32 @@ struct ServerConfig {
   std::string frame_id = "map";            ///< the map frame
   std::string classes = "semantic_kitti";  ///< name of a class table, or a file
   double tf_timeout = 0.5;                 ///< how long a cloud waits for its transform [s of wall time]
-  int queue_size = 10;                     ///< clouds that may wait
+  int queue_size = 10;                     ///< most clouds that wait
   QueuePolicy queue_policy = QueuePolicy::kDropOldest;
   OnTimeJump on_time_jump = OnTimeJump::kKeep;
-  double window = 0.0;             ///< edge of the cube about the sensor that is kept [m]; 0: everything is
+  double window = 0.0;             ///< edge of the cube around the sensor that is kept [m]; 0: all
   double diagnostic_period = 1.0;  ///< [s]
-  double publish_rate = 2.0;       ///< maps a second, at most [Hz]
-  double view_min_z = -1e6;        ///< lowest voxels that markers and voxel_cloud show [m]
-  double view_max_z = 1e6;         ///< highest [m]
-  double view_range = 0.0;         ///< how far markers and voxel_cloud show [m]; 0: everything
+  double publish_rate = 2.0;       ///< highest rate of each map topic [Hz]
+  double view_min_z = -1e6;        ///< lowest height that markers and voxel_cloud show [m]
+  double view_max_z = 1e6;         ///< greatest [m]
+  double view_range = 0.0;         ///< distance that markers and voxel_cloud show [m]; 0: all
   bool latch = false;              ///< whether map topics are latched
   ColorMode color_mode = ColorMode::kSemantics;
   double occupancy_min_z = -1e6;  ///< of projected_map [m]
   double occupancy_max_z = 1e6;   ///< of projected_map [m]
   HeightReference occupancy_height = HeightReference::kMap;
   bool full_projected_map = false;  ///< whether projected_map is sent whole each time
-  /// Of all inputs that set nothing else; the only input where `inputs` names none.
+  /// What inputs do not set for themselves; the only input where `inputs` names none.
   InputConfig input;
   /// Settings of each named input, by name: parameter and value. See allInputs.
   std::map<std::string, std::map<std::string, std::string>> inputs;
 };
 
-/// The inputs with all their settings: what they do not set is that of `server.input`, and for ranges that of
+/// The inputs with all their settings. What an input does not set comes from `server.input`, its ranges from
 /// `mapper.sensor_model`.
 std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfig& mapper);
 
-/// The server's own parameters (the mapper's are in core/parameters.h).
+/// The server's own parameters; the mapper's are in mapping/parameters.h.
 std::vector<NamedParameter<ServerConfig>> serverParameters();
 
 /// Reads all parameters of a private namespace.

@@ -1,13 +1,14 @@
-// The server's parameters, and that the documents name every one, and every topic, service and field.
+// The server's parameters, and that the documents name every topic, service and field.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "bki_mapping/mapping/parameters.h"
+#include "other_value.h"
 #include "ros/live_settings.h"
 #include "ros/point_account.h"
 #include "ros/scan_ledger.h"
@@ -49,15 +50,14 @@ TEST(ServerConfig, SetsBothKindsAndRefusesBothKinds) {
                std::invalid_argument);
 }
 
-TEST(Documents, HaveARowForEachServerParameter) {
-  const std::string document = textOf(kRoot / "docs/parameters.md");
-  const auto expectRow = [&](const auto& p, const std::string& value) {
-    const std::string row = "| `" + p.name + "` | `" + value + "` | " + p.unit + " | " + p.values + " | " +
-                            p.description + " |\n";
-    EXPECT_NE(document.find(row), std::string::npos) << "docs/parameters.md lacks\n" << row;
-  };
-  for (const auto& p : serverParameters()) expectRow(p, p.get(ServerConfig()));
-  for (const auto& p : inputParameters()) expectRow(p, p.get(InputConfig()));
+TEST(ServerConfig, EachParameterSetsItsOwnMemberAndNoOther) {
+  expectOwnMembers(serverParameters());
+  expectOwnMembers(ownInputParameters());
+}
+
+TEST(ServerConfig, ParametersHaveNamesOfTheirOwnAndDescriptionsInSentences) {
+  expectNamesAndDescriptions(serverParameters());
+  expectNamesAndDescriptions(ownInputParameters());
 }
 
 TEST(ServerConfig, InputsTakeOverWhatTheyDoNotSet) {
@@ -95,32 +95,53 @@ TEST(ServerConfig, InputsTakeOverWhatTheyDoNotSet) {
       std::invalid_argument);
 }
 
-TEST(LiveSettings, HaveTheNamesDefaultsAndDescriptionsOfTheParameters) {
-  dynamic_reconfigure::Config defaults, expected;
-  MappingConfig::__getDefault__().__toMessage__(defaults);
-  LiveSettings::show(ServerConfig(), MapperConfig()).__toMessage__(expected);
-  const auto same = [](const auto& a, const auto& b) {
-    ASSERT_EQ(a.size(), b.size());
-    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].value, b[i].value) << a[i].name;
-  };
-  same(defaults.bools, expected.bools);
-  same(defaults.ints, expected.ints);
-  same(defaults.doubles, expected.doubles);
-  same(defaults.strs, expected.strs);
-  std::map<std::string, std::string> descriptions;
-  const auto collect = [&](const auto& table) {
-    for (const auto& p : table) {
-      std::string name = p.name;
-      std::replace(name.begin(), name.end(), '/', '_');
-      descriptions[name] = p.description;
+TEST(LiveSettings, ShowAndTakeEveryParameterThatChangesWhileMapping) {
+  ServerConfig server, taken_server;
+  MapperConfig mapper, taken_mapper;
+  const auto change = [](const auto& parameters, auto& config) {
+    for (const auto& p : parameters) {
+      if (p.changesWhileMapping()) p.set(config, otherValue(p, config));
     }
   };
-  collect(serverParameters());
-  collect(mapperParameters());
-  EXPECT_GT(MappingConfig::__getParamDescriptions__().size(), 20u);
-  for (const auto& p : MappingConfig::__getParamDescriptions__()) {
-    if (p->name == "last_refusal") continue;  // an answer, no parameter
-    EXPECT_EQ(p->description, descriptions[p->name]) << p->name;
+  change(serverParameters(), server);
+  change(mapperParameters(), mapper);
+  LiveSettings::take(LiveSettings::show(server, mapper), taken_server, taken_mapper);
+  for (const auto& p : serverParameters()) EXPECT_TRUE(p.equal(taken_server, server)) << p.name;
+  for (const auto& p : mapperParameters()) EXPECT_TRUE(p.equal(taken_mapper, mapper)) << p.name;
+}
+
+TEST(LiveSettings, DefaultsAreTheParameters) {
+  MappingConfig defaults = MappingConfig::__getDefault__();
+  ServerConfig server;
+  MapperConfig mapper;
+  server.color_mode = ColorMode::kHeight;
+  server.window = 7.0;
+  mapper.free_space.mode = "even";
+  mapper.scan_limit.hits = 3.0;
+  LiveSettings::take(defaults, server, mapper);
+  for (const auto& p : serverParameters()) EXPECT_TRUE(p.equal(server, ServerConfig())) << p.name;
+  for (const auto& p : mapperParameters()) EXPECT_TRUE(p.equal(mapper, MapperConfig())) << p.name;
+}
+
+TEST(LiveSettings, RefuseEachThatIsShownOnly) {
+  for (const std::string& name : shownAtStart()) {
+    ServerConfig server;
+    MapperConfig mapper;
+    ServerConfig other_server;
+    MapperConfig other_mapper;
+    const auto change = [&](const auto& parameters, auto& config) {
+      for (const auto& p : parameters) {
+        if (p.name == name) p.set(config, otherValue(p, config));
+      }
+    };
+    change(serverParameters(), other_server);
+    change(mapperParameters(), other_mapper);
+    try {
+      LiveSettings::take(LiveSettings::show(other_server, other_mapper), server, mapper);
+      ADD_FAILURE() << name << " changed";
+    } catch (const std::invalid_argument& fault) {
+      EXPECT_EQ(fault.what(), "parameter " + name + " cannot change while mapping; set it and start again");
+    }
   }
 }
 

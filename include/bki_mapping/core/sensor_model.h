@@ -4,14 +4,14 @@
 namespace bki_mapping {
 
 struct SensorModelConfig {
-  double min_range = 0.0;   ///< hits nearer than this are dropped [m]
-  double max_range = -1.0;  ///< hits farther than this are no hits [m]; -1: not known
+  double min_range = 0.0;   ///< hits closer than this are dropped [m]
+  double max_range = -1.0;  ///< hits beyond this do not occupy [m]; -1: not known
 
-  /// Where a range is not known, points farther than this count as faults of the driver [m]: they neither
-  /// occupy nor clear. Lidars see up to about 250 m; a corrupt point may lie anywhere.
+  /// Where max_range is not known, points beyond this are faults of the driver [m]: they neither occupy nor
+  /// clear. Lidars see up to about 250 m; a corrupt point may lie anywhere.
   static constexpr double kFarthest = 300.0;
   bool knowsRange() const { return max_range > 0.0; }
-  double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< no hit is farther [m]
+  double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< range of the farthest hit [m]
 };
 
 }  // namespace bki_mapping

@@ -13,7 +13,7 @@ namespace bki_mapping {
 /// list, a name given twice.
 std::map<std::string, std::string> loadParameterFile(const std::string& file);
 
-/// The mapper's settings as such a file, each with a comment that tells values, unit and meaning.
+/// The mapper's settings as such a file, each with its meaning, values and unit as a comment.
 std::string parameterYaml(const MapperConfig& config);
 
 }  // namespace bki_mapping

@@ -8,7 +8,7 @@ namespace bki_mapping {
 struct FreeGainConfig {
   double dynamic_classes = 1.0;  ///< classes flagged dynamic
   double static_classes = 1.0;   ///< the others
-  /// Evidence of hits over which a gain above 1 falls to 1/e of what it is above 1; 0: it does not.
+  /// A gain g above 1 falls with the evidence from hits, to 1 + (g - 1) exp(-hits / persistence); 0: never.
   double persistence = 0.0;
 };
 

@@ -12,14 +12,18 @@ namespace bki_mapping {
 
 using Parameter = NamedParameter<MapperConfig>;
 
-/// All parameters of the mapper, in the order in which they are documented.
+/// All parameters of the mapper, in the order in which they are documented. Those of a component stand in
+/// its room, in `*_parameters.h` beside the code that reads them.
 std::vector<Parameter> mapperParameters();
-
-/// Whether a mapper can take over another value of a parameter and keep its map.
-bool changesWhileMapping(const std::string& name);
 
 /// setNamedParameters with the mapper's parameters.
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values);
+
+/// checkNamedParameters with the mapper's parameters.
+void checkParameters(const MapperConfig& config);
+
+/// @throws std::invalid_argument that names a parameter that differs, but can change only at the start.
+void checkChanges(const MapperConfig& before, const MapperConfig& after);
 
 /// What a user should know about settings that are allowed, but hardly meant: a sentence each.
 std::vector<std::string> settingWarnings(const MapperConfig& config);

@@ -32,7 +32,7 @@ class SemanticMapper {
 
   /// Takes over other settings; the map stays, and its states follow the gains.
   /// @throws std::invalid_argument if a setting is not allowed, or cannot change while mapping
-  /// (changesWhileMapping); the settings are then as they were.
+  /// (Changes::kAtStart); the settings are then as they were.
   void reconfigure(const MapperConfig& config);
 
   /// Forgets all scans, and gives their memory back to the system.

@@ -5,15 +5,15 @@
 
 namespace bki_mapping {
 
-/// What one scan may add at most to one voxel; 0: no limit.
+/// Most evidence that one scan adds to a voxel; 0: no limit.
 struct ScanLimitConfig {
-  double hits = 0.0;  ///< to all classes together; they share it in proportion
+  double hits = 0.0;  ///< of all classes together; larger sums are scaled down
   double free = 0.0;
-  /// Blocks that its hits, or its free space, may touch; 0: as many as lie within the sensor's reach, but no
-  /// more than kMostBlocks. A scan beyond the limit is refused whole.
+  /// Most blocks that its hits, or its free space, may touch; 0: those within the sensor's reach, at most
+  /// kMostBlocks. A larger scan is refused whole.
   std::int64_t blocks = 0;
 
-  static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< half a gigabyte for each class in all of them
+  static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< 0.5 GB for each class that all of them hold
 };
 
 }  // namespace bki_mapping

@@ -1,0 +1,33 @@
+/// @file The parameters of how the state of a voxel is decided, by name.
+#pragma once
+
+#include <vector>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/map/free_gain_config.h"
+
+namespace bki_mapping {
+
+inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
+  using C = FreeGainConfig;
+  const NumberRange gain = NumberRange::above(0.0).upTo(kMostEvidence).slider(1e-6, 1e6);
+  return {
+      realParameter(
+          "dynamic", &C::dynamic_classes, gain, "", Changes::kWhileMapping,
+          "Factor on the evidence for free when the state of a voxel is decided whose likeliest "
+          "class has the flag dynamic. Set it above 1 to clear the trails of moving objects sooner."),
+      realParameter(
+          "static", &C::static_classes, gain, "", Changes::kWhileMapping,
+          "Factor on the evidence for free when the state of a voxel is decided whose likeliest "
+          "class does not have the flag dynamic. Set it below 1 to keep floors and walls that beams "
+          "graze."),
+      realParameter(
+          "persistence", &C::persistence, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
+          Changes::kWhileMapping,
+          "Evidence from hits over which a gain g above 1 falls, to 1 + (g - 1) exp(-evidence / "
+          "persistence). Set it to the evidence of a few scans to keep what is hit again and again, "
+          "such as parked cars; 0 keeps gains constant."),
+  };
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,32 @@
+/// @file The limits of a scan by name.
+#pragma once
+
+#include <vector>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/update/scan_limit_config.h"
+
+namespace bki_mapping {
+
+inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
+  using C = ScanLimitConfig;
+  const NumberRange evidence = NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6);
+  return {
+      realParameter(
+          "hits", &C::hits, evidence, "", Changes::kWhileMapping,
+          "Most evidence that the hits of one scan add to a voxel, all classes together; larger sums "
+          "are scaled down to it. Set it so that scans count alike however dense their points are; 0 "
+          "sets no limit."),
+      realParameter("free", &C::free, evidence, "", Changes::kWhileMapping,
+                    "Most evidence for free that one scan adds to a voxel. Set it so that scans count alike "
+                    "however many beams cross the voxel; 0 sets no limit."),
+      integerParameter(
+          "blocks", &C::blocks, NumberRange::atLeast(0).upTo(1e9), Changes::kWhileMapping,
+          "Most blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "
+          "touch; a larger scan is refused whole. Lower it to protect memory; 0 allows the blocks "
+          "within the sensor's reach, at most " +
+              std::to_string(ScanLimitConfig::kMostBlocks) + "."),
+  };
+}
+
+}  // namespace bki_mapping
