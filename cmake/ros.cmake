@@ -41,6 +41,8 @@ add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_mess
 bki_mapping_tool(play_sequence bki_mapping_ros)
 add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
+add_executable(print_parameters src/tools/print_parameters.cpp)
+bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
 add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
 bki_mapping_tool(benchmark_publishing bki_mapping_ros)
@@ -51,7 +53,7 @@ install(TARGETS ${bki_mapping_rooms} bki_mapping_nodelets
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS benchmark_publishing benchmark_sequence evaluate_map map_sequence mapping_node play_sequence
-  sequence_to_bag simulate_drive
+  print_parameters sequence_to_bag simulate_drive
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 if(TARGET benchmark_parts)
   install(TARGETS benchmark_parts RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

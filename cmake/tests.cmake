@@ -71,6 +71,7 @@ add_test(NAME vector_symbols_test
 
 if(CATKIN_ENABLE_TESTING)
   bki_mapping_script_test(tools commands_test)
+  bki_mapping_script_test(scripts generated_parameters_test)
   set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS

@@ -1,0 +1,65 @@
+/// @file Prints the facts of all parameters as JSON, for scripts/generate_parameters.
+#include <algorithm>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "bki_mapping/mapping/parameters.h"
+#include "ros/live_settings.h"
+#include "ros/server_config.h"
+
+namespace bki_mapping {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* nameOf(ParameterType type) {
+  switch (type) {
+    case ParameterType::kReal:
+      return "real";
+    case ParameterType::kInteger:
+      return "integer";
+    case ParameterType::kTruth:
+      return "truth";
+    case ParameterType::kWord:
+      return "word";
+    default:
+      return "text";
+  }
+}
+
+/// Numbers are text, as people read and write them.
+template <typename Config>
+Json jsonOf(const std::vector<NamedParameter<Config>>& parameters) {
+  const std::vector<std::string>& shown = ros_shell::shownAtStart();
+  Json list = Json::array();
+  for (const auto& p : parameters) {
+    Json facts = {{"name", p.name},
+                  {"type", nameOf(p.type)},
+                  {"default", p.get(Config())},
+                  {"unit", p.unit},
+                  {"values", p.values},
+                  {"words", p.words},
+                  {"changes_while_mapping", p.changesWhileMapping()},
+                  {"shown_while_mapping", p.changesWhileMapping() || indexOf(shown, p.name).has_value()},
+                  {"description", p.description}};
+    if (p.type == ParameterType::kReal || p.type == ParameterType::kInteger) {
+      facts["slider"] = {numberText(p.range.sliderLeast()), numberText(p.range.sliderMost())};
+    }
+    list.push_back(facts);
+  }
+  return list;
+}
+
+}  // namespace
+}  // namespace bki_mapping
+
+int main() {
+  using namespace bki_mapping;
+  std::cout << Json{{"mapper", jsonOf(mapperParameters())},
+                    {"node", jsonOf(ros_shell::serverParameters())},
+                    {"inputs", jsonOf(ros_shell::inputParameters())},
+                    {"refusal", ros_shell::kLastRefusal}}
+                   .dump(2)
+            << "\n";
+  return std::cout.good() ? 0 : 1;
+}
