@@ -1,6 +1,8 @@
 """What the rostests share: clouds, poses, and waiting for messages with a timeout."""
 import random
 import struct
+import subprocess
+import tempfile
 import threading
 import time
 import unittest
@@ -122,6 +124,44 @@ class Robot:
         self.publish_pose(stamp, position, yaw_quarter_turns)
         self.clouds.publish(make_cloud(points, labels, stamp, **{'frame': self.frame, **options}))
         return stamp
+
+
+class Mapping:
+    """A running launch file with the mapper `mapping`, and a robot beside it."""
+    points = [(0.2 * i - 10.0, 8.0, 0.1 * (i % 20) - 1.0) for i in range(100)]
+
+    def __init__(self, *arguments, launch=('bki_mapping', 'mapping.launch')):
+        self.output = tempfile.TemporaryFile('w+')
+        self.status = Listener('/mapping/status', MappingStatus)
+        self.robot = Robot('/velodyne_points')
+        self.launch = subprocess.Popen(['roslaunch', '--wait', *launch, *arguments],
+                                       stdout=self.output, stderr=subprocess.STDOUT)
+        try:
+            self.robot.connect()
+        except AssertionError as fault:
+            self.__exit__()
+            raise AssertionError(f'{fault}; {launch} printed:\n{self.printed()}') from fault
+
+    def __enter__(self):
+        return self
+
+    def scan(self, points=None, labels=None, **options):
+        """Publishes a scan; returns the status after it."""
+        points = points or self.points
+        stamp = self.robot.scan(points, labels or [CAR] * len(points), **options)
+        return self.status.wait_for(lambda m: m.header.stamp == stamp, 'dealing with the cloud')
+
+    def __exit__(self, *_):
+        self.launch.terminate()
+        self.launch.wait(30)
+        wait_until(lambda: self.status.subscriber.get_num_connections() == 0, 'the launch ending')
+        self.status.close()
+        self.robot.clouds.unregister()
+        self.robot.poses.unregister()
+
+    def printed(self):
+        self.output.seek(0)
+        return self.output.read()
 
 
 def random_scan(seed, points=60, reach=30.0):

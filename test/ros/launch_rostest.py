@@ -2,52 +2,16 @@
 """mapping.launch as users start it: with every preset, as node and nodelet, with simulated time that goes back."""
 import glob
 import os
-import subprocess
 import sys
-import tempfile
 import unittest
 
 import roslib.packages
 import rospy
 import rostest
-from bki_mapping.msg import MappingStatus
 from rosgraph_msgs.msg import Clock, Log
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import CAR, Listener, Robot, wait_until  # noqa: E402
-
-POINTS = [(0.2 * i - 10.0, 8.0, 0.1 * (i % 20) - 1.0) for i in range(100)]
-
-
-class Mapping:
-    """A running mapping.launch with a robot beside it."""
-
-    def __init__(self, *arguments):
-        self.output = tempfile.TemporaryFile('w+')
-        self.status = Listener('/mapping/status', MappingStatus)
-        self.robot = Robot('/velodyne_points')
-        self.launch = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', 'mapping.launch', *arguments],
-                                       stdout=self.output, stderr=subprocess.STDOUT)
-        self.robot.connect()
-
-    def __enter__(self):
-        return self
-
-    def scan(self):
-        stamp = self.robot.scan(POINTS, [CAR] * len(POINTS))
-        return self.status.wait_for(lambda m: m.header.stamp == stamp, 'dealing with the cloud')
-
-    def __exit__(self, *_):
-        self.launch.terminate()
-        self.launch.wait(30)
-        wait_until(lambda: self.status.subscriber.get_num_connections() == 0, 'the launch ending')
-        self.status.close()
-        self.robot.clouds.unregister()
-        self.robot.poses.unregister()
-
-    def printed(self):
-        self.output.seek(0)
-        return self.output.read()
+from harness import Listener, Mapping, wait_until  # noqa: E402
 
 
 class Launch(unittest.TestCase):
