@@ -62,5 +62,17 @@ install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_
 install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
-catkin_install_python(PROGRAMS scripts/class_table_path.py scripts/mapping_summary.py scripts/play_bag.py
+catkin_install_python(PROGRAMS scripts/body_box.py scripts/class_table_path.py scripts/mapping_summary.py scripts/play_bag.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+
+# pcl_ros serves at run time: launch files load its nodelets, nothing is linked with it. Debian's describes them as being in
+# lib/libpcl_ros_filters.so, but puts that into lib/<architecture>; a link in our own lib leads pluginlib there.
+find_library(BKI_MAPPING_PCL_ROS_FILTERS pcl_ros_filters PATHS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE} NO_DEFAULT_PATH)
+mark_as_advanced(BKI_MAPPING_PCL_ROS_FILTERS)
+if(BKI_MAPPING_PCL_ROS_FILTERS)
+  set(link ${CATKIN_DEVEL_PREFIX}/lib/libpcl_ros_filters.so)
+  file(MAKE_DIRECTORY ${CATKIN_DEVEL_PREFIX}/lib)
+  file(CREATE_LINK ${BKI_MAPPING_PCL_ROS_FILTERS} ${link} SYMBOLIC)
+  #catkin_lint: ignore_once external_file
+  install(FILES ${link} DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+endif()
