@@ -13,10 +13,11 @@ inline std::vector<NamedParameter<FreeSpaceConfig>> freeSpaceParameters() {
   using C = FreeSpaceConfig;
   constexpr double kMostSeed = 9007199254740991.0;  // 2^53 - 1: larger integers have no exact text
   return {
-      wordParameter("mode", &C::mode, freeSpaceModes(), Changes::kWhileMapping,
-                    "How beams mark space as free: none does not; even adds a sample every free_space/gap; "
-                    "uniform and linear add random samples; line adds whole beams. Use line where moving "
-                    "objects must disappear from the map, linear where time is short."),
+      wordParameter(
+          "mode", &C::mode, freeSpaceModes(), Changes::kWhileMapping,
+          "How beams mark space as free: none leaves it unknown; even adds a sample every free_space/gap; "
+          "uniform and linear add random samples; line adds whole beams. Use line where moving "
+          "objects must disappear from the map, linear where time is short."),
       realParameter("gap", &C::gap, NumberRange::atLeast(0.01).slider(0.01, 100.0), "m",
                     Changes::kWhileMapping,
                     "Distance between the samples on a beam in mode even. A larger gap takes less time and "

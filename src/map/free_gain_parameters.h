@@ -14,12 +14,12 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
   return {
       realParameter(
           "dynamic", &C::dynamic_classes, gain, "", Changes::kWhileMapping,
-          "Factor on the evidence for free when the state of a voxel is decided whose likeliest "
-          "class has the flag dynamic. Set it above 1 to clear the trails of moving objects sooner."),
+          "Factor on the evidence for free when deciding the state of a voxel whose likeliest class has the "
+          "flag dynamic. Set it above 1 to clear the trails of moving objects sooner."),
       realParameter(
           "static", &C::static_classes, gain, "", Changes::kWhileMapping,
-          "Factor on the evidence for free when the state of a voxel is decided whose likeliest "
-          "class does not have the flag dynamic. Set it below 1 to keep floors and walls that beams "
+          "Factor on the evidence for free when deciding the state of a voxel whose likeliest class does not "
+          "have the flag dynamic. Set it below 1 to keep floors and walls that beams "
           "graze."),
       realParameter(
           "persistence", &C::persistence, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
