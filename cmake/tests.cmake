@@ -40,7 +40,7 @@ function(bki_mapping_unit_tests room)
 endfunction()
 
 bki_mapping_unit_tests(core grid_geometry)
-bki_mapping_unit_tests(parallel thread_pool)
+bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
 bki_mapping_unit_tests(map column_map map_query semantic_map)
 bki_mapping_unit_tests(points downsample point_bins tile_grid)

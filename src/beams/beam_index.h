@@ -48,7 +48,7 @@ class BeamTable : public BeamIndex {
  private:
   void appendCells(int row, int first_column, int last_column, std::vector<BeamRange>& ranges) const;
 
-  std::vector<std::uint32_t> begin_, next_;
+  std::vector<std::uint32_t> begin_;
 };
 
 /// The same from an R-tree (Boost.Geometry) over unit direction vectors, which has neither seam nor pole:

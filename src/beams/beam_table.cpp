@@ -2,18 +2,18 @@
 #include <cmath>
 
 #include "beams/beam_index.h"
+#include "parallel/group_by.h"
 
 namespace bki_mapping {
 
 void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order) {
-  // A counting sort.
   constexpr std::size_t kCells = kBeamRows * kBeamColumns;
   begin_.assign(kCells + 1, 0);
   for (const std::uint32_t cell : cells) ++begin_[cell + 1];
-  for (std::size_t c = 1; c <= kCells; ++c) begin_[c] += begin_[c - 1];
-  next_ = begin_;
   order.resize(cells.size());
-  for (std::uint32_t b = 0; b < cells.size(); ++b) order[next_[cells[b]]++] = b;
+  groupBy(kCells, begin_.data(), [&](auto&& positionOf) {
+    for (std::uint32_t b = 0; b < cells.size(); ++b) order[positionOf(cells[b])] = b;
+  });
 }
 
 void BeamTable::appendCells(int row, int first, int last, std::vector<BeamRange>& ranges) const {

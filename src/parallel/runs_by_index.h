@@ -1,9 +1,9 @@
 /// @file Runs of items, brought together by the tile or block in which they lie.
 #pragma once
 
-#include <algorithm>
 #include <vector>
 
+#include "parallel/group_by.h"
 #include "parallel/index_numbering.h"
 
 namespace bki_mapping {
@@ -28,14 +28,12 @@ class RunsByIndex {
     number_.push_back(number);
     added_.push_back(run);
   }
-  /// Once all are added: a counting sort. Runs of one index stay in their order.
+  /// Once all are added. Runs of one index stay in their order.
   void sort() {
-    for (std::size_t n = 1; n < begin_.size(); ++n) begin_[n] += begin_[n - 1];
     runs_.resize(added_.size());
-    // begin_[n] runs up to the next index's begin, and is then put back.
-    for (std::size_t r = 0; r < added_.size(); ++r) runs_[begin_[number_[r]]++] = added_[r];
-    std::copy_backward(begin_.begin(), begin_.end() - 1, begin_.end());
-    begin_.front() = 0;
+    groupBy(indices_.size(), begin_.data(), [this](auto&& positionOf) {
+      for (std::size_t r = 0; r < added_.size(); ++r) runs_[positionOf(number_[r])] = added_[r];
+    });
   }
 
   /// In the order in which they were first seen.

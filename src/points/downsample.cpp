@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "parallel/group_by.h"
+
 namespace bki_mapping {
 namespace {
 
@@ -50,12 +52,12 @@ void Downsampler::start(const Eigen::Vector3d& origin, std::size_t chunks, const
   std::size_t most = 0, most_tiles = 0;
   for (const Input& input : inputs_) {
     most = std::max(most, input.points_.size());
-    most_tiles = std::max(most_tiles, input.begin_.capacity());
+    most_tiles = std::max(most_tiles, input.tile_sizes_.capacity());
   }
   for (Input& input : inputs_) {
     input.points_.resize(most);
     input.tile_of_.resize(most);
-    input.begin_.reserve(most_tiles);
+    input.tile_sizes_.reserve(most_tiles);
   }
   for (std::size_t m = 0; m < mergers_.size(); ++m) {
     for (const CellMerger& other : mergers_) mergers_[m].reserveAs(other);
@@ -69,14 +71,14 @@ Downsampler::Input& Downsampler::open(std::size_t chunk, std::size_t worker) {
   input.tiles_->clear();
   input.known_.assign(kShortCodes, {{}, kNone});
   input.size_ = 0;
-  input.begin_.clear();
+  input.tile_sizes_.clear();
   input.count_ = 0;
   return input;
 }
 
 std::uint32_t Downsampler::Input::findNumber(const GridIndex& tile, KnownTile& known) {
   known = {tile, tiles_->insert(tile)};
-  if (known.number == begin_.size()) begin_.push_back(0);
+  if (known.number == tile_sizes_.size()) tile_sizes_.push_back(0);
   return known.number;
 }
 
@@ -99,7 +101,7 @@ void Downsampler::Input::place() {
     KnownTile& known = known_[shortCode(tile)];
     const bool is_known = known.index == tile && known.number != kNone;
     tile_of[i] = is_known ? known.number : findNumber(tile, known);
-    ++begin_[tile_of[i]];
+    ++tile_sizes_[tile_of[i]];
   }
   size_ += count;
   count_ = 0;
@@ -110,24 +112,20 @@ void Downsampler::close(std::size_t chunk_number, std::size_t worker) {
   Input& input = inputs_[worker];
   input.place();
   const std::size_t count = input.size_, tiles = chunk.tiles.size();
-  chunk.begin.resize(tiles + 1);
-  std::uint32_t begin = 0;
-  for (std::size_t t = 0; t < tiles; ++t) {
-    chunk.begin[t] = begin;
-    begin += input.begin_[t];
-    input.begin_[t] = chunk.begin[t];
-  }
-  chunk.begin[tiles] = begin;
+  chunk.begin.assign(1, 0);
+  chunk.begin.insert(chunk.begin.end(), input.tile_sizes_.begin(), input.tile_sizes_.end());
   chunk.points.resize(count);
   if (ordered_) {
     chunk.place.resize(count);
     chunk.cell_of.assign(count, kNone);
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t to = input.begin_[input.tile_of_[i]]++;
-    chunk.points[to] = input.points_[i];
-    if (ordered_) chunk.place[to] = static_cast<std::uint32_t>(i);
-  }
+  groupBy(tiles, chunk.begin.data(), [&](auto&& positionOf) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t position = positionOf(input.tile_of_[i]);
+      chunk.points[position] = input.points_[i];
+      if (ordered_) chunk.place[position] = static_cast<std::uint32_t>(i);
+    }
+  });
   turns_.finish(chunk_number, [this](std::size_t c) { collectRuns(c); });
 }
 

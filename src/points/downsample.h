@@ -61,11 +61,11 @@ class Downsampler {
     ClassId labels_[kBatch];
     std::size_t count_ = 0;
     TilePlaces places_;
-    std::vector<KnownTile> known_;        ///< tiles met last, by a few bits of their index
-    std::size_t size_ = 0;                ///< of the two that follow; they are longer
-    std::vector<TilePoint> points_;       ///< of the chunk
-    std::vector<std::uint32_t> tile_of_;  ///< number of the tile of each
-    std::vector<std::uint32_t> begin_;    ///< of each tile's points, once sorted
+    std::vector<KnownTile> known_;           ///< tiles met last, by a few bits of their index
+    std::size_t size_ = 0;                   ///< of the two that follow; they are longer
+    std::vector<TilePoint> points_;          ///< of the chunk
+    std::vector<std::uint32_t> tile_of_;     ///< number of the tile of each
+    std::vector<std::uint32_t> tile_sizes_;  ///< points of each tile
   };
 
   /// Forgets all points. @param origin of the points in the map frame [m]. @param ordered whether inOrder is

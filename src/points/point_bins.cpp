@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "parallel/group_by.h"
 #include "points/axis_blocks.h"
 #include "update/work_limit.h"
 
@@ -134,19 +135,16 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) cons
   }
 }
 
-/// A counting sort; begin[b + 1] holds the number of block b's points.
 void PointBins::sortGroup(const Scratch& scratch, Group& group) const {
-  for (std::size_t b = 1; b < group.begin.size(); ++b) group.begin[b] += group.begin[b - 1];
   group.points.resize(scratch.size);
-  // begin[b] runs up to the next block's begin, and is then put back.
   group.classes.assign(group.blocks.size(), 0);
-  for (std::size_t i = 0; i < scratch.size; ++i) {
-    const std::uint32_t block = scratch.block[i];
-    group.points[group.begin[block]++] = scratch.points[i];
-    group.classes[block] |= PointRun::classBit(scratch.points[i].label);
-  }
-  std::copy_backward(group.begin.begin(), group.begin.end() - 1, group.begin.end());
-  group.begin.front() = 0;
+  groupBy(group.blocks.size(), group.begin.data(), [&](auto&& positionOf) {
+    for (std::size_t i = 0; i < scratch.size; ++i) {
+      const std::uint32_t block = scratch.block[i];
+      group.points[positionOf(block)] = scratch.points[i];
+      group.classes[block] |= PointRun::classBit(scratch.points[i].label);
+    }
+  });
 }
 
 void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch,

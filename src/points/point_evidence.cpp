@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "parallel/group_by.h"
+
 namespace bki_mapping {
 
 PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels,
@@ -63,25 +65,26 @@ void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t co
   }
 }
 
-std::size_t PointEvidence::sortByClass(std::size_t block, Workspace& workspace, ClassEnds& end) const {
-  end.fill(0);
-  std::size_t count = 0, last = 0;
-  for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
-    count += run->count;
+std::size_t PointEvidence::sortByClass(std::size_t block, Workspace& workspace, ClassBegins& begin) const {
+  begin.fill(0);
+  const PointRun* const runs = bins_.begin(block);
+  const PointRun* const runs_end = bins_.end(block);
+  std::size_t last = 0;
+  for (const PointRun* run = runs; run != runs_end; ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
       const std::size_t label = run->points[i].label;
-      ++end[label + 1];
+      ++begin[label + 1];
       last = std::max(last, label);
     }
   }
-  // A counting sort; most blocks see two or three classes.
-  for (std::size_t label = 1; label <= last; ++label) end[label] += end[label - 1];
-  for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
-    for (std::size_t i = 0; i < run->count; ++i) {
-      workspace.points[end[run->points[i].label]++] = run->points[i];
+  groupBy(last + 1, begin.data(), [&](auto&& positionOf) {
+    for (const PointRun* run = runs; run != runs_end; ++run) {
+      for (std::size_t i = 0; i < run->count; ++i) {
+        workspace.points[positionOf(run->points[i].label)] = run->points[i];
+      }
     }
-  }
-  return count;
+  });
+  return begin[last + 1];
 }
 
 void PointEvidence::sumBlock(std::size_t block, Workspace& workspace, BlockSums& sums) const {
@@ -96,13 +99,13 @@ void PointEvidence::sumBlock(std::size_t block, Workspace& workspace, BlockSums&
     sumClass(static_cast<ClassId>(runs->points->label), runs, run_count, sums);
     return;
   }
-  ClassEnds end;
-  const std::size_t count = sortByClass(block, workspace, end);
+  ClassBegins begin;
+  const std::size_t count = sortByClass(block, workspace, begin);
   for (std::size_t i = 0; i < count;) {
     const auto label = static_cast<ClassId>(workspace.points[i].label);
-    const PointRun run{workspace.points.data() + i, end[label] - i, 0};
+    const PointRun run{workspace.points.data() + i, begin[label + 1] - i, 0};
     sumClass(label, &run, 1, sums);
-    i = end[label];
+    i = begin[label + 1];
   }
 }
 

@@ -38,11 +38,11 @@ class PointEvidence : public Evidence {
   struct alignas(kThreadsApart) Workspace {
     std::vector<LocalPoint> points;
   };
-  /// Where the points of each class end.
-  using ClassEnds = std::array<std::uint32_t, kMaxClasses + 3>;
+  /// Where the points of each class begin.
+  using ClassBegins = std::array<std::uint32_t, kMaxClasses + 3>;
 
   /// Brings the points of a block into the workspace, class by class. @return how many they are.
-  std::size_t sortByClass(std::size_t block, Workspace& workspace, ClassEnds& end) const;
+  std::size_t sortByClass(std::size_t block, Workspace& workspace, ClassBegins& begin) const;
   void sumBlock(std::size_t block, Workspace& workspace, BlockSums& sums) const;
   /// Opens the plane of a class and sets it to the sums of the points.
   void sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const;
