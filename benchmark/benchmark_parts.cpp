@@ -10,6 +10,7 @@
 #include "mapping/scan_preprocessor.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
+#include "simd/instruction_sets.h"
 #include "simulation/lidar.h"
 #include "update/map_updater.h"
 

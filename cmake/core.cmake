@@ -26,35 +26,23 @@ endfunction()
 bki_mapping_core_room(core SOURCES class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(map SOURCES column_map.cpp map_query.cpp semantic_map.cpp LINK bki_mapping_core)
-bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core)
+bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
+bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.cpp LINK bki_mapping_parallel bki_mapping_map)
+bki_mapping_core_room(points SOURCES
+    cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp
+    point_kernels.cpp point_kernels_avx2.cpp point_kernels_avx512.cpp point_kernels_generic.cpp
+    soft_point_evidence.cpp tile_grid.cpp
+  LINK bki_mapping_kernel bki_mapping_update)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp
-    raster/beam_tracks.cpp raster/group_sums.cpp
-    ../simd/inner_loops.cpp ../simd/inner_loops_generic.cpp
-    ../points/cell_merger.cpp ../points/downsample.cpp ../points/point_bins.cpp ../points/point_evidence.cpp
-    ../points/soft_point_evidence.cpp ../points/tile_grid.cpp
+    raster/group_sums.cpp
+    raster/line_kernels.cpp raster/line_kernels_avx2.cpp raster/line_kernels_avx512.cpp raster/line_kernels_generic.cpp
+    raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
-foreach(room points simd)  # of which the beams' library holds all
-  add_library(bki_mapping_${room} ALIAS bki_mapping_beams)
-endforeach()
 bki_mapping_core_room(free_space SOURCES
     beam_lines.cpp even_samples.cpp no_free_space.cpp random_samples.cpp registry.cpp
-  LINK bki_mapping_beams)
+  LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
-
-# The inner loops meet no infinities or NaN; without them a choice is a minimum or a maximum, one instruction.
-set(inner_loop_options -ffinite-math-only -fno-signed-zeros)
-set_source_files_properties(src/beams/../simd/inner_loops_generic.cpp PROPERTIES COMPILE_OPTIONS "${inner_loop_options}")
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  # Chosen at run time where the processor has it.
-  target_sources(bki_mapping_beams PRIVATE src/simd/inner_loops_avx2.cpp src/simd/inner_loops_avx512.cpp)
-  set_source_files_properties(src/simd/inner_loops_avx2.cpp PROPERTIES COMPILE_OPTIONS
-    "${inner_loop_options};-mavx2;-mfma")
-  set_source_files_properties(src/simd/inner_loops_avx512.cpp PROPERTIES COMPILE_OPTIONS
-    "${inner_loop_options};-mavx2;-mfma;-mavx512f;-mavx512dq;-mavx512bw;-mavx512vl;-mbmi2;-Wno-maybe-uninitialized")
-  # The last: GCC 12 warns of its own intrinsics (its bug 105593).
-  target_compile_definitions(bki_mapping_beams PRIVATE BKI_MAPPING_X86)
-endif()

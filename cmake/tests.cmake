@@ -44,12 +44,13 @@ bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
 bki_mapping_unit_tests(map column_map map_query semantic_map)
 bki_mapping_unit_tests(points downsample point_bins tile_grid)
-bki_mapping_unit_tests(beams beam_index beam_tracks instruction_sets occlusion)
+bki_mapping_unit_tests(beams beam_index instruction_sets line_setup occlusion)
 bki_mapping_unit_tests(free_space sampling)
 bki_mapping_unit_tests(mapping allocation bounds brute_force laws parameters real_data scan_preprocessor)
 bki_mapping_unit_tests(io atomic_file class_table map_export sequence yaml_file)
 bki_mapping_unit_tests(simulation simulation)
 bki_mapping_unit_tests(evaluation dynamics semantics truth)
+target_link_libraries(instruction_sets_test PRIVATE bki_mapping_points)
 target_link_libraries(parameters_test PRIVATE bki_mapping_io)
 target_link_libraries(real_data_test PRIVATE bki_mapping_io)
 target_link_libraries(map_export_test PRIVATE pcl_io)
@@ -67,7 +68,11 @@ bki_mapping_script_test(house links_test)
 bki_mapping_script_test(house skip_test)
 bki_mapping_script_test(tools tools_test)
 add_test(NAME vector_symbols_test
-  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py $<TARGET_OBJECTS:bki_mapping_beams>)
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
+    $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
+    $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_kernel> $<TARGET_OBJECTS:bki_mapping_update>
+    $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams>
+    $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping>)
 
 if(CATKIN_ENABLE_TESTING)
   bki_mapping_script_test(tools commands_test)

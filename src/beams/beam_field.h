@@ -10,6 +10,7 @@
 #include "beams/row_walk.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "kernel/sparse_kernel.h"
+#include "parallel/thread_pool.h"
 #include "update/block_group.h"
 
 namespace bki_mapping {

@@ -33,7 +33,7 @@ bool scaleSums(float scale, float* sums) {
 void LineEvidence::setField(const BeamField& field, ThreadPool& pool) {
   field_ = &field;
   if (field.kernel().type == KernelType::kCounting) return;
-  tracks_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), loops_, pool);
+  lines_.set(field.beams(), field.geometry().resolution(), field.reachMetres(), kernels_, pool);
 }
 
 const std::vector<GridIndex>& LineEvidence::touchedBlocks(const SemanticMap& map, std::size_t most,
@@ -73,8 +73,8 @@ void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBl
   const bool counting = field_->kernel().type == KernelType::kCounting;
   if (!counting) {
     field_->findRangesNear(group, own.near);
-    loops_.trace_beams(tracks_.arrays(), own.near.ranges.data(), own.near.ranges.size(), field_->boxOf(group),
-                       weight_, own.group);
+    kernels_.trace_beams(lines_.arrays(), own.near.ranges.data(), own.near.ranges.size(),
+                         field_->boxOf(group), weight_, own.group);
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockIndex& index = blocks[b].index;

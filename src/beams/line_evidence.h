@@ -6,7 +6,7 @@
 #include "beams/beam_field.h"
 #include "beams/block_walk.h"
 #include "beams/raster/group_sums.h"
-#include "simd/inner_loops.h"
+#include "beams/raster/line_kernels.h"
 #include "update/evidence.h"
 
 namespace bki_mapping {
@@ -17,7 +17,7 @@ class LineEvidence : public Evidence {
  public:
   /// @param instruction_set one of instructionSets(); the best there is if empty.
   LineEvidence(BeamWeight weight, FreeSpaceExtent extent, const std::string& instruction_set = "")
-      : weight_(weight), extent_(extent), loops_(innerLoopsFor(instruction_set)) {}
+      : weight_(weight), extent_(extent), kernels_(lineKernelsFor(instruction_set)) {}
 
   /// Replaces the beams. @param field must stay where it is until the scan is done.
   void setField(const BeamField& field, ThreadPool& pool);
@@ -43,8 +43,8 @@ class LineEvidence : public Evidence {
   const BeamField* field_ = nullptr;
   BeamWeight weight_;
   FreeSpaceExtent extent_;
-  const InnerLoops& loops_;
-  BeamTracks tracks_;
+  const LineKernels& kernels_;
+  LineSetups lines_;
   BlockWalk walk_;
   IndexNumbering touched_;
   std::vector<Workspace> workspaces_;

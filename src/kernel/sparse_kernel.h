@@ -12,24 +12,18 @@ namespace bki_mapping {
 ///     k(r) = (2 + cos(2 pi r)) / 3 * (1 - r) + sin(2 pi r) / (2 pi)   for r < 1, else 0.
 /// (Equation (1) of Zhong and Peng lacks the factor 1 - r.) Near r = 1 the kernel falls off as (1 - r)^5, so
 /// it is computed as (1 - r)^5 times a polynomial of degree 6, fitted for the least greatest error, 6e-7.
-/// With rounding the result is within 1e-6 of the formula.
-/// @param r d / l, >= 0: one number, or several side by side. @param s 1 - r, or 0 for r >= 1.
-template <typename Number>
-[[gnu::always_inline]] inline Number sparseKernel(Number r, Number s) {
-  Number q = 4.7855168148542475f * r - 5.6925235501933855f;
-  q = q * r - 6.8854927828244925f;
-  q = q * r + 2.096001637192428f;
-  q = q * r + 8.419096650581338f;
-  q = q * r + 5.000077953447409f;
-  q = q * r + 0.9999994177910798f;
-  const Number s2 = s * s;
-  return q * (s2 * s2 * s);
-}
+/// With rounding the result is within 1e-6 of the formula. These are the coefficients, of r^6 first.
+constexpr int kSparseTerms = 7;
+constexpr float kSparsePolynomial[kSparseTerms] = {
+    4.7855168148542475f, -5.6925235501933855f, -6.8854927828244925f, 2.096001637192428f,
+    8.419096650581338f,  5.000077953447409f,   0.9999994177910798f};
 
 /// @param t r^2 = (d / l)^2, >= 0.
 [[gnu::always_inline]] inline float sparseKernel(float t) {
-  const float r = std::sqrt(t);
-  return sparseKernel(r, 1.0f - r > 0.0f ? 1.0f - r : 0.0f);
+  const float r = std::sqrt(t), s = 1.0f - r > 0.0f ? 1.0f - r : 0.0f, s2 = s * s;
+  float q = kSparsePolynomial[0];
+  for (int n = 1; n < kSparseTerms; ++n) q = q * r + kSparsePolynomial[n];
+  return q * (s2 * s2 * s);
 }
 
 /// A kernel in units of voxels.

@@ -33,7 +33,7 @@ constexpr std::size_t kShortCodes = 1024;
 }  // namespace
 
 Downsampler::Downsampler(double cell, double tile, const std::string& instruction_set)
-    : loops_(&innerLoopsFor(instruction_set)),
+    : kernels_(&pointKernelsFor(instruction_set)),
       merges_(cell > 0.0),
       cells_(merges_ ? cell : tile),
       edge_(merges_ ? tileEdge(cell, tile) : 1) {}
@@ -84,7 +84,7 @@ std::uint32_t Downsampler::Input::findNumber(const GridIndex& tile, KnownTile& k
 
 void Downsampler::Input::place() {
   const std::size_t count = count_;
-  owner_->loops_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
+  owner_->kernels_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
   if (points_.size() < size_ + count) {
     tile_of_.resize(2 * (size_ + count));
     points_.resize(tile_of_.size());

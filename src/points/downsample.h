@@ -10,8 +10,8 @@
 #include "parallel/runs_by_index.h"
 #include "parallel/thread_pool.h"
 #include "points/cell_merger.h"
+#include "points/point_kernels.h"
 #include "points/tile_grid.h"
-#include "simd/inner_loops.h"
 
 namespace bki_mapping {
 
@@ -114,7 +114,7 @@ class Downsampler {
   void merge(std::uint32_t group, CellMerger& merger);
   void write(const Chunk& chunk, LabelledPoints& output) const;
 
-  const InnerLoops* loops_;
+  const PointKernels* kernels_;
   bool merges_;
   bool ordered_ = false;
   GridGeometry cells_;

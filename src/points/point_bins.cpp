@@ -53,8 +53,8 @@ template <typename Scratch, typename Group>
 
 }  // namespace
 
-PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops)
-    : geometry_(geometry), kernel_(kernel), loops_(loops) {
+PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels)
+    : geometry_(geometry), kernel_(kernel), kernels_(kernels) {
   const double most = kBlockEdge * (AxisBlocks::kMost - 2) / 2.0;
   if (kernel_.type == KernelType::kSparse && !(kernel_.reach < most)) {
     throw std::invalid_argument("kernel/length is more than " + std::to_string(static_cast<int>(most)) +
@@ -128,7 +128,7 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) cons
              scratch, group);
     }
   } else if (kernel_.reach >= kHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
-    loops_.reach_blocks(count, kernel_.reach, scratch.places);
+    kernels_.reach_blocks(count, kernel_.reach, scratch.places);
     binNear(count, scratch, group);
   } else {
     for (std::size_t i = 0; i < count; ++i) binFar(i, scratch, group);
@@ -157,7 +157,7 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
   for (std::size_t begin = 0; begin < size; begin += kBatch) {
     const std::size_t count = std::min(size - begin, kBatch);
     const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
-    loops_.place_points(grid, span, count, scratch.places);
+    kernels_.place_points(grid, span, count, scratch.places);
     scratch.labels = points.labels.data() + begin;
     binBatch(count, scratch, group);
   }

@@ -11,7 +11,7 @@
 #include "parallel/thread_pool.h"
 #include "points/downsample.h"
 #include "points/local_point.h"
-#include "simd/inner_loops.h"
+#include "points/point_kernels.h"
 
 namespace bki_mapping {
 
@@ -20,7 +20,7 @@ namespace bki_mapping {
 class PointBins {
  public:
   /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
-  PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const InnerLoops& loops);
+  PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels);
 
   /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
   /// @param home_always whether a point is sorted into the block that holds it even if it reaches none of its
@@ -69,7 +69,7 @@ class PointBins {
 
   GridGeometry geometry_;
   VoxelKernel kernel_;
-  const InnerLoops& loops_;
+  const PointKernels& kernels_;
   bool home_always_ = false, one_class_ = false;
   std::vector<Scratch> scratch_;  ///< one a worker
   std::vector<Group> groups_;

@@ -9,8 +9,8 @@ namespace bki_mapping {
 PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels,
                              const std::string& instruction_set)
     : kernel_(kernel, geometry.resolution()),
-      loops_(innerLoopsFor(instruction_set)),
-      bins_(geometry, kernel_, loops_),
+      kernels_(pointKernelsFor(instruction_set)),
+      bins_(geometry, kernel_, kernels_),
       reports_voxels_(reports_voxels) {}
 
 void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool) {
@@ -56,7 +56,7 @@ void PointEvidence::reserve(std::size_t workers) {
 void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const {
   BlockSums::Plane& plane = sums.open(label);
   if (kernel_.type == KernelType::kSparse) {
-    plane.layers = loops_.sum_points(runs, count, kernel_.reach, kernel_.scale, plane.values);
+    plane.layers = kernels_.sum_points(runs, count, kernel_.reach, kernel_.scale, plane.values);
     return;
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);

@@ -50,7 +50,7 @@ class PointEvidence : public Evidence {
   void prefetch(std::size_t block) const;
 
   VoxelKernel kernel_;
-  const InnerLoops& loops_;
+  const PointKernels& kernels_;
   PointBins bins_;
   bool reports_voxels_;
   std::size_t size_ = 0;

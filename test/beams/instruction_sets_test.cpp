@@ -9,6 +9,7 @@
 #include "points/point_evidence.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
+#include "simd/instruction_sets.h"
 #include "update/map_updater.h"
 
 namespace bki_mapping {
@@ -33,8 +34,15 @@ std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& bru
 
 TEST(InstructionSets, GenericIsAlwaysThere) {
   EXPECT_EQ(instructionSets().front(), "generic");
-  EXPECT_THROW(innerLoopsFor("abacus"), std::invalid_argument);
-  EXPECT_EQ(innerLoopsFor("").instruction_set, instructionSets().back());
+  EXPECT_THROW(instructionSetFor("abacus"), std::invalid_argument);
+  EXPECT_THROW(lineKernelsFor("abacus"), std::invalid_argument);
+  EXPECT_THROW(pointKernelsFor("abacus"), std::invalid_argument);
+  EXPECT_EQ(lineKernelsFor("").instruction_set, instructionSets().back());
+  EXPECT_EQ(pointKernelsFor("").instruction_set, instructionSets().back());
+  for (const std::string& set : instructionSets()) {
+    EXPECT_EQ(lineKernelsFor(set).instruction_set, set);
+    EXPECT_EQ(pointKernelsFor(set).instruction_set, set);
+  }
 }
 
 TEST(InstructionSets, LinesEqualBruteForceOnEach) {

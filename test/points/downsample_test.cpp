@@ -4,6 +4,7 @@
 #include "points/downsample.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
+#include "simd/instruction_sets.h"
 
 namespace bki_mapping {
 namespace {

@@ -53,7 +53,7 @@ class Bins {
   /// @param tile edge [m] in which neighbours come: blocks, or cubes that are none.
   Bins(double length, bool home_always, const LabelledPoints& points, double tile)
       : downsampler_(0.0, tile),
-        bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), innerLoopsFor("")) {
+        bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), pointKernelsFor("")) {
     for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
       downsampler_.start(kOrigin, 1, pool_, false);
       Downsampler::Input& input = downsampler_.open(0, 0);

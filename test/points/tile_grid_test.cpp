@@ -4,7 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "simd/inner_loops.h"
+#include "points/point_kernels.h"
+#include "simd/instruction_sets.h"
 
 namespace bki_mapping {
 namespace {
@@ -59,9 +60,9 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
           const GridGeometry geometry(cell);
           const TileGrid grid(geometry, origin, edge);
           TilePlaces places;
-          innerLoopsFor(set).place_points(grid, points.span(), kBatch - 3, places);
+          pointKernelsFor(set).place_points(grid, points.span(), kBatch - 3, places);
           TilePlaces cells;
-          innerLoopsFor(set).place_cells(grid, points.span(), kBatch - 3, cells);
+          pointKernelsFor(set).place_cells(grid, points.span(), kBatch - 3, cells);
           for (std::size_t i = 0; i < kBatch - 3; ++i) {
             ASSERT_EQ(cells.tileOf(i), places.tileOf(i)) << set << ", edge " << edge << ", point " << i;
             ASSERT_EQ(cells.cell[i], places.cell[i]) << set << ", edge " << edge << ", point " << i;
@@ -85,9 +86,9 @@ TEST(TileGrid, PlacesPointsOutOfThisWorldSomewhere) {
   Points points;
   for (const float far : {1e9f, -1e9f, 1e12f, -3e38f, 3e38f}) points.add(far, -far, 1.0f);
   for (const std::string& set : instructionSets()) {
-    const InnerLoops& loops = innerLoopsFor(set);
+    const PointKernels& kernels = pointKernelsFor(set);
     for (const int edge : {8, 24, 32}) {
-      for (const auto place : {loops.place_points, loops.place_cells}) {
+      for (const auto place : {kernels.place_points, kernels.place_cells}) {
         TilePlaces places;
         place(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(), points.x.size(), places);
         for (std::size_t i = 0; i < points.x.size(); ++i) {
@@ -121,7 +122,7 @@ TEST(TileGrid, FindsTheBlocksThatPointsReach) {
       for (std::size_t i = 0; i < kCount; ++i) {
         for (auto& axis : places.inside) axis[i] = in_block(random);
       }
-      innerLoopsFor(set).reach_blocks(kCount, reach, places);
+      pointKernelsFor(set).reach_blocks(kCount, reach, places);
       for (std::size_t i = 0; i < kCount; ++i) {
         const Eigen::Vector3d p(places.inside[0][i], places.inside[1][i], places.inside[2][i]);
         for (int code = 0; code < 27; ++code) {

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "beams/raster/beam_tracks.h"
+#include "beams/beams.h"
+#include "beams/raster/beam_slicing.h"
 #include "update/block_group.h"
 
 namespace bki_mapping {

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <memory>
-#if defined(__SSE__)
-#include <immintrin.h>
-#endif
+
+#include "simd/vec_generic.h"
 
 namespace bki_mapping {
 namespace {
@@ -35,19 +34,11 @@ void forEachRow(int row_axis, Visit&& visit) {
 }
 
 /// Adds four rows of four numbers to four rows of others, columns to rows.
-inline void addTurned(const float* from, int from_row, float* to, int to_row) {
-#if defined(__SSE__)
-  __m128 rows[4];
-  for (int n = 0; n < 4; ++n) rows[n] = _mm_loadu_ps(from + n * from_row);
-  _MM_TRANSPOSE4_PS(rows[0], rows[1], rows[2], rows[3]);
-  for (int n = 0; n < 4; ++n) {
-    _mm_storeu_ps(to + n * to_row, _mm_add_ps(_mm_loadu_ps(to + n * to_row), rows[n]));
-  }
-#else
-  for (int n = 0; n < 4; ++n) {
-    for (int m = 0; m < 4; ++m) to[n * to_row + m] += from[m * from_row + n];
-  }
-#endif
+inline void addTransposed(const float* from, int from_row, float* to, int to_row) {
+  Float4 rows[4];
+  for (int n = 0; n < 4; ++n) rows[n] = LoadFour(from + n * from_row);
+  Transpose4(rows);
+  for (int n = 0; n < 4; ++n) AddU(rows[n], to + n * to_row);
 }
 
 /// Adds rows along x to a block's sums.
@@ -58,7 +49,7 @@ void addRows(const float* numbers, float* sums) {
 }
 
 /// Adds rows along y or z.
-void addTurnedRows(int row_axis, const float* numbers, float* sums) {
+void addTransposedRows(int row_axis, const float* numbers, float* sums) {
   constexpr int kOffset[3] = {1, kBlockEdge, kBlockEdge * kBlockEdge};
   const int other = 3 - row_axis, from_row = GroupSums::stride(row_axis, 0), to_row = kOffset[row_axis];
   for (int n = 0; n < kBlockEdge; ++n) {
@@ -66,7 +57,7 @@ void addTurnedRows(int row_axis, const float* numbers, float* sums) {
     float* const to = sums + n * kOffset[other];
     for (int x = 0; x < kBlockEdge; x += 4) {
       for (int k = 0; k < kBlockEdge; k += 4) {
-        addTurned(from + x * from_row + k, from_row, to + x + k * to_row, to_row);
+        addTransposed(from + x * from_row + k, from_row, to + x + k * to_row, to_row);
       }
     }
   }
@@ -106,7 +97,8 @@ void GroupSums::sumsOf(const std::array<int, 3>& place, float* sums) const {
   };
   if (arrays_[0].is_open) addRows(numbers(0), sums);
   for (const int row_axis : {1, 2}) {
-    if (arrays_[static_cast<std::size_t>(row_axis)].is_open) addTurnedRows(row_axis, numbers(row_axis), sums);
+    if (arrays_[static_cast<std::size_t>(row_axis)].is_open)
+      addTransposedRows(row_axis, numbers(row_axis), sums);
   }
 }
 

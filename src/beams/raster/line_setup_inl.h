@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstddef>
 
-#include "beams/raster/beam_tracks.h"
-#include "kernel/lane_kernel.h"
+#include "beams/raster/line_setup.h"
+#include "kernel/vec_kernel_inl.h"
 
 namespace bki_mapping {
 namespace {
 
 /// Some beams side by side.
-struct TrackBatch {
+struct LineBatch {
   static constexpr std::size_t kMost = 64;
 
   std::int32_t axis[kMost];                             ///< main axes
@@ -22,14 +22,14 @@ struct TrackBatch {
   float rho[kMost];                                     ///< change of rho by that step
   std::int32_t slicing[kMost];                          ///< as BeamSlicing numbers them
   double by_slice_side[kMost], by_slice_height[kMost];  ///< slopes by step from slice to slice
-  // As in BeamTrack:
+  // As in LineSetup:
   std::int32_t step_side[kMost], step_height[kMost];
   float rho_slice[kMost], e_side[kMost], e_height[kMost], g_height[kMost], rho_side[kMost], rho_height[kMost],
       half_side[kMost], half_height[kMost];
 };
 
 /// A beam without length has no direction, and reaches nothing: its rho is 0 everywhere.
-void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolution, TrackBatch& batch) {
+void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolution, LineBatch& batch) {
   constexpr float kShortest = 1e-9f;  // [m]
   for (std::size_t n = 0; n < count; ++n) {
     const float x = beams[n].x(), y = beams[n].y(), z = beams[n].z();
@@ -57,9 +57,9 @@ void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolut
 /// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Within d =
 /// 1 are places up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size of a
 /// box, and therefore in double precision.
-void findTracks(std::size_t count, float reach, TrackBatch& batch) {
+void findLines(std::size_t count, float reach, LineBatch& batch) {
   const float counts = reach * static_cast<float>(kReachThatCounts), counts2 = counts * counts;
-  const float by_reach = LaneKernel::unit() / reach;
+  const float by_reach = VecKernel::unit() / reach;
   for (std::size_t n = 0; n < count; ++n) {
     const auto s = static_cast<float>(batch.slope_side[n]), t = static_cast<float>(batch.slope_height[n]);
     const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
@@ -77,7 +77,7 @@ void findTracks(std::size_t count, float reach, TrackBatch& batch) {
     batch.by_slice_height[n] = slope_height;
     batch.rho_slice[n] = batch.rho[n] * static_cast<float>(by_slice);
     const auto steps = [](double slope) {
-      return static_cast<std::int32_t>(slope * kTrackVoxel + (slope < 0.0 ? -0.5 : 0.5));  // rounded
+      return static_cast<std::int32_t>(slope * kOneVoxel + (slope < 0.0 ? -0.5 : 0.5));  // rounded
     };
     batch.step_side[n] = steps(slope_side);
     batch.step_height[n] = steps(slope_height);
@@ -98,35 +98,36 @@ void findTracks(std::size_t count, float reach, TrackBatch& batch) {
 }
 
 /// Writes up to kLanes tracks, the batch's from `first` on.
-inline void writeTracks(const TrackBatch& batch, std::size_t first, std::size_t count, BeamTrack* to) {
-  const auto ints = [&](const float* from) { return reinterpret_cast<IntLanes>(load(from + first)); };
-  const auto whole = [&](const std::int32_t* from) { return load(from + first); };
+inline void writeLines(const LineBatch& batch, std::size_t first, std::size_t count, LineSetup* to) {
+  const auto ints = [&](const float* from) { return BitCast<IntVec>(LoadU(from + first)); };
+  const auto whole = [&](const std::int32_t* from) { return LoadU(from + first); };
   alignas(64) std::int32_t fours[3][4 * kLanes];
-  storeFours(fours[0],
-             {whole(batch.step_side), whole(batch.step_height), ints(batch.e_side), ints(batch.e_height)});
-  storeFours(fours[1],
-             {ints(batch.g_height), ints(batch.rho_side), ints(batch.rho_height), ints(batch.rho_slice)});
-  storeFours(fours[2], {ints(batch.half_side), ints(batch.half_height), whole(batch.slicing), IntLanes{}});
-  static_assert(offsetof(BeamTrack, step_side) == 16 && offsetof(BeamTrack, g_height) == 32 &&
-                offsetof(BeamTrack, half_side) == 48 && offsetof(BeamTrack, slicing) == 56);
+  StoreInterleaved4(
+      {whole(batch.step_side), whole(batch.step_height), ints(batch.e_side), ints(batch.e_height)}, fours[0]);
+  StoreInterleaved4(
+      {ints(batch.g_height), ints(batch.rho_side), ints(batch.rho_height), ints(batch.rho_slice)}, fours[1]);
+  StoreInterleaved4({ints(batch.half_side), ints(batch.half_height), whole(batch.slicing), IntVec{}},
+                    fours[2]);
+  static_assert(offsetof(LineSetup, step_side) == 16 && offsetof(LineSetup, g_height) == 32 &&
+                offsetof(LineSetup, half_side) == 48 && offsetof(LineSetup, slicing) == 56);
   for (std::size_t n = 0; n < count; ++n) {
     to[n].slope_side = batch.by_slice_side[first + n];
     to[n].slope_height = batch.by_slice_height[first + n];
     for (std::size_t k = 0; k < 3; ++k) {
       __builtin_memcpy(reinterpret_cast<unsigned char*>(to + n) + 16 * (k + 1),
-                       fours[k] + fourOf(static_cast<int>(n)), 16);
+                       fours[k] + Interleaved4(static_cast<int>(n)), 16);
     }
   }
 }
 
-void makeTracksLoop(const Eigen::Vector3f* beams, std::size_t count, double resolution, float reach,
-                    const BeamTrackTargets& to) {
+void setUpLines(const Eigen::Vector3f* beams, std::size_t count, double resolution, float reach,
+                const LineSetupTargets& to) {
   const auto per_metre = static_cast<float>(1.0 / resolution);
-  TrackBatch batch = {};
-  for (std::size_t begin = 0; begin < count; begin += TrackBatch::kMost) {
-    const std::size_t some = std::min(count - begin, TrackBatch::kMost);
+  LineBatch batch = {};
+  for (std::size_t begin = 0; begin < count; begin += LineBatch::kMost) {
+    const std::size_t some = std::min(count - begin, LineBatch::kMost);
     takeCourses(beams + begin, some, resolution, batch);
-    findTracks(some, reach, batch);
+    findLines(some, reach, batch);
     for (std::size_t n = 0; n < some; ++n) {
       to.axis[begin + n] = batch.axis[n];
       to.slope_side[begin + n] = static_cast<float>(batch.slope_side[n]);
@@ -135,7 +136,7 @@ void makeTracksLoop(const Eigen::Vector3f* beams, std::size_t count, double reso
       to.skew[begin + n] = static_cast<float>(BeamSlicing::of(batch.slicing[n]).skew);
     }
     for (std::size_t n = 0; n < some; n += kLanes) {
-      writeTracks(batch, n, std::min<std::size_t>(some - n, kLanes), to.tracks + begin + n);
+      writeLines(batch, n, std::min<std::size_t>(some - n, kLanes), to.lines + begin + n);
     }
   }
 }

@@ -3,60 +3,58 @@
 #pragma once
 
 #include "beams/raster/group_sums.h"
-#include "beams/raster/lane_weight.h"
-#include "beams/raster/traced_beam.h"
-#include "kernel/lane_kernel.h"
-#include "simd/lanes.h"
+#include "beams/raster/slices_inl.h"
+#include "kernel/vec_kernel_inl.h"
 
 namespace bki_mapping {
 namespace {
 
 /// The fraction of a place in voxels, and 1: in [1, 2), without rounding.
-[[gnu::always_inline]] inline FloatLanes fractionAndOne(IntLanes place) {
-  static_assert(kTrackBits == 23, "the bits of a float's fraction");
-  return reinterpret_cast<FloatLanes>((place & (kTrackVoxel - 1)) | 0x3f800000);
+[[gnu::always_inline]] inline FloatVec fractionAndOne(IntVec place) {
+  static_assert(kPositionBits == 23, "the bits of a float's fraction");
+  return BitCast<FloatVec>((place & (kOneVoxel - 1)) | 0x3f800000);
 }
 
 /// Slices of beams, gathered until there are many: first where they are is found, a beam at a time, then they
 /// are added, one slice like the other. Lanes are slices. @tparam kVoxels of a slice, 2 or 4.
 template <BeamWeight kWeight, int kVoxels>
-class ThinSlices {
+class NarrowKernelRaster {
  public:
-  explicit ThinSlices(const LaneKernel& kernel) : kernel_(kernel) {}
+  explicit NarrowKernelRaster(const VecKernel& kernel) : kernel_(kernel) {}
 
   /// Takes slices of a beam, up to kRoom. @param sums at the group's first voxel. @param middle slice, in
   /// which the beam's place is.
-  [[gnu::always_inline]] void add(const TracedBeam& beam, int first, int slices, int middle, float* sums,
+  [[gnu::always_inline]] void add(const LineInBox& beam, int first, int slices, int middle, float* sums,
                                   SliceStrides strides) {
     if (sums != sums_ || count_ + slices > kRoom) flush();
     sums_ = sums;
     const int begin = count_, end = begin + slices;
-    const BeamTrack& track = beam.track;
-    const IntLanes number = countUp() + (first - middle);
+    const LineSetup& line = beam.line;
+    const IntVec number = Iota() + (first - middle);
     // The nearest column, and of it the lowest voxel.
     constexpr int kBelow = kVoxels / 2 - 1;  // under the one below the beam
-    IntLanes side = number * track.step_side + (beam.side + kTrackVoxel / 2),
-             height = number * track.step_height + (beam.height - kBelow * kTrackVoxel),
-             slice = (number + middle) * strides.slice;
-    FloatLanes step = toFloat(number);
+    IntVec side = number * line.step_side + (beam.side + kOneVoxel / 2),
+           height = number * line.step_height + (beam.height - kBelow * kOneVoxel),
+           slice = (number + middle) * strides.slice;
+    FloatVec step = ConvertTo<FloatVec>(number);
     int n = begin;
     do {  // there is a slice
       // A column's voxels stand one behind the other.
-      store(voxel_ + n, (side >> kTrackBits) * strides.side + (height >> kTrackBits) + slice);
+      StoreU((side >> kPositionBits) * strides.side + (height >> kPositionBits) + slice, voxel_ + n);
       // That voxel's place, from the beam's on.
-      const FloatLanes s = 1.5f - fractionAndOne(side),
-                       h = static_cast<float>(1 - kBelow) - fractionAndOne(height);
-      FloatLanes e = s * track.e_side + h * track.e_height, g = h * track.g_height,
-                 w = step * track.rho_slice + beam.rho + s * track.rho_side + h * track.rho_height;
+      const FloatVec s = 1.5f - fractionAndOne(side),
+                     h = static_cast<float>(1 - kBelow) - fractionAndOne(height);
+      FloatVec e = s * line.e_side + h * line.e_height, g = h * line.g_height,
+               w = step * line.rho_slice + beam.rho + s * line.rho_side + h * line.rho_height;
       for (int voxel = 0; voxel < kVoxels; ++voxel) {
-        store(squared_[voxel] + n, e * e + LaneKernel::kShift + g * g);
-        store(rho_[voxel] + n, w);
-        e += track.e_height;
-        g += track.g_height;
-        w += track.rho_height;
+        StoreU(VecKernel::squared(e, g), squared_[voxel] + n);
+        StoreU(w, rho_[voxel] + n);
+        e += line.e_height;
+        g += line.g_height;
+        w += line.rho_height;
       }
-      side += kLanes * track.step_side;
-      height += kLanes * track.step_height;
+      side += kLanes * line.step_side;
+      height += kLanes * line.step_height;
       slice += kLanes * strides.slice;
       step += static_cast<float>(kLanes);
       n += kLanes;
@@ -74,7 +72,7 @@ class ThinSlices {
       for (int voxel = 0; voxel < kVoxels; ++voxel) squared_[voxel][end] = rho_[voxel][end] = 0.0f;
     }
     // Of the lanes before and those at hand by turns: what is added then has not to wait for its values.
-    const LaneKernel kernel = kernel_;  // in registers
+    const VecKernel kernel = kernel_;  // in registers
     alignas(64) float even[kVoxels * kLanes], odd[kVoxels * kLanes];
     compute(kernel, 0, even);
     int n = 0;
@@ -96,32 +94,29 @@ class ThinSlices {
   static constexpr int kRoom = 512;
   static constexpr int kNowhere = -GroupSums::kPad;  ///< beside the group
 
-  [[gnu::always_inline]] void compute(const LaneKernel& kernel, int n, float* by_slice) const {
-    FloatLanes values[kVoxels];
+  [[gnu::always_inline]] void compute(const VecKernel& kernel, int n, float* by_slice) const {
+    FloatVec values[kVoxels];
     for (int voxel = 0; voxel < kVoxels; ++voxel) {
-      values[voxel] = Weight<kWeight>::at(load(rho_[voxel] + n)) * kernel(load(squared_[voxel] + n));
+      values[voxel] = VecWeight<kWeight>::at(LoadU(rho_[voxel] + n)) * kernel(LoadU(squared_[voxel] + n));
     }
     if constexpr (kVoxels == 2) {
-      storePairs(by_slice, values[0], values[1]);
+      StoreInterleaved2(values[0], values[1], by_slice);
     } else {
-      storeFours(by_slice, values);
+      StoreInterleaved4(values, by_slice);
     }
   }
   [[gnu::always_inline]] void addLanes(int n, const float* by_slice) const {
-    Part<4>::Lanes four;
     for (int lane = 0; lane < kLanes; lane += 4 / kVoxels) {
       float* const first = sums_ + voxel_[n + lane];
       if constexpr (kVoxels == 2) {
-        __builtin_memcpy(&four, by_slice + pairOf(lane), sizeof(four));
-        addPairs(first, sums_ + voxel_[n + lane + 1], four);
+        AddPairs(LoadFour(by_slice + Interleaved2(lane)), first, sums_ + voxel_[n + lane + 1]);
       } else {
-        __builtin_memcpy(&four, by_slice + fourOf(lane), sizeof(four));
-        addTo(first, four);
+        AddU(LoadFour(by_slice + Interleaved4(lane)), first);
       }
     }
   }
 
-  const LaneKernel kernel_;
+  const VecKernel kernel_;
   float* sums_ = nullptr;
   int count_ = 0;
   // Where the slices' voxels are, their squared distance as the kernel takes it, and rho.

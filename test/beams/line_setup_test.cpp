@@ -1,11 +1,12 @@
-// What tracks say of distances from a beam and of places along it is what geometry says.
+// Distances from a beam and positions along it, as its line setup has them, are those of geometry.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "beams/raster/beam_tracks.h"
-#include "simd/inner_loops.h"
+#include "beams/raster/line_kernels.h"
+#include "beams/raster/line_setup.h"
+#include "simd/instruction_sets.h"
 
 namespace bki_mapping {
 namespace {
@@ -28,7 +29,7 @@ std::vector<Eigen::Vector3f> directions() {
   return all;
 }
 
-/// The slices of a track: a place in the slice through the sensor, one step to the next slice's.
+/// The axes of a slice through the sensor, and the step to the next slice.
 struct Basis {
   Eigen::Vector3d side, height, across;  ///< across: 1 from slice to slice
 
@@ -41,45 +42,45 @@ struct Basis {
   }
 };
 
-void expectTracksAgreeWithGeometry(const InnerLoops& loops) {
+void expectSetupsAgreeWithGeometry(const LineKernels& kernels) {
   ThreadPool pool(2);
-  const double unit = static_cast<double>(loops.kernel_unit);
+  const double unit = std::sqrt(static_cast<double>(kernels.kernel_scale));
   std::mt19937 random(6);
   std::uniform_real_distribution<double> uniform(-3.0, 3.0);
   const std::vector<Eigen::Vector3f> ends = directions();
   for (const double reach : {0.4, 1.0, 1.5, 4.0}) {  // [voxels]
-    BeamTracks tracks;
-    tracks.set({{}, ends}, kResolution, reach * kResolution, loops, pool);
+    LineSetups setups;
+    setups.set({{}, ends}, kResolution, reach * kResolution, kernels, pool);
     int skews = 0, straights = 0;
     for (std::size_t b = 0; b < ends.size(); ++b) {
-      const BeamTrack track = tracks.arrays().tracks[b];
-      const BeamSlicing slicing = BeamSlicing::of(track.slicing);
-      ASSERT_EQ(slicing.number(), track.slicing);
-      EXPECT_EQ(static_cast<float>(slicing.skew), tracks.arrays().skew[b]);
+      const LineSetup line = setups.arrays().lines[b];
+      const BeamSlicing slicing = BeamSlicing::of(line.slicing);
+      ASSERT_EQ(slicing.number(), line.slicing);
+      EXPECT_EQ(static_cast<float>(slicing.skew), setups.arrays().skew[b]);
       (slicing.skew == 0 ? straights : skews) += 1;
       const Basis basis(slicing);
       const Eigen::Vector3d end = ends[b].cast<double>() / kResolution, u = end.normalized();
-      // On the beam in slice 1, as the track has it.
+      // On the beam in slice 1, as the setup has it.
       Eigen::Vector3d at = u / u.dot(basis.across);
-      EXPECT_NEAR(track.rho_slice, at.dot(u) / end.norm(), 1e-6);
-      Eigen::Vector3d place = track.slope_height * basis.height;
+      EXPECT_NEAR(line.rho_slice, at.dot(u) / end.norm(), 1e-6);
+      Eigen::Vector3d position = line.slope_height * basis.height;
       if (slicing.skew == 0) {
-        place += basis.across + track.slope_side * basis.side;
+        position += basis.across + line.slope_side * basis.side;
       } else {
-        place +=
-            slicing.skew * Eigen::Vector3d::Unit(kSideAxis[slicing.axis]) + track.slope_side * basis.side;
+        position +=
+            slicing.skew * Eigen::Vector3d::Unit(kSideAxis[slicing.axis]) + line.slope_side * basis.side;
       }
-      EXPECT_LT((place - at).norm(), 1e-6);
+      EXPECT_LT((position - at).norm(), 1e-6);
       for (int n = 0; n < 10; ++n) {
         const double side = uniform(random), height = uniform(random);
         const Eigen::Vector3d p = side * basis.side + height * basis.height;
         const double distance = (p - p.dot(u) * u).norm() / reach * unit;
-        const double e = side * track.e_side + height * track.e_height, g = height * track.g_height;
+        const double e = side * line.e_side + height * line.e_height, g = height * line.g_height;
         EXPECT_NEAR(std::hypot(e, g), distance, unit * 5e-6 * (1.0 + 1.0 / reach)) << ends[b].transpose();
-        EXPECT_NEAR(side * track.rho_side + height * track.rho_height, p.dot(u) / end.norm(), 1e-6);
+        EXPECT_NEAR(side * line.rho_side + height * line.rho_height, p.dot(u) / end.norm(), 1e-6);
         if (distance < unit * kReachThatCounts) {
-          EXPECT_LE(std::abs(side), track.half_side + 1e-5f);
-          EXPECT_LE(std::abs(height), track.half_height + 1e-5f);
+          EXPECT_LE(std::abs(side), line.half_side + 1e-5f);
+          EXPECT_LE(std::abs(height), line.half_height + 1e-5f);
         }
       }
     }
@@ -88,19 +89,19 @@ void expectTracksAgreeWithGeometry(const InnerLoops& loops) {
   }
 }
 
-TEST(BeamTracks, AgreeWithGeometryOnEachInstructionSet) {
+TEST(LineSetups, AgreeWithGeometryOnEachInstructionSet) {
   for (const std::string& set : instructionSets()) {
     SCOPED_TRACE(set);
-    expectTracksAgreeWithGeometry(innerLoopsFor(set));
+    expectSetupsAgreeWithGeometry(lineKernelsFor(set));
   }
 }
 
-TEST(BeamTracks, KernelsOfMoreThan72VoxelsAreTooLong) {
+TEST(LineSetups, KernelsOfMoreThan72VoxelsAreTooLong) {
   ThreadPool pool(1);
-  BeamTracks tracks;
-  const InnerLoops& loops = innerLoopsFor("");
-  tracks.set({{}, directions()}, 0.1, 7.2, loops, pool);
-  EXPECT_THROW(tracks.set({{}, directions()}, 0.1, 7.21, loops, pool), std::invalid_argument);
+  LineSetups setups;
+  const LineKernels& kernels = lineKernelsFor("");
+  setups.set({{}, directions()}, 0.1, 7.2, kernels, pool);
+  EXPECT_THROW(setups.set({{}, directions()}, 0.1, 7.21, kernels, pool), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,29 +1,29 @@
-#include "beams/raster/beam_tracks.h"
+#include "beams/raster/line_setup.h"
 
 #include <stdexcept>
 
 #include "beams/beam_cells.h"
+#include "beams/raster/line_kernels.h"
 #include "parallel/chunks.h"
-#include "simd/inner_loops.h"
 
 namespace bki_mapping {
 
-void BeamTracks::set(const Beams& beams, double resolution, double length, const InnerLoops& loops,
+void LineSetups::set(const Beams& beams, double resolution, double length, const LineKernels& kernels,
                      ThreadPool& pool) {
   const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
   axis_.resize(padded, 0);
   for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
-  tracks_.resize(count);
-  if (length > kMostTrackReach * resolution) {
+  lines_.resize(count);
+  if (length > kMostLineReach * resolution) {
     throw std::invalid_argument("a kernel of more than 72 voxels is too long for lines");
   }
   const auto reach = static_cast<float>(length / resolution);
   const Chunks chunks(count);
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     const std::size_t begin = chunks.begin(c);
-    loops.make_tracks(beams.ends.data() + begin, chunks.end(c) - begin, resolution, reach,
-                      {axis_.data() + begin, slope_side_.data() + begin, slope_height_.data() + begin,
-                       end_.data() + begin, skew_.data() + begin, tracks_.data() + begin});
+    kernels.set_up_lines(beams.ends.data() + begin, chunks.end(c) - begin, resolution, reach,
+                         {axis_.data() + begin, slope_side_.data() + begin, slope_height_.data() + begin,
+                          end_.data() + begin, skew_.data() + begin, lines_.data() + begin});
   });
 }
 

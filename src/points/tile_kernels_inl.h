@@ -2,6 +2,8 @@
 /// instruction set's file includes it and gets a copy of its own.
 #pragma once
 
+#include <cmath>
+
 #include "points/tile_grid.h"
 
 namespace bki_mapping {
@@ -28,11 +30,10 @@ void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t 
     constexpr float kFar = 0x1.0p22f, kRounding = 4.0f * 0x1.0p-24f;
     quotient = quotient < kFar ? quotient : kFar;
     quotient = quotient > -kFar ? quotient : -kFar;
-    const float size = quotient > 0.0f ? quotient : -quotient;
+    const float size = std::abs(quotient);
     const float margin = kRounding * (size + 2.0f * TileGrid::kMostEdge);
     const std::int32_t floor = floorOf(quotient);
-    const float middle = quotient - (static_cast<float>(floor) + 0.5f);
-    const float aside = middle > 0.0f ? middle : -middle;
+    const float aside = std::abs(quotient - (static_cast<float>(floor) + 0.5f));
     // Half a cell keeps the quotient by the edge away from whole numbers.
     const std::int32_t tile = floorOf((static_cast<float>(floor) + 0.5f) * per_edge);
     places.tile[kAxis][i] = home + tile;
@@ -58,13 +59,13 @@ void placeExactlyWhere(const std::int32_t* unsure, const TileGrid& grid, const P
   }
 }
 
-void placeCellsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+void placeCells(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
   alignas(64) std::int32_t unsure[kBatch];
   placeCellsOnAxes(grid, points, count, places, unsure);
   placeExactlyWhere(unsure, grid, points, count, places);
 }
 
-void placePointsLoop(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
+void placePoints(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places) {
   alignas(64) std::int32_t unsure[kBatch];
   placeCellsOnAxes(grid, points, count, places, unsure);
   for (int axis = 0; axis < 3; ++axis) {
@@ -92,7 +93,7 @@ struct AxisDistances {
   }
 };
 
-void reachBlocksLoop(std::size_t count, float reach, TilePlaces& places) {
+void reachBlocks(std::size_t count, float reach, TilePlaces& places) {
   const float reach2 = reach * reach;
   for (std::size_t i = 0; i < count; ++i) {
     const AxisDistances x(places.inside[0][i]), y(places.inside[1][i]), z(places.inside[2][i]);

@@ -1,0 +1,34 @@
+/// @file The loops over the lines of beams, compiled for each instruction set.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "beams/beam_cells.h"
+#include "beams/raster/group_sums.h"
+#include "beams/raster/line_setup.h"
+#include "bki_mapping/beams/beam_config.h"
+
+namespace bki_mapping {
+
+/// The loops for one instruction set. line_kernels_inl.h says how they work.
+struct LineKernels {
+  const char* instruction_set;
+  /// Computes the lines of beams. @param beams from the sensor to their ends [m]. @param resolution [m].
+  /// @param reach length of the kernel [voxels], at most kMostLineReach.
+  void (*set_up_lines)(const Eigen::Vector3f* beams, std::size_t count, double resolution, float reach,
+                       const LineSetupTargets& to);
+  /// Sets the sums of the blocks of a box that matter to those of w(rho) k(d) over the beams of some ranges,
+  /// the kernel being sparse and of unit scale: d the distance to the beam's line, w the weight along it, 0
+  /// unless 0 < rho < 1.
+  /// @param beams set up by the same instruction set. @param sums with memory for all of them.
+  void (*trace_beams)(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
+                      const BeamBox& box, BeamWeight weight, GroupSums& sums);
+  float kernel_scale;  ///< lines measure distances in lengths of the kernel / sqrt(kernel_scale)
+};
+
+/// @param instruction_set one of instructionSets(); the fastest if empty.
+/// @throws std::invalid_argument for any other.
+const LineKernels& lineKernelsFor(const std::string& instruction_set);
+
+}  // namespace bki_mapping

@@ -1,0 +1,17 @@
+#include "beams/raster/line_kernels.h"
+#include "kernel/kernel_table.h"
+#include "kernel/sparse_kernel.h"
+#include "simd/vec_avx2.h"
+
+#include "beams/raster/line_kernels_inl.h"
+
+#include "simd/end_region.h"
+
+namespace bki_mapping {
+
+const LineKernels& lineKernelsAvx2() {
+  static const LineKernels kernels = {"avx2", setUpLines, traceBeams, VecKernel::kScale};
+  return kernels;
+}
+
+}  // namespace bki_mapping

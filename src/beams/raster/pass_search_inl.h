@@ -1,0 +1,177 @@
+/// @file Which beams pass through a box; included by the inner loops alone.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "beams/beam_cells.h"
+#include "beams/raster/group_sums.h"
+
+namespace bki_mapping {
+namespace {
+
+/// The blocks of a box as sets of bits: those of a layer across a main axis, side first.
+struct BoxBlocks {
+  static constexpr int kAll = 0xffff, kEachHeight = 0x1111, kEachSide = 0xf;
+
+  Table8<std::int32_t> layer[kGroupEdge];  ///< by main axis: those that matter
+  /// Those with number n - 1 and more, and those with up to n - 1, n being 0 to 5.
+  Table8<std::int32_t> side_from, side_to, height_from, height_to;
+
+  explicit BoxBlocks(std::uint64_t blocks) {
+    static_assert(kGroupEdge == 4);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int k = 0; k < kGroupEdge; ++k) {
+        layer[k].values[axis] = static_cast<std::int32_t>(layerOf(blocks, axis, k));
+      }
+    }
+    for (int n = 0; n <= 5; ++n) {
+      const int below = std::max(n - 1, 0), above = std::max(4 - n, 0);  // how many are left out
+      side_from.values[n] = kEachHeight * (kEachSide & (kEachSide << below));
+      height_from.values[n] = kAll & (kAll << 4 * below);
+      side_to.values[n] = kEachHeight * (kEachSide >> above);
+      height_to.values[n] = kAll >> 4 * above;
+    }
+  }
+};
+
+/// Beams side by side, and the slices in which they may reach the box. Lengths are in voxels, from the box's
+/// centre.
+class BoxSearch {
+ public:
+  explicit BoxSearch(const BeamBox& box) : blocks_(box.blocks), reach_(static_cast<float>(box.reach)) {
+    const Eigen::Vector3f centre = box.centre().cast<float>();
+    for (int axis = 0; axis < 3; ++axis) {
+      main_.values[axis] = centre[axis];
+      side_.values[axis] = centre[kSideAxis[axis]];
+      height_.values[axis] = centre[kHeightAxis[axis]];
+    }
+    slack_ = 0.01f + 1e-6f * centre.cwiseAbs().maxCoeff();  // for rounding
+  }
+
+  /// Finds the passes of up to kLanes beams. @param[out] to the passes; as many are written to.
+  /// @return behind the last pass found.
+  BeamPass* find(const LineSetupArrays& beams, BeamRange range, BeamPass* to) const {
+    const std::uint32_t b = range.first;
+    const IntVec axis = LoadU(beams.axis + b);
+    const FloatVec end = LoadU(beams.end + b), centre = TableLookup(main_, axis);
+    FloatVec low = Max(Min(FloatVec{}, end) - reach_ - centre, Set(-kHalf)),
+             high = Min(Max(FloatVec{}, end) + reach_ - centre, Set(kHalf));
+    const Across side = across(LoadU(beams.slope_side + b), TableLookup(side_, axis), centre),
+                 height = across(LoadU(beams.slope_height + b), TableLookup(height_, axis), centre);
+    for (const Across* each : {&side, &height}) {
+      low = Max(low, (-kHalf - each->reach - each->turned) * each->inverse_slope);
+      high = Min(high, (kHalf + each->reach - each->turned) * each->inverse_slope);
+    }
+    low += kHalf + 1.0f - slack_;  // up to the next whole number
+    high += kHalf + slack_;
+    IntVec alive = (low < high + 1.0f) & (Iota() < static_cast<std::int32_t>(range.last - b));
+    IntVec first = ConvertTo<IntVec>(IfThenElse(alive, low, FloatVec{})),
+           last = ConvertTo<IntVec>(IfThenElse(alive, high, FloatVec{}));
+    alive &= first <= last;
+    if (!AnyTrue(alive)) return to;
+    IntVec found = {}, from = {}, until = {};
+    for (int k = 0; k < kGroupEdge; ++k) {
+      const IntVec here = (first < kBlockEdge * (k + 1)) & (last >= kBlockEdge * k) & alive &
+                          ((blocksOf(side, k, blocks_.side_from, blocks_.side_to) &
+                            blocksOf(height, k, blocks_.height_from, blocks_.height_to) &
+                            TableLookup(blocks_.layer[k], axis)) != 0);
+      from = IfThenElse(here & ~found, Set(kBlockEdge * k), from);
+      until = IfThenElse(here, Set(kBlockEdge * (k + 1) - 1), until);
+      found |= here;
+    }
+    if (!AnyTrue(found)) return to;
+    first = Max(first, from);
+    last = Min(last, until);
+    const FloatVec skew = LoadU(beams.skew + b);
+    turnSkew(skew, side, first, last);
+    return emit({Iota() + static_cast<std::int32_t>(b), first, last, slicing(axis, skew)}, found, to);
+  }
+
+ private:
+  static constexpr auto kHalf = static_cast<float>(BeamBox::kHalf);
+
+  /// As BeamSlicing numbers them.
+  static IntVec slicing(IntVec axis, FloatVec skew) {
+    static_assert(BeamSlicing{0, 1}.number() == 3 && BeamSlicing{0, -1}.number() == 6);
+    return axis + IfThenElse(skew == 0.0f, IntVec{}, IfThenElse(skew > 0.0f, Set(3), Set(6)));
+  }
+  /// Writes the passes found. @param numbers of a pass, in their order.
+  static BeamPass* emit(const IntVec (&numbers)[4], IntVec found, BeamPass* to) {
+    static_assert(sizeof(BeamPass) == 4 * sizeof(std::int32_t));
+    alignas(64) std::int32_t passes[4 * kLanes];
+    StoreInterleaved4(numbers, passes);
+    const IntVec step = found & static_cast<std::int32_t>(sizeof(BeamPass));
+    auto* bytes = reinterpret_cast<unsigned char*>(to);
+    for (int n = 0; n < kLanes; ++n) {
+      __builtin_memcpy(bytes, passes + Interleaved4(n), sizeof(BeamPass));
+      bytes += step[n];
+    }
+    return reinterpret_cast<BeamPass*>(bytes);
+  }
+
+  /// How beams run along the side axis, or the height axis.
+  struct Across {
+    FloatVec slope;
+    FloatVec at;             ///< place in the slice through the box's centre
+    FloatVec reach;          ///< of the kernel, at least
+    FloatVec inverse_slope;  ///< without its sign
+    FloatVec turned;         ///< `at`, with the axis turned so that the slope is positive
+  };
+  Across across(FloatVec slope, FloatVec centre, FloatVec main) const {
+    const FloatVec at = main * slope - centre, size = Max(Abs(slope), Set(1e-9f));
+    return {slope, at, reach_ * (1.0f + 0.5f * slope * slope) + slack_, 1.0f / size,
+            IfThenElse(slope < 0.0f, -at, at)};
+  }
+  /// Turns straight slices into skew ones that hold the same voxels which beams reach, where they are skew.
+  void turnSkew(FloatVec skew, const Across& side, IntVec& first, IntVec& last) const {
+    // A column is up to half a voxel along the main axis from the beam's place in its skew slice.
+    constexpr float kBehind = 64.0f;  // so that there are none below 0
+    const FloatVec by_voxel = 2.0f + Abs(side.slope);
+    const FloatVec slice = skew * (side.at + kHalf) + (2.0f * kHalf + kBehind);  // at the box's centre
+    const FloatVec low = (ConvertTo<FloatVec>(first) - (kHalf + 0.5f)) * by_voxel + slice,
+                   high = (ConvertTo<FloatVec>(last) - (kHalf - 0.5f)) * by_voxel + slice;
+    const Mask straight = skew == 0.0f;
+    first = IfThenElse(straight, first,
+                       ConvertTo<IntVec>(low + 1.0f - slack_) - static_cast<std::int32_t>(kBehind));
+    last = IfThenElse(straight, last, ConvertTo<IntVec>(high + slack_) - static_cast<std::int32_t>(kBehind));
+  }
+  [[gnu::always_inline]] static IntVec blockAt(FloatVec x) {
+    return ConvertTo<IntVec>(Min(Max(x, FloatVec{}), Set(static_cast<float>(kGroupEdge + 1))));
+  }
+  /// The blocks that beams reach in layer k.
+  static IntVec blocksOf(const Across& across, int k, const Table8<std::int32_t>& from,
+                         const Table8<std::int32_t>& to) {
+    constexpr float kToBlocks = 1.0f / kBlockEdge, kHalfLayer = 0.5f * (kBlockEdge - 1);
+    const float middle = static_cast<float>(kBlockEdge * k) + kHalfLayer - kHalf;
+    const FloatVec at = (across.at + middle * across.slope + (kHalf + kBlockEdge)) * kToBlocks;
+    const FloatVec room = (across.reach + kHalfLayer * Abs(across.slope)) * kToBlocks;
+    return TableLookup(from, blockAt(at - room)) & TableLookup(to, blockAt(at + room));
+  }
+
+  BoxBlocks blocks_;
+  Table8<float> main_, side_, height_;  ///< the box's centre by main axis
+  float reach_, slack_;
+};
+
+/// So many passes ahead, tracks are sent for.
+constexpr std::size_t kAhead = 8;
+
+/// Finds the passes of beams through a box, in the order of the beams. Of kAhead behind the last, there are
+/// any numbers. `sums` has room for all beams (GroupSums::reserve): a vector that grew here would leave its
+/// code, compiled for this instruction set, to the linker's choice.
+inline void findPasses(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
+                       const BeamBox& box, GroupSums& sums) {
+  const BoxSearch search(box);
+  static_assert(kLanes <= GroupSums::kPassPadding && kAhead <= GroupSums::kPassPadding);
+  BeamPass* to = sums.passes.data();
+  for (std::size_t r = 0; r < count; ++r) {
+    for (BeamRange left = ranges[r]; left.first < left.last; left.first += kLanes) {
+      to = search.find(beams, left, to);
+    }
+  }
+  sums.pass_count = static_cast<std::size_t>(to - sums.passes.data());
+}
+
+}  // namespace
+}  // namespace bki_mapping

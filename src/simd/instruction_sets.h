@@ -1,0 +1,37 @@
+/// @file The instruction sets for which the loops over points and lines are compiled.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace bki_mapping {
+
+enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
+
+/// The names of the instruction sets that this build and this processor have, from the slowest, "generic", to
+/// the fastest.
+std::vector<std::string> instructionSets();
+
+/// One of instructionSets() by its name; the fastest if the name is empty.
+/// @throws std::invalid_argument for any other name.
+InstructionSet instructionSetFor(const std::string& name);
+
+/// A table of kernels for each instruction set.
+template <typename Kernels>
+struct KernelsBySet {
+  const Kernels &generic, &avx2, &avx512;
+
+  /// @param name as for instructionSetFor.
+  const Kernels& choose(const std::string& name) const {
+    switch (instructionSetFor(name)) {
+      case InstructionSet::kAvx512:
+        return avx512;
+      case InstructionSet::kAvx2:
+        return avx2;
+      default:
+        return generic;
+    }
+  }
+};
+
+}  // namespace bki_mapping
