@@ -10,8 +10,8 @@
 namespace bki_mapping {
 namespace {
 
-/// By kernelTable(): a look-up in registers for each coefficient, and no root, whose latency is that of four
-/// multiplications and more. It takes t = kScale (d / l)^2 + kShift.
+/// By kernelTable(): a look-up in registers for each of four coefficients, three multiplications, and no
+/// square root. It takes t = kScale (d / l)^2 + kShift.
 template <typename Table>
 class TableKernel {
  public:

@@ -1,5 +1,5 @@
-/// @file Where points lie in a grid of cells: a loop of which compilers make vector instructions. Each
-/// instruction set's file includes it and gets a copy of its own.
+/// @file Which cells of a grid hold points. Plain loops over arrays, which compilers turn into vector
+/// instructions; included once for each instruction set, by point_kernels_*.cpp.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Of numbers that an int holds.
+/// x must be in the range of an int.
 [[gnu::always_inline]] inline std::int32_t floorOf(float x) {
   const auto whole = static_cast<std::int32_t>(x);
   return whole - static_cast<std::int32_t>(static_cast<float>(whole) > x);
@@ -79,9 +79,9 @@ void placePoints(const TileGrid& grid, const PointSpan& points, std::size_t coun
 }
 
 /// The squared distance from a point to the nearest voxel centre of the block before its own, of its own, and
-/// of the one behind it, on one axis [voxels^2]. @param c from the first centre of its own, -0.5 to 7.5.
+/// of the block after it, on one axis [voxels^2]. @param c from the first centre of its own, -0.5 to 7.5.
 struct AxisDistances {
-  float before, home, behind;
+  float before, home, after;
 
   [[gnu::always_inline]] explicit AxisDistances(float c) {
     constexpr auto kEdge = static_cast<float>(kBlockEdge);
@@ -89,7 +89,7 @@ struct AxisDistances {
     const float nearest = rounded < kEdge - 1.0f ? rounded : kEdge - 1.0f;
     before = (c + 1.0f) * (c + 1.0f);
     home = (c - nearest) * (c - nearest);
-    behind = (kEdge - c) * (kEdge - c);
+    after = (kEdge - c) * (kEdge - c);
   }
 };
 
@@ -97,8 +97,8 @@ void reachBlocks(std::size_t count, float reach, TilePlaces& places) {
   const float reach2 = reach * reach;
   for (std::size_t i = 0; i < count; ++i) {
     const AxisDistances x(places.inside[0][i]), y(places.inside[1][i]), z(places.inside[2][i]);
-    const float xs[3] = {x.before, x.home, x.behind}, ys[3] = {y.before, y.home, y.behind},
-                zs[3] = {z.before, z.home, z.behind};
+    const float xs[3] = {x.before, x.home, x.after}, ys[3] = {y.before, y.home, y.after},
+                zs[3] = {z.before, z.home, z.after};
     std::int32_t reached = 0;
     for (int k = 0; k < 3; ++k) {
       for (int j = 0; j < 3; ++j) {

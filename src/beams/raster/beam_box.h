@@ -14,14 +14,14 @@ namespace bki_mapping {
 struct BeamBox {
   double first[3];       ///< centre of the group's first voxel, relative to the sensor
   double reach;          ///< length of the kernel
-  std::uint64_t blocks;  ///< those that matter, as in BlockGroup
+  std::uint64_t blocks;  ///< those whose sums are wanted, as in BlockGroup; below, those that matter
 
   static constexpr double kHalf = 0.5 * (kGroupVoxels - 1);  ///< from the first voxel's centre to the box's
 
   Eigen::Vector3d centre() const { return Eigen::Vector3d(first[0], first[1], first[2]).array() + kHalf; }
 };
 
-/// The slices of a box, first to last, in which a beam may reach blocks that matter.
+/// A beam's way through a box: the slices, first to last, in which it may reach blocks that matter.
 struct BeamPass {
   std::uint32_t beam;
   std::int32_t first, last;

@@ -1,15 +1,17 @@
-/// @file How beams' surroundings are cut into slices of voxels, which beams are traced through.
+/// @file The slices of voxels through which beams are swept.
 #pragma once
 
 namespace bki_mapping {
 
-/// A beam runs along one axis most, its main axis. About it, voxels stand in columns along the height axis,
-/// and columns side by side along the side axis.
+/// A slice is the set of voxels in one position of a sweep plane: the plane moves along the beam, and in each
+/// slice the line of the beam has one position. The main axis is that along which the beam runs most; columns
+/// of voxels lie along the height axis, and columns are counted along the side axis.
 constexpr int kSideAxis[3] = {1, 0, 1}, kHeightAxis[3] = {2, 2, 0};
 
-/// Straight slices stand across the main axis, and hold columns 1 voxel apart. In skew slices 2 main + skew
-/// side is the same for all voxels: their columns are sqrt(5) voxels apart, so that a short kernel reaches
-/// but one of them. A slice's columns are counted by their side in straight slices, by main in skew ones.
+/// Straight slices are perpendicular to the main axis; their columns are 1 voxel apart. Skew slices are
+/// sheared, as in shear-warp volume rendering: 2 main + skew side is the same for all voxels of a slice.
+/// Their columns are sqrt(5) voxels apart, so that a narrow kernel reaches only one of them. Columns of
+/// straight slices are counted by their side, columns of skew slices by their main coordinate.
 struct BeamSlicing {
   static constexpr int kCount = 9;
 

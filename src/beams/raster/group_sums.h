@@ -9,18 +9,18 @@
 
 namespace bki_mapping {
 
-/// Sums of the sparse kernel over beams, in rows of voxels along an axis; for each of the three axes there
-/// are such rows on their own. There is room around the group's voxels for what is added beside them.
+/// Sums of the sparse kernel over beams: three arrays of the group's voxels, which differ in the axis along
+/// which voxels are adjacent in memory. Padding around the group takes what loops add beside it.
 class GroupSums {
  public:
-  static constexpr int kPad = 8;                                           ///< voxels before and behind a row
+  static constexpr int kPad = 8;                                           ///< voxels before and after a row
   static constexpr int kBeside = 6;                                        ///< rows on each side
   static constexpr int kRow = kGroupVoxels + 2 * kPad;                     ///< from row to row
   static constexpr int kPlane = (kGroupVoxels + 2 * kBeside) * kRow + 16;  ///< an odd number of cache lines
   static constexpr int kArray = (kGroupVoxels + 2 * kBeside) * kPlane;     ///< all rows along an axis
   static constexpr int kFirst = kBeside * kPlane + kBeside * kRow + kPad;  ///< the group's first voxel
 
-  /// From voxel to voxel along an axis, where rows lie along another.
+  /// From voxel to voxel along an axis, in the array of a row axis.
   static constexpr int stride(int row_axis, int axis) {
     return axis == row_axis ? 1 : axis == (row_axis == 0 ? 1 : 0) ? kRow : kPlane;
   }
@@ -31,18 +31,18 @@ class GroupSums {
   GroupSums(GroupSums&&) = default;
   GroupSums& operator=(GroupSums&&) = default;
 
-  /// Forgets all sums. @param blocks that matter; of the others no sums are kept.
+  /// Forgets all sums. @param blocks that matter; sums of others are undefined.
   void start(std::uint64_t blocks);
-  /// Makes room for sums in rows along an axis, which are 0 then. @return the group's first voxel there.
+  /// Sets the array of a row axis to 0, which must not be used before. @return the group's first voxel there.
   float* open(int row_axis);
   /// Sets `sums` to those of a block that matters. @param place in the group [blocks].
   void sumsOf(const std::array<int, 3>& place, float* sums) const;
-  /// Takes all memory that sums over so many beams can need.
+  /// Allocates all memory that sums over up to this many beams need.
   void reserve(std::size_t beams);
 
-  /// Inner loops may write this many passes past the last.
+  /// Loops may write up to this many passes past the last.
   static constexpr std::size_t kPassPadding = 16;
-  /// Working memory of what adds: passes, and how many of them there are. There is room for one a beam.
+  /// Working memory of what adds: the passes of beams, at most one a beam, and their count.
   std::vector<BeamPass> passes;
   std::size_t pass_count = 0;
 

@@ -1,5 +1,23 @@
-/// @file The innermost loop of line evidence; each instruction set's file includes it and gets a copy of its
-/// own. Beams are traced through a box slice by slice, and added to the voxels that the kernel reaches there.
+/// @file The loops over lines of beams: entry to this folder.
+///
+/// 1. line_setup_inl.h, once a scan: for each beam the slices it is swept through, its slopes there, and the
+///    quadratic form of the distance from its line (LineSetup).
+/// 2. pass_search_inl.h, for each group of blocks: which beams pass through the group's box, and in which
+/// slices
+///    (BeamPass). The beams it looks at are those of BeamField::findRangesNear.
+/// 3. slices_inl.h: the box in slices of each kind, and the line's position in its middle slice.
+/// 4. For each pass, by how far the kernel reaches from the line (in findLines):
+///      - narrow_kernel_inl.h, where skew slices have the reach within one column: always where the kernel is
+///      as
+///        long as a voxel or shorter, as by default. Two voxels of a column hold it, or four where the line
+///        is steep along the column (half_height > 1). Lanes are slices.
+///      - wide_kernel_inl.h, in straight slices, for longer kernels. Lanes are the voxels of a slice.
+/// 5. GroupSums holds the sums of all beams, in rows along the axis that suits each kind of slice.
+///
+/// The narrow way exists since per beam and slice it evaluates the kernel twice, where a straight slice takes
+/// a whole vector for the three or four voxels that matter.
+///
+/// These files are included once for each instruction set, by line_kernels_*.cpp.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +35,7 @@ namespace {
 /// Adds the beams whose passes have been found.
 template <BeamWeight kWeight>
 void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums) {
-  // So far off the search, in single precision, names slices beside the box.
+  // From here on [voxels], the search, in single precision, includes slices beside the box.
   constexpr double kDistant = 1e5;
   const bool distant = box.centre().cwiseAbs().maxCoeff() > kDistant;
   constexpr auto kSlicing = BeamSlicing::of;
@@ -28,12 +46,15 @@ void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums)
   for (int axis = 0; axis < 3; ++axis) {
     for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
   }
-  constexpr int kFew = 4, kMany = kLanes < 8 ? kLanes : 8;
+  // Reaches below two voxels get columns in fours. With columns in eights for all, kernels of 1.5 voxels cost
+  // 17 % more (user time of map_sequence --threads 1, presets/robot.yaml, KITTI sequence 04, AVX-512); with
+  // fours and heights cut down to blocks that matter, as much.
+  constexpr int kFour = 4, kEight = kLanes < 8 ? kLanes : 8;
   const VecKernel kernel;
-  WideKernelRaster<kWeight, kFew> few(kernel);
-  WideKernelRaster<kWeight, kMany> many(kernel);
-  float* arrays[3] = {};  // by the axis of rows
-  NarrowKernelRaster<kWeight, 2> thin(kernel);
+  WideKernelRaster<kWeight, kFour> fours(kernel);
+  WideKernelRaster<kWeight, kEight> eights(kernel);
+  float* arrays[3] = {};  // of sums, by the axis of rows
+  NarrowKernelRaster<kWeight, 2> narrow(kernel);
   NarrowKernelRaster<kWeight, 4> steep(kernel);
   for (std::size_t n = 0; n < sums.pass_count; ++n) {
     BeamPass pass = sums.passes[n];
@@ -50,20 +71,20 @@ void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums)
     if (slices.skew != 0) {
       const int count = pass.last - pass.first + 1;
       if (line.half_height <= 1.0f) {
-        thin.add(beam, pass.first, count, slices.middle, array, slices.strides);
+        narrow.add(beam, pass.first, count, slices.middle, array, slices.strides);
       } else {
         steep.add(beam, pass.first, count, slices.middle, array, slices.strides);
       }
       continue;
     }
     const WideReach reach(line);
-    if (2 * reach.side < kFew * kOneVoxel) {
-      addThickWhole(beam, reach, pass, few, array, slices.strides);
+    if (2 * reach.side < kFour * kOneVoxel) {
+      addWideWhole(beam, reach, pass, fours, array, slices.strides);
     } else {
-      addThick(beam, reach, pass, layers[slices.axis], many, array, slices.strides);
+      addWide(beam, reach, pass, layers[slices.axis], eights, array, slices.strides);
     }
   }
-  thin.flush();
+  narrow.flush();
   steep.flush();
 }
 

@@ -1,5 +1,5 @@
-/// @file How beams cross slices of voxels: loops of which compilers make vector instructions. Each
-/// instruction set's file includes it and gets a copy of its own.
+/// @file Computes LineSetups from beams. Plain loops over arrays, which compilers turn into vector
+/// instructions. Part of line_kernels_inl.h.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Some beams side by side.
+/// Some beams as arrays.
 struct LineBatch {
   static constexpr std::size_t kMost = 64;
 
@@ -53,10 +53,10 @@ void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolut
 ///
 /// Let v lead from a slice's column to the next, n stand across slices (v = (0, 1), n = (1, 0) in straight
 /// ones, v = (1, -2 skew), n = (2, skew) in skew ones, along the main and side axes), h along columns, u be
-/// the unit direction. A place at p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
+/// the unit direction. A position p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
 /// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Within d =
-/// 1 are places up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size of a
-/// box, and therefore in double precision.
+/// 1 are positions up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size
+/// of a box, and therefore in double precision.
 void findLines(std::size_t count, float reach, LineBatch& batch) {
   const float counts = reach * static_cast<float>(kReachThatCounts), counts2 = counts * counts;
   const float by_reach = VecKernel::unit() / reach;
@@ -97,7 +97,7 @@ void findLines(std::size_t count, float reach, LineBatch& batch) {
   }
 }
 
-/// Writes up to kLanes tracks, the batch's from `first` on.
+/// Writes up to kLanes setups, the batch's from `first` on.
 inline void writeLines(const LineBatch& batch, std::size_t first, std::size_t count, LineSetup* to) {
   const auto ints = [&](const float* from) { return BitCast<IntVec>(LoadU(from + first)); };
   const auto whole = [&](const std::int32_t* from) { return LoadU(from + first); };

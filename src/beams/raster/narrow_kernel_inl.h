@@ -1,5 +1,5 @@
-/// @file Beams of a short kernel, added to one column of each skew slice, and of that to the two voxels
-/// between which the beam passes, or to four. Included by trace_loop.h alone.
+/// @file Narrow kernels: beams added to one column of each skew slice, to the two voxels between which the
+/// line passes, or to four. Part of line_kernels_inl.h.
 #pragma once
 
 #include "beams/raster/group_sums.h"
@@ -9,21 +9,23 @@
 namespace bki_mapping {
 namespace {
 
-/// The fraction of a place in voxels, and 1: in [1, 2), without rounding.
-[[gnu::always_inline]] inline FloatVec fractionAndOne(IntVec place) {
+/// 1 + the fraction of a fixed-point position, in [1, 2), without rounding: the fraction's bits are a
+/// float's.
+[[gnu::always_inline]] inline FloatVec onePlusFraction(IntVec position) {
   static_assert(kPositionBits == 23, "the bits of a float's fraction");
-  return BitCast<FloatVec>((place & (kOneVoxel - 1)) | 0x3f800000);
+  return BitCast<FloatVec>((position & (kOneVoxel - 1)) | 0x3f800000);
 }
 
-/// Slices of beams, gathered until there are many: first where they are is found, a beam at a time, then they
-/// are added, one slice like the other. Lanes are slices. @tparam kVoxels of a slice, 2 or 4.
+/// Lanes are slices. The number of slices of a beam in a box is seldom a multiple of kLanes; so the slices of
+/// many beams are gathered, a beam at a time, and then added in full vectors.
+/// @tparam kVoxels of a slice, 2 or 4: lines that climb steeply along a column reach four.
 template <BeamWeight kWeight, int kVoxels>
 class NarrowKernelRaster {
  public:
   explicit NarrowKernelRaster(const VecKernel& kernel) : kernel_(kernel) {}
 
-  /// Takes slices of a beam, up to kRoom. @param sums at the group's first voxel. @param middle slice, in
-  /// which the beam's place is.
+  /// Gathers slices of a beam, up to kRoom. @param sums at the group's first voxel. @param middle the slice
+  /// in which the line's position is given.
   [[gnu::always_inline]] void add(const LineInBox& beam, int first, int slices, int middle, float* sums,
                                   SliceStrides strides) {
     if (sums != sums_ || count_ + slices > kRoom) flush();
@@ -31,19 +33,19 @@ class NarrowKernelRaster {
     const int begin = count_, end = begin + slices;
     const LineSetup& line = beam.line;
     const IntVec number = Iota() + (first - middle);
-    // The nearest column, and of it the lowest voxel.
-    constexpr int kBelow = kVoxels / 2 - 1;  // under the one below the beam
+    // The nearest column, and the lowest of its voxels.
+    constexpr int kBelow = kVoxels / 2 - 1;  // voxels under the one next below the line
     IntVec side = number * line.step_side + (beam.side + kOneVoxel / 2),
            height = number * line.step_height + (beam.height - kBelow * kOneVoxel),
            slice = (number + middle) * strides.slice;
     FloatVec step = ConvertTo<FloatVec>(number);
     int n = begin;
     do {  // there is a slice
-      // A column's voxels stand one behind the other.
+      // The voxels of a column are adjacent in memory.
       StoreU((side >> kPositionBits) * strides.side + (height >> kPositionBits) + slice, voxel_ + n);
-      // That voxel's place, from the beam's on.
-      const FloatVec s = 1.5f - fractionAndOne(side),
-                     h = static_cast<float>(1 - kBelow) - fractionAndOne(height);
+      // That voxel from the line.
+      const FloatVec s = 1.5f - onePlusFraction(side),
+                     h = static_cast<float>(1 - kBelow) - onePlusFraction(height);
       FloatVec e = s * line.e_side + h * line.e_height, g = h * line.g_height,
                w = step * line.rho_slice + beam.rho + s * line.rho_side + h * line.rho_height;
       for (int voxel = 0; voxel < kVoxels; ++voxel) {
@@ -59,11 +61,12 @@ class NarrowKernelRaster {
       step += static_cast<float>(kLanes);
       n += kLanes;
     } while (n < end);
-    // Two pairs are added at a time, which have to be of one beam: with the slice behind, if need be.
+    // Pairs are added two at a time, which must not overlap: of two slices of one beam, they never do. If the
+    // count is odd, the slice past the last, whose values are 0, fills up.
     count_ = kVoxels == 2 ? end + end % 2 : end;
   }
 
-  /// Adds what is gathered to the sums.
+  /// Adds all that is gathered.
   void flush() {
     if (count_ == 0) return;
     int end = count_;
@@ -71,7 +74,7 @@ class NarrowKernelRaster {
       voxel_[end] = kNowhere;
       for (int voxel = 0; voxel < kVoxels; ++voxel) squared_[voxel][end] = rho_[voxel][end] = 0.0f;
     }
-    // Of the lanes before and those at hand by turns: what is added then has not to wait for its values.
+    // Software-pipelined: compute the next vector while the previous one is scattered.
     const VecKernel kernel = kernel_;  // in registers
     alignas(64) float even[kVoxels * kLanes], odd[kVoxels * kLanes];
     compute(kernel, 0, even);
@@ -92,7 +95,7 @@ class NarrowKernelRaster {
 
  private:
   static constexpr int kRoom = 512;
-  static constexpr int kNowhere = -GroupSums::kPad;  ///< beside the group
+  static constexpr int kNowhere = -GroupSums::kPad;  ///< a voxel in the padding beside the group
 
   [[gnu::always_inline]] void compute(const VecKernel& kernel, int n, float* by_slice) const {
     FloatVec values[kVoxels];
@@ -119,7 +122,7 @@ class NarrowKernelRaster {
   const VecKernel kernel_;
   float* sums_ = nullptr;
   int count_ = 0;
-  // Where the slices' voxels are, their squared distance as the kernel takes it, and rho.
+  // The lowest voxel of each slice; of each voxel the squared distance, as the kernel takes it, and rho.
   alignas(64) std::int32_t voxel_[kRoom + kLanes];
   alignas(64) float squared_[kVoxels][kRoom + kLanes];
   alignas(64) float rho_[kVoxels][kRoom + kLanes];

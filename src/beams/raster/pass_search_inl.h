@@ -1,4 +1,4 @@
-/// @file Which beams pass through a box; included by the inner loops alone.
+/// @file Which beams pass through a box, and in which slices. Part of line_kernels_inl.h.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,13 @@
 namespace bki_mapping {
 namespace {
 
-/// The blocks of a box as sets of bits: those of a layer across a main axis, side first.
+/// The blocks of a box as sets of bits: bit side + 4 height of a layer across a main axis.
 struct BoxBlocks {
   static constexpr int kAll = 0xffff, kEachHeight = 0x1111, kEachSide = 0xf;
 
   Table8<std::int32_t> layer[kGroupEdge];  ///< by main axis: those that matter
-  /// Those with number n - 1 and more, and those with up to n - 1, n being 0 to 5.
+  /// Blocks from n - 1 up, and blocks up to n - 1; n is 0 to 5, so that positions beside the box have an
+  /// entry.
   Table8<std::int32_t> side_from, side_to, height_from, height_to;
 
   explicit BoxBlocks(std::uint64_t blocks) {
@@ -26,7 +27,7 @@ struct BoxBlocks {
       }
     }
     for (int n = 0; n <= 5; ++n) {
-      const int below = std::max(n - 1, 0), above = std::max(4 - n, 0);  // how many are left out
+      const int below = std::max(n - 1, 0), above = std::max(4 - n, 0);  // blocks left out
       side_from.values[n] = kEachHeight * (kEachSide & (kEachSide << below));
       height_from.values[n] = kAll & (kAll << 4 * below);
       side_to.values[n] = kEachHeight * (kEachSide >> above);
@@ -35,8 +36,8 @@ struct BoxBlocks {
   }
 };
 
-/// Beams side by side, and the slices in which they may reach the box. Lengths are in voxels, from the box's
-/// centre.
+/// Lanes are beams: finds the slices in which each may reach the box. Lengths are in voxels, from the centre
+/// of the box. The result is conservative: slack_ covers rounding, and corners count as inside.
 class BoxSearch {
  public:
   explicit BoxSearch(const BeamBox& box) : blocks_(box.blocks), reach_(static_cast<float>(box.reach)) {
@@ -49,8 +50,8 @@ class BoxSearch {
     slack_ = 0.01f + 1e-6f * centre.cwiseAbs().maxCoeff();  // for rounding
   }
 
-  /// Finds the passes of up to kLanes beams. @param[out] to the passes; as many are written to.
-  /// @return behind the last pass found.
+  /// Finds the passes of up to kLanes beams. @param[out] to room for kLanes passes.
+  /// @return the end of those found.
   BeamPass* find(const LineSetupArrays& beams, BeamRange range, BeamPass* to) const {
     const std::uint32_t b = range.first;
     const IntVec axis = LoadU(beams.axis + b);
@@ -63,7 +64,7 @@ class BoxSearch {
       low = Max(low, (-kHalf - each->reach - each->turned) * each->inverse_slope);
       high = Min(high, (kHalf + each->reach - each->turned) * each->inverse_slope);
     }
-    low += kHalf + 1.0f - slack_;  // up to the next whole number
+    low += kHalf + 1.0f - slack_;  // rounds up
     high += kHalf + slack_;
     IntVec alive = (low < high + 1.0f) & (Iota() < static_cast<std::int32_t>(range.last - b));
     IntVec first = ConvertTo<IntVec>(IfThenElse(alive, low, FloatVec{})),
@@ -96,11 +97,12 @@ class BoxSearch {
     static_assert(BeamSlicing{0, 1}.number() == 3 && BeamSlicing{0, -1}.number() == 6);
     return axis + IfThenElse(skew == 0.0f, IntVec{}, IfThenElse(skew > 0.0f, Set(3), Set(6)));
   }
-  /// Writes the passes found. @param numbers of a pass, in their order.
-  static BeamPass* emit(const IntVec (&numbers)[4], IntVec found, BeamPass* to) {
+  /// Writes the passes found, all kLanes: one that is not found is overwritten by the next, without a branch.
+  /// @param fields of BeamPass, in their order.
+  static BeamPass* emit(const IntVec (&fields)[4], IntVec found, BeamPass* to) {
     static_assert(sizeof(BeamPass) == 4 * sizeof(std::int32_t));
     alignas(64) std::int32_t passes[4 * kLanes];
-    StoreInterleaved4(numbers, passes);
+    StoreInterleaved4(fields, passes);
     const IntVec step = found & static_cast<std::int32_t>(sizeof(BeamPass));
     auto* bytes = reinterpret_cast<unsigned char*>(to);
     for (int n = 0; n < kLanes; ++n) {
@@ -110,31 +112,31 @@ class BoxSearch {
     return reinterpret_cast<BeamPass*>(bytes);
   }
 
-  /// How beams run along the side axis, or the height axis.
+  /// How lines run along the side axis, or the height axis.
   struct Across {
     FloatVec slope;
-    FloatVec at;             ///< place in the slice through the box's centre
-    FloatVec reach;          ///< of the kernel, at least
-    FloatVec inverse_slope;  ///< without its sign
-    FloatVec turned;         ///< `at`, with the axis turned so that the slope is positive
+    FloatVec at;             ///< position in the slice through the box's centre
+    FloatVec reach;          ///< of the kernel, or more
+    FloatVec inverse_slope;  ///< of its magnitude
+    FloatVec turned;         ///< `at`, with the axis reversed where the slope is negative
   };
   Across across(FloatVec slope, FloatVec centre, FloatVec main) const {
     const FloatVec at = main * slope - centre, size = Max(Abs(slope), Set(1e-9f));
     return {slope, at, reach_ * (1.0f + 0.5f * slope * slope) + slack_, 1.0f / size,
             IfThenElse(slope < 0.0f, -at, at)};
   }
-  /// Turns straight slices into skew ones that hold the same voxels which beams reach, where they are skew.
+  /// Converts straight slices to the skew slices that hold the same reached voxels, for beams in skew slices.
   void turnSkew(FloatVec skew, const Across& side, IntVec& first, IntVec& last) const {
-    // A column is up to half a voxel along the main axis from the beam's place in its skew slice.
-    constexpr float kBehind = 64.0f;  // so that there are none below 0
+    // A column is up to half a voxel along the main axis from the line's position in its skew slice.
+    constexpr float kOffset = 64.0f;  // keeps numbers positive: conversion truncates
     const FloatVec by_voxel = 2.0f + Abs(side.slope);
-    const FloatVec slice = skew * (side.at + kHalf) + (2.0f * kHalf + kBehind);  // at the box's centre
+    const FloatVec slice = skew * (side.at + kHalf) + (2.0f * kHalf + kOffset);  // at the box's centre
     const FloatVec low = (ConvertTo<FloatVec>(first) - (kHalf + 0.5f)) * by_voxel + slice,
                    high = (ConvertTo<FloatVec>(last) - (kHalf - 0.5f)) * by_voxel + slice;
     const Mask straight = skew == 0.0f;
     first = IfThenElse(straight, first,
-                       ConvertTo<IntVec>(low + 1.0f - slack_) - static_cast<std::int32_t>(kBehind));
-    last = IfThenElse(straight, last, ConvertTo<IntVec>(high + slack_) - static_cast<std::int32_t>(kBehind));
+                       ConvertTo<IntVec>(low + 1.0f - slack_) - static_cast<std::int32_t>(kOffset));
+    last = IfThenElse(straight, last, ConvertTo<IntVec>(high + slack_) - static_cast<std::int32_t>(kOffset));
   }
   [[gnu::always_inline]] static IntVec blockAt(FloatVec x) {
     return ConvertTo<IntVec>(Min(Max(x, FloatVec{}), Set(static_cast<float>(kGroupEdge + 1))));
@@ -154,12 +156,12 @@ class BoxSearch {
   float reach_, slack_;
 };
 
-/// So many passes ahead, tracks are sent for.
+/// Line setups, a cache line each, are prefetched this many passes ahead: those of a scan exceed the caches
+/// near the core, and passes skip beams.
 constexpr std::size_t kAhead = 8;
 
-/// Finds the passes of beams through a box, in the order of the beams. Of kAhead behind the last, there are
-/// any numbers. `sums` has room for all beams (GroupSums::reserve): a vector that grew here would leave its
-/// code, compiled for this instruction set, to the linker's choice.
+/// Finds the passes of beams through a box, in the order of the beams. `sums` has room for all of them
+/// (GroupSums::reserve). The kAhead passes past the last may be read, and have any value.
 inline void findPasses(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
                        const BeamBox& box, GroupSums& sums) {
   const BoxSearch search(box);

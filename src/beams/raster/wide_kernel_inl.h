@@ -1,5 +1,5 @@
-/// @file Beams of a long kernel, added to all voxels that they reach in straight slices; included by
-/// trace_loop.h alone.
+/// @file Wide kernels: beams added to all voxels that they reach in straight slices. Part of
+/// line_kernels_inl.h.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Lanes are kSides voxels side by side, times as many rows, one above the other, as there is room for.
+/// The voxels of a vector: kSides columns side by side, and as many rows, one above the other, as fill it.
 template <int kSides>
 struct WideShape {
   static constexpr int kRows = kLanes / kSides;
@@ -27,7 +27,7 @@ struct WideShape {
   }
 };
 
-/// Whole numbers from first to last, none if last is below.
+/// Integers from first to last; none if last < first.
 struct Span {
   int first, last;
 
@@ -35,7 +35,7 @@ struct Span {
   bool empty() const { return first > last; }
 };
 
-/// How far a beam reaches from its place in a slice [1 / kOneVoxel].
+/// How far the kernel reaches from the line in a slice, in fixed point.
 struct WideReach {
   std::int32_t side, height;
 
@@ -43,15 +43,15 @@ struct WideReach {
       : side(toFixedPoint(static_cast<double>(line.half_side))),
         height(toFixedPoint(static_cast<double>(line.half_height))) {}
 
-  /// The voxels that a beam reaches in some slices, along one axis. @param place in the first.
-  static Span span(std::int32_t place, std::int32_t step, int slices, std::int32_t half) {
-    const std::int32_t other = place + (slices - 1) * step;
-    return {(std::min(place, other) - half + (kOneVoxel - 1)) >> kPositionBits,
-            (std::max(place, other) + half) >> kPositionBits};
+  /// The voxels that a beam reaches in some slices, along one axis. @param at its position in the first.
+  static Span span(std::int32_t at, std::int32_t step, int slices, std::int32_t half) {
+    const std::int32_t end = at + (slices - 1) * step;
+    return {(std::min(at, end) - half + (kOneVoxel - 1)) >> kPositionBits,
+            (std::max(at, end) + half) >> kPositionBits};
   }
 };
 
-/// Those of some heights that are in blocks that matter, as far as these hold any of the sides.
+/// Cuts heights down to the blocks that matter among those that hold any of the sides.
 /// @param layer as layerOf gives it.
 inline Span heightsThatMatter(std::uint32_t layer, const Span& sides, const Span& heights) {
   constexpr Span kAll = {0, kGroupVoxels - 1};
@@ -66,7 +66,8 @@ inline Span heightsThatMatter(std::uint32_t layer, const Span& sides, const Span
   return h.within({kBlockEdge * first, kBlockEdge * (last + 1) - 1});
 }
 
-/// What is to be added for a beam, so many lanes after so many.
+/// The vectors of voxels that a beam reaches. They are gathered for all slices before any is added: finding
+/// them depends on the beam and branches, adding them is one loop without a branch.
 template <BeamWeight kWeight, int kSides>
 class WideKernelRaster {
  public:
@@ -74,7 +75,7 @@ class WideKernelRaster {
 
   explicit WideKernelRaster(const VecKernel& kernel) : kernel_(kernel) {}
 
-  /// Takes slices from `first` on. @param heights that matter.
+  /// Gathers the vectors of some slices. @param heights that matter.
   [[gnu::always_inline]] void add(const LineInBox& beam, const WideReach& reach, int first, int slices,
                                   const Span& heights, SliceStrides strides) {
     constexpr std::int32_t kUp = kOneVoxel - 1;
@@ -120,9 +121,9 @@ class WideKernelRaster {
     count_ = end;
   }
 
-  /// Adds them all.
+  /// Adds all that are gathered.
   [[gnu::always_inline]] void addTo(float* sums, const LineInBox& beam, SliceStrides strides) {
-    const Shape shape = shape_;  // in registers, as the kernel
+    const Shape shape = shape_;  // in registers
     const VecKernel kernel = kernel_;
     const FloatVec e_lanes = shape.side * beam.line.e_side + shape.height * beam.line.e_height,
                    g_lanes = shape.height * beam.line.g_height,
@@ -150,7 +151,7 @@ class WideKernelRaster {
   const Shape shape_;
   const VecKernel kernel_;
   int count_ = 0;
-  // The first voxel, and e, g and rho there.
+  // The first voxel of each vector, and e, g and rho there.
   alignas(64) std::int32_t at_[kRoom + kLanes];
   alignas(64) float e_[kRoom + kLanes], g_[kRoom + kLanes], rho_[kRoom + kLanes];
 };
@@ -158,10 +159,10 @@ class WideKernelRaster {
 /// Adds a beam in the slices of its pass. @param layers of the box, as layerOf gives them. @param sums at the
 /// group's first voxel.
 template <BeamWeight kWeight, int kSides>
-[[gnu::always_inline]] inline void addThick(const LineInBox& beam, const WideReach& reach,
-                                            const BeamPass& pass, const std::uint32_t (&layers)[kGroupEdge],
-                                            WideKernelRaster<kWeight, kSides>& vectors, float* sums,
-                                            SliceStrides strides) {
+[[gnu::always_inline]] inline void addWide(const LineInBox& beam, const WideReach& reach,
+                                           const BeamPass& pass, const std::uint32_t (&layers)[kGroupEdge],
+                                           WideKernelRaster<kWeight, kSides>& vectors, float* sums,
+                                           SliceStrides strides) {
   for (int slice = pass.first, slices; slice <= pass.last; slice += slices) {
     const int layer = slice / kBlockEdge;
     slices = std::min(pass.last + 1, (layer + 1) * kBlockEdge) - slice;
@@ -178,12 +179,13 @@ template <BeamWeight kWeight, int kSides>
   vectors.addTo(sums, beam, strides);
 }
 
-/// The same where the kernel is so short that leaving out heights does not pay.
+/// The same, without cutting heights down to blocks that matter: for kernels of few voxels it costs more than
+/// it saves.
 template <BeamWeight kWeight, int kSides>
-[[gnu::always_inline]] inline void addThickWhole(const LineInBox& beam, const WideReach& reach,
-                                                 const BeamPass& pass,
-                                                 WideKernelRaster<kWeight, kSides>& vectors, float* sums,
-                                                 SliceStrides strides) {
+[[gnu::always_inline]] inline void addWideWhole(const LineInBox& beam, const WideReach& reach,
+                                                const BeamPass& pass,
+                                                WideKernelRaster<kWeight, kSides>& vectors, float* sums,
+                                                SliceStrides strides) {
   constexpr Span kAll = {-GroupSums::kBeside, kGroupVoxels - 1 + GroupSums::kBeside};
   vectors.add(beam, reach, pass.first, pass.last - pass.first + 1, kAll, strides);
   vectors.addTo(sums, beam, strides);
