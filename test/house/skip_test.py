@@ -34,6 +34,9 @@ class Skips(unittest.TestCase):
         if 'real_bag_rostest' in self.tests:
             self.assertEqual(self.outcome('real_bag_rostest'), 'skipped')
 
+    def test_without_an_emulator(self):
+        self.assertEqual(self.outcome('nehalem_test', PATH='/no/such'), 'skipped')
+
     def test_what_tests_something_is_not_skipped(self):
         self.assertEqual(self.outcome('grid_geometry_test'), 'passed')
 
