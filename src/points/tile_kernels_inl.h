@@ -25,12 +25,10 @@ void placeCellOnAxis(const TileGrid& grid, const PointSpan& points, std::size_t 
   const std::int32_t whole_edge = grid.edge, home = grid.home[kAxis];
   const std::int32_t stride = kAxis == 0 ? 1 : (kAxis == 1 ? whole_edge : whole_edge * whole_edge);
   for (std::size_t i = 0; i < count; ++i) {
-    float quotient = points.axes[kAxis][i] * per_metre + first;
-    // Rounding errs by less than 3 * 2^-24 of its terms; farther out than this that is more than a half.
+    const float cells = points.axes[kAxis][i] * per_metre + first, size = std::abs(cells);
+    // Rounding errs by less than 3 * 2^-24 of its terms. From kFar on the margin takes all points.
     constexpr float kFar = 0x1.0p22f, kRounding = 4.0f * 0x1.0p-24f;
-    quotient = quotient < kFar ? quotient : kFar;
-    quotient = quotient > -kFar ? quotient : -kFar;
-    const float size = std::abs(quotient);
+    const float quotient = size < kFar ? cells : 0.0f;
     const float margin = kRounding * (size + 2.0f * TileGrid::kMostEdge);
     const std::int32_t floor = floorOf(quotient);
     const float aside = std::abs(quotient - (static_cast<float>(floor) + 0.5f));
