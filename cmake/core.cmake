@@ -11,6 +11,8 @@ function(bki_mapping_room room)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
   target_link_libraries(${target} PUBLIC ${arg_LINK})
+  target_link_options(${target} PRIVATE LINKER:--no-undefined)
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")  # rooms share precompiled headers
   bki_mapping_warnings(${target})
   set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_ROOMS ${target})
 endfunction()
@@ -21,6 +23,12 @@ function(bki_mapping_core_room room)
   bki_mapping_room(${room} ${ARGN})
   target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math
     $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> -O3)
+  if(room STREQUAL "core")
+    bki_mapping_precompile(bki_mapping_core
+      <Eigen/Geometry> <algorithm> <array> <bitset> <cmath> <map> <memory> <optional> <stdexcept> <string> <vector>)
+  else()
+    bki_mapping_precompile(bki_mapping_${room} REUSE bki_mapping_core)
+  endif()
 endfunction()
 
 bki_mapping_core_room(core SOURCES class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)

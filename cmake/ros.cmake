@@ -27,6 +27,9 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
   LINK bki_mapping_evaluation ${catkin_LIBRARIES})
+bki_mapping_precompile(bki_mapping_ros
+  <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
+  <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)

@@ -25,6 +25,7 @@ target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_mapping)
 target_compile_options(bki_mapping_reference PRIVATE -O2)
 bki_mapping_warnings(bki_mapping_reference)
 
+unset(BKI_MAPPING_FIRST_TEST CACHE)
 # bki_mapping_unit_tests(ROOM name...): test/ROOM/NAME_test.cpp, linked with the room and the reference.
 function(bki_mapping_unit_tests room)
   foreach(each ${ARGN})
@@ -33,6 +34,13 @@ function(bki_mapping_unit_tests room)
     target_link_libraries(${name} PRIVATE bki_mapping_${room} bki_mapping_reference GTest::gtest GTest::gtest_main)
     target_compile_definitions(${name} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     bki_mapping_warnings(${name})
+    if(NOT BKI_MAPPING_FIRST_TEST)
+      bki_mapping_precompile(${name}
+        <gtest/gtest.h> <Eigen/Geometry> <algorithm> <cmath> <fstream> <map> <random> <string> <vector>)
+      set(BKI_MAPPING_FIRST_TEST ${name} CACHE INTERNAL "Whose precompiled headers the other tests use")
+    elseif(NOT name STREQUAL BKI_MAPPING_FIRST_TEST)
+      bki_mapping_precompile(${name} REUSE ${BKI_MAPPING_FIRST_TEST})
+    endif()
     add_test(NAME ${name} COMMAND ${name})
     # Where the last line names a skipped test, none failed: GoogleTest lists those after them.
     set_tests_properties(${name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
