@@ -1,4 +1,5 @@
-// The parts of the mapper, one by one, on a simulated scan. Google Benchmark's options apply, for instance
+// Times the parts of the mapper separately on a simulated scan. Takes Google Benchmark's options, for
+// instance
 // --benchmark_filter=Lines.
 #include <benchmark/benchmark.h>
 
@@ -18,7 +19,7 @@ namespace {
 
 using namespace bki_mapping;
 
-/// A scan of 64 beams, what was seen of it, and a map that holds it.
+/// A scan of 64 beams, the same after preprocessing, and a map of it.
 struct Fixture {
   Fixture() : pool(1), observer(config), mapper(config, classes) {
     seen = observer.observe(scan, *classes, pool);
@@ -71,7 +72,7 @@ void beamField(benchmark::State& state, BeamIndexType index) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
 }
 
-/// Asks for the beams near each block of the map.
+/// Queries the beams near each block of the map.
 void retrieval(benchmark::State& state, BeamIndexType index) {
   Fixture& f = fixture();
   BeamField field(f.geometry, f.config.kernel, index);
@@ -113,7 +114,7 @@ void queries(benchmark::State& state) {
   state.SetItemsProcessed(voxels);
 }
 
-/// The cloud that the topic voxel_cloud carries.
+/// The cloud of the topic voxel_cloud.
 void voxelCloud(benchmark::State& state) {
   Fixture& f = fixture();
   for (auto _ : state) {

@@ -9,6 +9,7 @@
 #include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cases.h"
+#include "core/quantile.h"
 #include "core/stopwatch.h"
 #include "curves.h"
 #include "evaluation/run_report.h"
@@ -21,7 +22,7 @@ using namespace bki_mapping;
 namespace po = tools::po;
 using benchmark::Case;
 
-/// Times of scans, of all repeats [ms].
+/// Times of the scans in all repeats [ms].
 struct Timing {
   std::vector<double> yardstick, integration;
   std::size_t map_bytes = 0;
@@ -39,19 +40,19 @@ std::vector<Case> cases() {
 po::options_description options() {
   po::options_description options("Options");
   options.add(tools::sequenceOptions());
-  options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "table to write")(
+  options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "output table")(
       "warm-up", tools::countOption("--warm-up", 0)->value_name("N")->default_value(3),
-      "first scans that are not timed")("repeats",
-                                        tools::countOption("--repeats", 1)->value_name("N")->default_value(5),
-                                        "times that each mode maps the sequence anew")(
+      "number of first scans that are not timed")(
+      "repeats", tools::countOption("--repeats", 1)->value_name("N")->default_value(5),
+      "number of times that each mode maps the sequence")(
       "curves", po::value<std::string>()->value_name("DIR"),
-      "measure simulated drives too, and write curves as CSV and PNG into this folder")(
+      "also measure simulated drives, and write curves as CSV and PNG to this folder")(
       "curve-scans", tools::countOption("--curve-scans", 2, 1000000)->value_name("N")->default_value(2000),
-      "length of the drive over which the map grows");
+      "scans of the drive during which the map grows");
   return options;
 }
 
-/// Times pcl::VoxelGrid with 0.1 m leaves on raw scans, one thread.
+/// Times pcl::VoxelGrid with leaves of 0.1 m on raw scans, on one thread.
 void timeYardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up, Timing& timing) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
@@ -91,7 +92,8 @@ int measure(const po::variables_map& given) {
   const auto [first, last] = tools::frameRange(given, sequence);
   const std::size_t warm_up = tools::count(given, "warm-up");
   const std::size_t repeats = tools::count(given, "repeats");
-  if (last - first <= warm_up) throw std::invalid_argument("there are no scans left after --warm-up");
+  if (last - first <= warm_up)
+    throw std::invalid_argument("no scans are left after --warm-up; lower it, or raise --scans");
   if (given.count("csv")) checkWritable(given["csv"].as<std::string>());
   std::vector<SequenceFrame> frames;
   for (std::size_t i = first; i < last; ++i) frames.push_back(sequence.read(i));
@@ -106,7 +108,7 @@ int measure(const po::variables_map& given) {
     Timing timings[2];  // with one thread, and with two
     for (std::size_t repeat = 0; repeat < repeats; ++repeat) {
       for (int threads = 1; threads <= 2; ++threads) {
-        // The yardstick is taken each time, so that both sides of a ratio meet the same machine.
+        // Measured in every repeat, so that both terms of a ratio see the same load of the machine.
         timeYardstick(frames, warm_up, timings[threads - 1]);
         timeCase(c, threads, frames, warm_up, classes, timings[threads - 1]);
       }

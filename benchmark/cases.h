@@ -1,4 +1,4 @@
-/// @file The settings that are timed.
+/// @file The settings to be timed.
 #pragma once
 
 #include <map>
@@ -7,7 +7,7 @@
 
 namespace bki_mapping::benchmark {
 
-/// Settings to time, with the name under which they are listed.
+/// Settings to be timed, with their name in the tables.
 struct Case {
   std::string name;
   std::map<std::string, std::string> settings;

@@ -8,8 +8,8 @@
 #include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cases.h"
+#include "core/quantile.h"
 #include "core/stopwatch.h"
-#include "evaluation/run_report.h"
 #include "io/atomic_file.h"
 #include "simulation/lidar.h"
 #include "tools/draw.h"
@@ -28,7 +28,7 @@ std::unique_ptr<SemanticMapper> mapperOf(std::map<std::string, std::string> sett
       config, std::make_shared<const ClassTable>(loadClassTable("semantic_kitti")));
 }
 
-/// A short drive, mapped with some settings.
+/// Result of a short drive mapped with given settings.
 struct ShortRun {
   std::size_t points = 0, hits = 0;  ///< of the last scan
   double median_ms = 0.0, worst_ms = 0.0;
@@ -69,7 +69,7 @@ const std::vector<Case>& curveCases() {
   return cases;
 }
 
-/// A mode, in a map that grows all the while and in one that begins with the last scans.
+/// A mode in two maps: one that grows during the whole drive, and one that begins with the last scans.
 struct GrowingCase {
   explicit GrowingCase(const Case& of)
       : name(of.name), grown(mapperOf(of.settings)), fresh(mapperOf(of.settings)) {}
@@ -85,8 +85,9 @@ double millisecondsOf(SemanticMapper& mapper, const Scan& scan) {
   return watch.lap();
 }
 
-/// Time against the size of the map: all modes see each scan, one after the other. Prints what the last scans
-/// took, and what the same scans take in a map of their own: streets differ from each other.
+/// Measures time against the size of the map; the modes map each scan in turn. Prints the time of the last
+/// scans in the grown map and in a new one, which separates the size of the map from the differences between
+/// streets.
 std::string growth(std::size_t count) {
   const simulation::Drive drive({static_cast<int>(count), kSpeed, 1, {}});
   const std::size_t last = std::min<std::size_t>(200, count / 2), begin = count - last;
@@ -95,14 +96,15 @@ std::string growth(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const Scan scan = drive.frame(i).scan();
     for (GrowingCase& c : all) {
-      const bool both = i >= begin, fresh_first = i % 2 == 1;  // who comes second finds the scan in the cache
+      const bool both = i >= begin,
+                 fresh_first = i % 2 == 1;  // alternate, because the second one finds the scan in the cache
       double ms_fresh = 0.0;
       if (both && fresh_first) ms_fresh = millisecondsOf(*c.fresh, scan);
       const double ms = millisecondsOf(*c.grown, scan);
       if (both && !fresh_first) ms_fresh = millisecondsOf(*c.fresh, scan);
       csv += '"' + c.name + "\"," + std::to_string(i) + "," + std::to_string(c.grown->map().size()) + "," +
              std::to_string(c.grown->map().bytes()) + "," + std::to_string(ms) + "\n";
-      if (i < begin + last / 10) continue;  // all is new to the fresh map
+      if (i < begin + last / 10) continue;  // the new map is still growing quickly
       c.ms_grown.push_back(ms);
       c.ms_fresh.push_back(ms_fresh);
     }
@@ -140,7 +142,7 @@ std::string resolution() {
   return csv;
 }
 
-/// A sensor of 128 beams with 2100 columns: 260 thousand points a scan.
+/// A sensor with 128 beams and 2100 columns: 260 thousand points per scan.
 std::string sensor() {
   std::string csv = "mode,points,hits,median_ms,worst_ms\n";
   const std::vector<Scan> scans = shortDrive(128, 2100);

@@ -1,4 +1,4 @@
-/// @file How the time of a scan grows: with the map, with the points, with the resolution; on simulated
+/// @file Time of a scan against the size of the map, the number of points and the resolution, on simulated
 /// drives.
 #pragma once
 
@@ -7,9 +7,9 @@
 namespace bki_mapping::benchmark {
 
 /// Measures the curves, and every mode on a 128-beam sensor, with two threads. Writes growth.csv, points.csv,
-/// resolution.csv and sensor.csv into a folder, made if missing, and draws the first three as PNG with
-/// plot_curves.py.
-/// @param scans length of the drive over which the map grows.
+/// resolution.csv and sensor.csv to a folder, which it creates if missing, and draws the first three as PNG
+/// by plot_curves.py.
+/// @param scans length of the drive during which the map grows.
 /// @throws std::runtime_error if a file cannot be written or the plots cannot be drawn.
 void measureCurves(const std::string& folder, std::size_t scans);
 

@@ -13,7 +13,7 @@ target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJ
 target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
-bki_mapping_room(evaluation SOURCES dynamics.cpp quality_report.cpp run_report.cpp semantics.cpp truth.cpp
+bki_mapping_room(evaluation SOURCES dynamics_evaluation.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation Boost::program_options)

@@ -9,31 +9,32 @@ namespace bki_mapping::tools {
 namespace {
 
 using Json = nlohmann::json;
+using simulation::Proportion;
 using simulation::SpaceQuality;
-using simulation::Tally;
 using simulation::TruthQuality;
 
 /// The figures of SpaceQuality by name.
 struct SpaceFigure {
   const char* name;
-  Tally SpaceQuality::*tally;
+  Proportion SpaceQuality::*proportion;
   const char* meaning;
 };
 constexpr SpaceFigure kSpaceFigures[] = {
-    {"free_precision", &SpaceQuality::free_precision, "of the voxels called free have nothing in them"},
-    {"free_recall", &SpaceQuality::free_recall, "of the empty voxels that beams crossed are called free"},
+    {"free_precision", &SpaceQuality::free_precision, "of the voxels free in the map are empty"},
+    {"free_recall", &SpaceQuality::free_recall, "of the empty voxels that beams crossed are free in the map"},
     {"occupied_precision", &SpaceQuality::occupied_precision,
-     "of those called occupied have something in them"},
-    {"occupied_near", &SpaceQuality::occupied_near, "of those have something in them or in a neighbour"},
+     "of the voxels occupied in the map have something in them"},
+    {"occupied_near", &SpaceQuality::occupied_near,
+     "of the same have something in them or within a voxel's edge"},
     {"occupied_recall", &SpaceQuality::occupied_recall,
-     "of the voxels hit, and not empty, are called occupied"},
+     "of the non-empty voxels that were hit are occupied in the map"},
 };
 
 Json spaceJson(const SpaceQuality& space) {
   Json figures;
   for (const SpaceFigure& figure : kSpaceFigures) {
-    figures[figure.name] = (space.*figure.tally).share();
-    figures[std::string(figure.name) + "_voxels"] = (space.*figure.tally).all;
+    figures[figure.name] = (space.*figure.proportion).fraction();
+    figures[std::string(figure.name) + "_voxels"] = (space.*figure.proportion).total;
   }
   return figures;
 }
@@ -69,7 +70,7 @@ Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
   return figures;
 }
 
-/// With one decimal; "-" for figures of nothing.
+/// One decimal; "-" for a fraction of nothing.
 std::string figureText(double figure) {
   if (!std::isfinite(figure)) return "-";
   std::ostringstream text;
@@ -79,8 +80,8 @@ std::string figureText(double figure) {
 
 class Table {
  public:
-  void share(const std::string& name, double share, const std::string& meaning) {
-    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << figureText(100.0 * share)
+  void percent(const std::string& name, double fraction, const std::string& meaning) {
+    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << figureText(100.0 * fraction)
          << " %  " << meaning << "\n";
   }
   void text(const std::string& line) { out_ << line << "\n"; }
@@ -92,14 +93,15 @@ class Table {
 
 void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table) {
   for (const SpaceFigure& figure : kSpaceFigures) {
-    table.share(figure.name, (truth.all.*figure.tally).share(), figure.meaning);
+    table.percent(figure.name, (truth.all.*figure.proportion).fraction(), figure.meaning);
   }
-  table.share("voxel mIoU", truth.meanIou(classes), "of the classes of voxels, over those there are");
-  table.share("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
-  table.share("occupancy ECE", truth.occupancy.error(),
-              "expected calibration error of the probability of occupancy");
+  table.percent("voxel mIoU", truth.meanIou(classes),
+                "of the classes of voxels, over the classes that occur");
+  table.percent("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
+  table.percent("occupancy ECE", truth.occupancy.error(),
+                "expected calibration error of the probability of occupancy");
   table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
-             " voxels of things that can move (none there for half a second); " +
+             " voxels of classes that can move (nothing movable near for 0.5 s); " +
              figureText(truth.mean_ghosts) + " on average while mapping");
 }
 
@@ -109,26 +111,27 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   const DynamicsQuality& d = quality.dynamics;
   const SemanticQuality& s = quality.semantics;
   Table table;
-  table.share("SA", d.staticAccuracy(), "of the points of standing things are in occupied voxels");
-  table.share("  ground", d.groundAccuracy(), "of those of ground");
-  table.share("  standing", d.standingAccuracy(), "of those of things that could move, but stand");
-  table.share("  other", d.otherAccuracy(), "of the others");
-  table.share("holes", d.holes(), "of the voxels that hold points of ground are not occupied");
-  table.share("DA", d.dynamicAccuracy(), "of the early points of moving things are not");
-  table.share("AA", d.accuracy(), "sqrt(SA DA)");
-  table.share("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
-  table.share("mIoU of the map", s.map.meanIou(), "at the labelled points");
-  table.share("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
-  table.share("ECE", s.reliability.error(), "expected calibration error of the class's probability");
-  table.share("AUSE", s.sparsificationError, "area under the sparsification error curve, by variance");
+  table.percent("SA", d.staticAccuracy(), "of the points of static objects are in occupied voxels");
+  table.percent("  ground", d.groundAccuracy(), "of the points of ground");
+  table.percent("  standing", d.standingAccuracy(),
+                "of the points of objects that could move, but stand still");
+  table.percent("  other", d.otherAccuracy(), "of the other static points");
+  table.percent("holes", d.holes(), "of the voxels with points of ground are not occupied");
+  table.percent("DA", d.dynamicAccuracy(),
+                "of the early points of moving objects are in voxels that are not occupied");
+  table.percent("AA", d.accuracy(), "sqrt(SA DA)");
+  table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
+  table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");
+  table.percent("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
+  table.percent("ECE", s.reliability.error(), "expected calibration error of the class's probability");
+  table.percent("AUSE", s.sparsification_error, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
-  table.text(std::to_string(d.static_points) + " points of standing and " + std::to_string(d.moving_points) +
-             " of moving things; median " + figureText(quality.median_ms) + " ms a scan");
+  table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
+             " of moving objects; median " + figureText(quality.median_ms) + " ms a scan");
   if (quality.labels_are_ids) {
-    table.text(
-        "class ids do not tell what moves, so DA and AA are not known, and all points count as standing");
+    table.text("class ids do not say what moves, so DA and AA are unknown and all points count as static");
   } else if (d.moving_points == 0) {
-    table.text("there is no point of a moving thing (raw labels 252 to 259), so DA and AA are not known");
+    table.text("no point is of a moving object (raw labels 252 to 259), so DA and AA are unknown");
   }
   if (quality.unknown_labels > 0) {
     table.text(std::to_string(quality.unknown_labels) + " of " + std::to_string(quality.labels) +
@@ -160,7 +163,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"accuracy_map", s.map.accuracy()},
                   {"accuracy_input", s.input.accuracy()},
                   {"calibration_error", s.reliability.error()},
-                  {"sparsification_error", s.sparsificationError},
+                  {"sparsification_error", s.sparsification_error},
                   {"median_ms", quality.median_ms},
                   {"labels_not_in_table", quality.unknown_labels},
                   {"classes", Json::array()}};

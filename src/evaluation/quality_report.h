@@ -1,30 +1,30 @@
-/// @file The figures of evaluate_map, for people and programs.
+/// @file The figures of evaluate_map as a table and as JSON.
 #pragma once
 
 #include <optional>
 #include <string>
 
-#include "evaluation/dynamics.h"
-#include "evaluation/semantics.h"
-#include "evaluation/truth.h"
+#include "evaluation/dynamics_evaluation.h"
+#include "evaluation/semantic_evaluation.h"
+#include "evaluation/truth_evaluation.h"
 
 namespace bki_mapping::tools {
 
 struct MapQuality {
   DynamicsQuality dynamics;
   SemanticQuality semantics;
-  std::optional<simulation::TruthQuality> truth;   ///< of simulated drives
+  std::optional<simulation::TruthQuality> truth;   ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
-  double median_ms = 0.0;                          ///< time of a scan
-  bool labels_are_ids = false;                     ///< which do not tell what moves
-  std::size_t labels = 0, unknown_labels = 0;      ///< of all points; of these, not in the class table
-  std::uint32_t unknown_label = 0;                 ///< one of these
+  double median_ms = 0.0;                          ///< median time of a scan [ms]
+  bool labels_are_ids = false;                     ///< so that it is unknown what moves
+  std::size_t labels = 0, unknown_labels = 0;      ///< labels of all points; those not in the class table
+  std::uint32_t unknown_label = 0;                 ///< an example of the latter
 };
 
-/// A table, one figure a line, with what it means; "-" for shares of nothing.
+/// A table with one figure per line and its meaning; "-" for fractions of nothing.
 std::string qualityTable(const MapQuality& quality, const ClassTable& classes);
 
-/// JSON; docs/files.md describes it. Shares of nothing are null.
+/// JSON; docs/files.md describes it. Fractions of nothing are null.
 std::string qualityJson(const MapQuality& quality, const ClassTable& classes);
 
 }  // namespace bki_mapping::tools

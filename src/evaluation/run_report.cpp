@@ -2,8 +2,6 @@
 
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <cmath>
 #include <iomanip>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +9,7 @@
 
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/parameters.h"
+#include "core/quantile.h"
 
 namespace bki_mapping {
 namespace {
@@ -67,7 +66,7 @@ Json scanJson(const ScanReport& scan) {
           {"update_ms", s.update_ms}};
 }
 
-/// What became of the points that are not in the map; "" if all are.
+/// Why points were left out of the map, and how many; "" if all are in it.
 std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig& config) {
   PointCounts sum;
   std::size_t refused = 0;
@@ -99,13 +98,6 @@ std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig
 }
 
 }  // namespace
-
-double quantile(std::vector<double> values, double p) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
-  return values[std::min(std::max<std::size_t>(rank, 1), values.size()) - 1];
-}
 
 std::size_t peakResidentBytes() {
   rusage usage{};

@@ -1,4 +1,4 @@
-/// @file What a run did, as JSON.
+/// @file The report of a run: as JSON, and as a few lines of text.
 #pragma once
 
 #include <string>
@@ -14,10 +14,7 @@ struct ScanReport {
   ScanStats stats;
 };
 
-/// The p-quantile of some values (nearest rank), 0 if there are none. @param p in [0, 1].
-double quantile(std::vector<double> values, double p);
-
-/// The largest resident size that this process has had so far [bytes].
+/// The peak resident memory of this process so far [bytes].
 std::size_t peakResidentBytes();
 
 /// The report of a run; docs/files.md describes its fields.

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr char kMark[] = ".bki_mapping-";
 constexpr char kSuffixLetters[] = "abcdefghijklmnopqrstuvwxyz0123456789";
 constexpr std::size_t kSuffixLength = 6;
-/// The mark, the longest process id, a dash and the suffix.
+/// Length of the mark, the longest process id, a dash and the suffix.
 constexpr std::size_t kLongestTail = sizeof(kMark) - 1 + 10 + 1 + kSuffixLength;
 
 fs::path folderOf(const fs::path& file) {
@@ -37,7 +37,7 @@ const char* kindOf(mode_t mode) {
   return "a device";
 }
 
-/// Where a path leads to, also if nothing is there yet. @param old what is there, if `exists`.
+/// Resolves links, also those to a file that does not exist yet. @param old status of the file, if `exists`.
 fs::path followLinks(const std::string& path, bool& exists, struct stat& old) {
   exists = stat(path.c_str(), &old) == 0;
   if (exists && !S_ISREG(old.st_mode)) {
@@ -52,11 +52,11 @@ fs::path followLinks(const std::string& path, bool& exists, struct stat& old) {
   return target;
 }
 
-/// What the names of all temporaries of a file begin with; shortened where the names would be too long.
+/// Common prefix of the temporary files of a target; shortened to keep within the file system's name limit.
 std::string temporaryPrefix(const fs::path& target) {
   const long limit = pathconf(folderOf(target).c_str(), _PC_NAME_MAX);
-  const std::size_t most = std::max<std::size_t>(limit > 0 ? static_cast<std::size_t>(limit) : 255, 64);
-  return "." + target.filename().string().substr(0, most - 1 - kLongestTail) + kMark;
+  const std::size_t max_length = std::max<std::size_t>(limit > 0 ? static_cast<std::size_t>(limit) : 255, 64);
+  return "." + target.filename().string().substr(0, max_length - 1 - kLongestTail) + kMark;
 }
 
 std::string randomSuffix() {
@@ -67,18 +67,19 @@ std::string randomSuffix() {
   return suffix;
 }
 
-/// Whether this user's process has left a temporary file for good.
+/// Whether a temporary file of this user was left by a process that has ended.
 bool isAbandoned(const fs::path& temporary, pid_t process) {
   const int file = open(temporary.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (file < 0) return false;
   struct stat status {};
   const bool own = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid();
-  const bool taken = flock(file, LOCK_EX | LOCK_NB) == 0, locked = !taken && errno == EWOULDBLOCK;
+  const bool acquired = flock(file, LOCK_EX | LOCK_NB) == 0, locked = !acquired && errno == EWOULDBLOCK;
   close(file);
   const bool gone = kill(process, 0) != 0 && errno == ESRCH;
-  // In a container each run may have the same id. This process locks its files before it writes to them.
-  const bool of_namesake = process == getpid() && taken && status.st_size > 0;
-  return own && !locked && (gone || of_namesake);
+  // In a container every run may have the same process id. A file of this process is locked before it has
+  // content, so that an unlocked file with content is from an earlier run.
+  const bool of_earlier_run = process == getpid() && acquired && status.st_size > 0;
+  return own && !locked && (gone || of_earlier_run);
 }
 
 void removeAbandoned(const fs::path& folder, const std::string& prefix) {
@@ -95,13 +96,14 @@ void removeAbandoned(const fs::path& folder, const std::string& prefix) {
   }
 }
 
-/// As far as this user may.
+/// Gives a new file the owner and group of the one it replaces, as far as this user has the right to.
 void keepOwner(int file, const struct stat& old) {
   [[maybe_unused]] const int group = fchown(file, static_cast<uid_t>(-1), old.st_gid);
   [[maybe_unused]] const int user = fchown(file, old.st_uid, static_cast<gid_t>(-1));
 }
 
-/// Makes a renaming last. Some file systems cannot, and some folders cannot be opened: the file is whole.
+/// Makes a renaming durable. Reports only errors of the disk: where a file system or a folder does not
+/// support this, the file is complete all the same.
 void syncFolder(const std::string& path, const fs::path& folder) {
   const int opened = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (opened < 0) return;
@@ -134,11 +136,11 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path) {
   removeAbandoned(folderOf(target), prefix);
   do {
     temporary_ = (folderOf(target) / (prefix + std::to_string(getpid()) + "-" + randomSuffix())).string();
-    // The kernel applies the umask; what an old file hides from others is hidden from the beginning.
+    // The kernel applies the umask. Before it replaces a file, 0600 keeps the content private until commit().
     file_ = open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, exists ? 0600 : 0666);
   } while (file_ < 0 && errno == EEXIST);
   if (file_ < 0) throw writeFailure(path_, std::strerror(errno));
-  flock(file_, LOCK_EX | LOCK_NB);  // where there are no locks, the process id alone says whose it is
+  flock(file_, LOCK_EX | LOCK_NB);  // optional: without locks, isAbandoned relies on the process id
   struct stat made {};
   fstat(file_, &made);
   mode_ = (exists ? old : made).st_mode & 0777;

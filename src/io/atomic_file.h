@@ -1,4 +1,4 @@
-/// @file Files that appear whole or not at all.
+/// @file Atomic writing of files: a reader sees the old file or the complete new one.
 #pragma once
 
 #include <sys/types.h>
@@ -8,40 +8,41 @@
 
 namespace bki_mapping {
 
-/// A new file under a temporary name beside its place. commit() puts it there in one step; without it, the
-/// file that was there before stays, and the temporary one is removed. Links are followed: they stay, and
-/// what they point to is replaced. An old file's permissions and owner are kept, a new one honours the umask.
-/// Temporaries that killed processes left for the same place are removed.
+/// A temporary file in the target's folder, which commit() renames to the target. Without commit() the target
+/// stays as it was, and the destructor removes the temporary file. A link is followed: it stays, and the file
+/// it points to is replaced. The permissions and owner of a replaced file are kept; a new one follows the
+/// umask. The constructor removes temporary files that killed processes left for the same target.
 class AtomicFile {
  public:
-  /// @throws std::runtime_error in one sentence if the folder cannot be written to, or if something other
-  /// than a regular file (a folder, a device, a pipe, a loop of links) is at the place.
+  /// @throws std::runtime_error in one sentence if the folder cannot be written to, or if `path` is something
+  /// other than a regular file: a folder, a device, a pipe or a loop of links.
   explicit AtomicFile(const std::string& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Where to write; it must not be replaced by another file.
+  /// The file to write to. It must be written in place, not replaced: the lock belongs to this file.
   const std::string& temporaryPath() const { return temporary_; }
   /// Appends bytes. @throws std::runtime_error as writeFailure.
   void write(const std::string& bytes);
-  /// @throws std::runtime_error as writeFailure: the data cannot reach the disk, or the place be taken.
+  /// @throws std::runtime_error as writeFailure if the data cannot reach the disk, or the renaming fails.
   void commit();
 
  private:
   std::string path_, target_, temporary_;
-  int file_ = -1;  ///< the temporary file, open and locked for as long as this lives
+  int file_ = -1;  ///< the temporary file, open and locked until destruction
   mode_t mode_ = 0;
   bool committed_ = false;
 };
 
-/// One sentence that names the file, the reason and the space that is free in its folder.
+/// An error with one sentence: the file, the reason, and the free space in its folder.
 std::runtime_error writeFailure(const std::string& path, const std::string& reason);
 
-/// @throws std::runtime_error as AtomicFile's constructor. Asked before long work, nothing is lost by it.
+/// Checks that AtomicFile can be created, so that long work does not end in a result that cannot be written.
+/// @throws std::runtime_error as AtomicFile's constructor.
 void checkWritable(const std::string& path);
 
-/// Writes a text file whole or not at all. @throws std::runtime_error naming the file and the reason.
+/// Writes a text file by AtomicFile. @throws std::runtime_error naming the file and the reason.
 void writeTextFile(const std::string& path, const std::string& text);
 
 }  // namespace bki_mapping

@@ -63,7 +63,7 @@ std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::
   return static_cast<std::uint8_t>(value);
 }
 
-/// @param owner of the keys, for the message.
+/// @param owner what the keys belong to, for the message.
 void checkKeys(const std::string& file, const YAML::Node& map, const std::string& owner,
                const std::vector<std::string>& known) {
   for (const auto& entry : map) {
@@ -74,14 +74,14 @@ void checkKeys(const std::string& file, const YAML::Node& map, const std::string
   }
 }
 
-/// @param owner of the name, for the message.
+/// @param owner what the name belongs to, for the message.
 std::string nameOf(const std::string& file, const YAML::Node& node, const std::string& owner) {
   const std::string name = node.IsNull() ? "" : node.as<std::string>();
   if (name.empty()) fail(file, "the name of " + owner + " is empty");
   return name;
 }
 
-/// @param number of the class in the list, from 1 on.
+/// @param number position of the class in the list, counted from 1.
 SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::size_t number) {
   if (!node.IsMap()) fail(file, "class " + std::to_string(number) + " of the list is no map");
   checkKeys(file, node, "a class", {"id", "name", "color", "raw", "flags", "free_gain"});

@@ -25,7 +25,7 @@ void flatten(const YAML::Node& node, const std::string& name, std::map<std::stri
   }
 }
 
-/// A sentence as lines of comment, of at most 100 characters.
+/// Wraps a sentence into comment lines of at most 100 characters.
 std::string comment(const std::string& sentence, const std::string& indent) {
   std::istringstream words(sentence);
   std::string text, line = indent + "#";

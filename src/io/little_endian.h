@@ -1,4 +1,4 @@
-/// @file Values as bytes.
+/// @file Serialises values as little-endian bytes.
 #pragma once
 
 #include <cstring>
@@ -6,7 +6,7 @@
 
 namespace bki_mapping {
 
-/// Appends a value's bytes, little-endian (as all hosts that ROS 1 supports are).
+/// Appends a value's bytes in host order, which is little-endian on all platforms of ROS 1.
 template <typename T>
 void appendBytes(std::string& bytes, T value) {
   char raw[sizeof(T)];

@@ -38,7 +38,7 @@ std::string plyBytes(const std::vector<VoxelRecord>& voxels, double resolution) 
 
 std::string pcdBytes(const std::vector<VoxelRecord>& voxels) {
   const pcl::PCLPointCloud2 cloud = toPcl(voxels);
-  // PCL's own writer maps the file into memory: where the disk fills up meanwhile, the process dies.
+  // PCL's own writer maps the file into memory, and the process dies if the disk fills up meanwhile.
   return pcl::PCDWriter().generateHeaderBinary(cloud, Eigen::Vector4f::Zero(),
                                                Eigen::Quaternionf::Identity()) +
          "DATA binary\n" + std::string(cloud.data.begin(), cloud.data.end());

@@ -25,7 +25,7 @@ std::ifstream openFile(const fs::path& path, const std::string& remedy) {
   return file;
 }
 
-/// The numbers of each line; empty lines at the end are left out.
+/// The numbers of each line; trailing empty lines are dropped.
 std::vector<std::vector<double>> readNumberLines(const fs::path& path, const std::string& remedy) {
   std::ifstream file = openFile(path, remedy);
   std::vector<std::vector<double>> lines;
@@ -90,7 +90,7 @@ std::vector<T> readBinary(const fs::path& path, std::size_t record) {
   return values;
 }
 
-/// The names of scans, without their ending, by number.
+/// The file names of the scans, without their extension, by number.
 std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     fail(folder.string() + " is no folder; give the folder of a sequence, with velodyne/ inside");
@@ -106,10 +106,10 @@ std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
       fail(entry.path().string() + " is not named by the number of its scan; rename it to NNNNNN.bin, line " +
            "NNNNNN + 1 of poses.txt being its pose, or move it elsewhere");
     }
-    const auto [place, is_new] = names.emplace(number, name);
+    const auto [known, is_new] = names.emplace(number, name);
     if (!is_new) {
-      fail(folder.string() + ": scans " + std::min(place->second, name) + " and " +
-           std::max(place->second, name) + " have the same number; remove one");
+      fail(folder.string() + ": scans " + std::min(known->second, name) + " and " +
+           std::max(known->second, name) + " have the same number; remove one");
     }
   }
   if (names.empty()) fail(folder.string() + " holds no scans (*.bin)");
@@ -166,18 +166,18 @@ Sequence::Sequence(const std::string& folder, const std::string& labels) : folde
 }
 
 std::string Sequence::gaps() const {
-  constexpr std::size_t kMostNamed = 10;
+  constexpr std::size_t kMaxNamed = 10;
   std::string text;
   std::size_t missing = 0, ranges = 0;
   for (std::size_t i = 1; i < numbers_.size(); ++i) {
     const std::size_t from = numbers_[i - 1] + 1, to = numbers_[i] - 1;
     if (from > to) continue;
     missing += to - from + 1;
-    if (++ranges > kMostNamed) continue;
+    if (++ranges > kMaxNamed) continue;
     text += (text.empty() ? "" : ", ") + sixDigits(from) + (from < to ? " to " + sixDigits(to) : "");
   }
   if (missing == 0) return "";
-  if (ranges > kMostNamed) text += " and others (" + std::to_string(missing) + " in all)";
+  if (ranges > kMaxNamed) text += " and others (" + std::to_string(missing) + " in all)";
   return (missing == 1 ? "scan " + text + " is" : "scans " + text + " are") + " missing in " +
          (fs::path(folder_) / "velodyne").string();
 }
@@ -192,7 +192,7 @@ SequenceFrame Sequence::read(std::size_t i) const {
     fail(label.string() + " has " + std::to_string(frame.labels.size()) + " labels, but " + scan.string() +
          " has " + std::to_string(values.size() / 4) + " points; they must be as many");
   }
-  for (std::uint32_t& raw : frame.labels) raw &= 0xffffu;  // the upper half is the instance
+  for (std::uint32_t& raw : frame.labels) raw &= 0xffffu;  // the upper 16 bits are the instance id
   frame.points.reserve(values.size() / 4);
   frame.remissions.reserve(values.size() / 4);
   for (std::size_t p = 0; p < values.size(); p += 4) {

@@ -1,12 +1,12 @@
-/// @file Where the package's own files are, in a build tree and in an installation.
+/// @file Locates the package's own files, in a build tree and in an installation.
 #pragma once
 
 #include <string>
 
 namespace bki_mapping {
 
-/// The folder with config/, launch/ and so on: share/bki_mapping beside the library's folder when installed,
-/// else the source tree it was built from.
+/// The folder with config/, launch/ and so on: share/bki_mapping next to the library's folder if installed,
+/// otherwise the source tree that the library was built from.
 std::string sharePath();
 
 }  // namespace bki_mapping

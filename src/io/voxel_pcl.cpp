@@ -7,7 +7,7 @@ namespace {
 
 using Field = pcl::PCLPointField;
 
-/// Appends a field behind those that are there.
+/// Appends a field after the existing ones.
 void addField(const char* name, std::uint8_t datatype, std::uint32_t size, pcl::PCLPointCloud2& cloud) {
   Field field;
   field.name = name;

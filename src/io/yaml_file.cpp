@@ -13,7 +13,7 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::size_t kMostBytes = 1000000, kMostLevels = 32, kMostNodes = 100000;
+constexpr std::size_t kMaxBytes = 1000000, kMaxLevels = 32, kMaxNodes = 100000;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw YAML::Exception(YAML::Mark::null_mark(), why);
@@ -23,7 +23,7 @@ constexpr std::size_t kMostBytes = 1000000, kMostLevels = 32, kMostNodes = 10000
   refuse("line " + std::to_string(mark.line + 1) + ": " + why);
 }
 
-/// Refuses what is too large, while the parser reads and before it goes deeper.
+/// Checks the limits while the parser reads, before it descends further.
 class Bounds : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark& mark) override {
@@ -60,11 +60,11 @@ class Bounds : public YAML::EventHandler {
   void OnMapEnd() override { end(); }
 
  private:
-  /// The size of a node with all aliases followed.
+  /// Size of a node with all aliases expanded.
   struct Extent {
     std::size_t nodes = 0, levels = 0;
   };
-  /// A list or map that has begun.
+  /// A list or map whose end has not been read yet.
   struct Open {
     YAML::anchor_t anchor;
     bool is_map;
@@ -74,7 +74,7 @@ class Bounds : public YAML::EventHandler {
     std::set<std::string> keys;
   };
 
-  /// @param text of a scalar.
+  /// @param text of a scalar; nullptr for other nodes.
   void addChild(const YAML::Mark& mark, const std::string* text) {
     if (open_.empty() || !open_.back().is_map) return;
     Open& map = open_.back();
@@ -86,18 +86,18 @@ class Bounds : public YAML::EventHandler {
 
   void addNodes(const YAML::Mark& mark, std::size_t count) {
     nodes_ += count;
-    if (nodes_ > kMostNodes) {
+    if (nodes_ > kMaxNodes) {
       refuse(mark,
-             "it has more than " + std::to_string(kMostNodes) + " nodes, aliases followed; the limit is");
+             "it has more than " + std::to_string(kMaxNodes) + " nodes, aliases followed; the limit is");
     }
   }
 
-  /// Below the innermost that is open.
+  /// Counts levels below the innermost open list or map.
   void addLevels(const YAML::Mark& mark, std::size_t levels) {
-    if (open_.size() + levels > kMostLevels) {
-      refuse(mark, "lists and maps are nested more than " + std::to_string(kMostLevels) + " levels deep");
+    if (open_.size() + levels > kMaxLevels) {
+      refuse(mark, "lists and maps are nested more than " + std::to_string(kMaxLevels) + " levels deep");
     }
-    // Only the innermost learns it now, the others when it ends.
+    // The outer ones are updated in end(), which avoids a walk over all of them for every node.
     if (!open_.empty()) open_.back().levels = std::max(open_.back().levels, levels + 1);
   }
 
@@ -119,16 +119,16 @@ class Bounds : public YAML::EventHandler {
 
   std::size_t documents_ = 0, nodes_ = 0;
   std::vector<Open> open_;
-  std::map<YAML::anchor_t, Extent> extents_;  ///< of nodes that have ended
+  std::map<YAML::anchor_t, Extent> extents_;  ///< of complete nodes
 };
 
 std::string textOf(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string text(kMostBytes + 1, '\0');
+  std::string text(kMaxBytes + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (file.bad() || (file.fail() && !file.eof())) refuse("it cannot be read; check the path");
   text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMostBytes) refuse("it is larger than 1 MB");
+  if (text.size() > kMaxBytes) refuse("it is larger than 1 MB");
   return text;
 }
 

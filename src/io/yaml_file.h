@@ -1,4 +1,4 @@
-/// @file YAML files that others wrote.
+/// @file Reads untrusted YAML files.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -7,11 +7,10 @@
 
 namespace bki_mapping {
 
-/// Reads a YAML file of one document. What would take the memory, the stack or the time of whoever walks
-/// through it is refused before any node is made: more than 1 MB, more than 32 levels, more than 100,000
-/// nodes with all aliases followed, an alias to a node that it is in; so are keys that are no plain text, or
-/// twice in a map.
-/// @throws YAML::Exception in one sentence, which leaves it to the caller to name the file.
+/// Reads a YAML file of one document. Limits protect memory, stack and time of the program, and are checked
+/// before any node is created: 1 MB, 32 levels, 100,000 nodes with all aliases expanded, no alias to a node
+/// that contains it. Every key must be plain text and unique in its map.
+/// @throws YAML::Exception in one sentence, to which the caller adds the name of the file.
 YAML::Node loadYamlFile(const std::string& path);
 
 }  // namespace bki_mapping

@@ -15,7 +15,7 @@ std::string pathIn(const std::string& folder) {
   return (std::filesystem::path(folder) / "simulation.yaml").string();
 }
 
-/// Calls visit(name, value) for each setting.
+/// Calls visit(name, value) for each setting, in the order of the file.
 template <typename Config, typename Visit>
 void forEachSetting(Config& config, Visit&& visit) {
   visit("scans", config.scans);

@@ -14,11 +14,11 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 
 struct Return {
-  double range = 0.0;  ///< [m]; 0: none
+  double range = 0.0;  ///< [m]; 0: no return
   std::uint32_t label = 0;
 };
 
-/// Standard normal number from a counter (Box and Muller 1958).
+/// Standard normal random number from a counter (Box and Muller 1958).
 double normal(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam) {
   const double u = 1.0 - counterRandom(seed, scan, beam, 0), v = counterRandom(seed, scan, beam, 1);
   return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * kPi * v);
@@ -38,7 +38,7 @@ Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const E
   return nearest.range < max_range ? nearest : Return{};
 }
 
-/// The shapes that a vertical fan of beams may meet.
+/// The shapes that a vertical fan of beams may hit.
 std::vector<const Shape*> shapesInFan(const Scene& scene, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double time, double max_range) {
   std::vector<const Shape*> shapes;
@@ -77,7 +77,8 @@ const DriveConfig& checked(const DriveConfig& config) {
     throw std::invalid_argument(std::string(l.name) + " is " + numberText(l.value) + ", but must be from " +
                                 numberText(l.least) + " to " + numberText(l.most));
   }
-  if (!(config.speed * config.scans / lidar.rate <= 1e6)) {  // before the street takes memory
+  if (!(config.speed * config.scans / lidar.rate <=
+        1e6)) {  // before makeStreet allocates a street of this length
     throw std::invalid_argument(
         "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
   }
@@ -127,7 +128,7 @@ Drive::Drive(const DriveConfig& config)
                         config.seed)) {}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
-  // In the right lane, weaving a little, 1.73 m above the ground.
+  // In the right lane, weaving slightly, 1.73 m above the ground as in KITTI.
   const double x = config_.speed * timeOf(i), wave = 0.06;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translation() = Eigen::Vector3d(x, -1.5 + 0.3 * std::sin(wave * x), 1.73);

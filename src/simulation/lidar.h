@@ -8,25 +8,25 @@ namespace bki_mapping::simulation {
 
 struct LidarConfig {
   int beams = 64;             ///< rows, spread evenly in elevation
-  int columns = 1800;         ///< azimuth steps a turn
+  int columns = 1800;         ///< azimuth steps per revolution
   double lowest = -0.43;      ///< elevation of the first row [rad]
   double highest = 0.04;      ///< elevation of the last row [rad]
-  double max_range = 80.0;    ///< no return beyond this [m]
+  double max_range = 80.0;    ///< range beyond which there is no return [m]
   double range_noise = 0.02;  ///< standard deviation [m]
-  double label_noise = 0.0;   ///< share of points with the label of a random shape
-  double rate = 10.0;         ///< turns a second
+  double label_noise = 0.0;   ///< fraction of points with the label of a random shape
+  double rate = 10.0;         ///< revolutions per second [Hz]
   std::uint64_t seed = 1;     ///< of the noise
 };
 
-/// One turn, taken at one moment (no motion within it).
-/// @param T_world_sensor pose at that moment. @param time [s]. @param scan number, a key of the noise.
-/// @return points in the sensor frame with raw SemanticKITTI labels; pose and stamp are left to the caller.
+/// Simulates one revolution without motion distortion: all beams are taken at the same time and pose.
+/// @param time [s]. @param scan index of the scan, which seeds its noise.
+/// @return points in the sensor frame with raw SemanticKITTI labels; the caller sets pose and stamp.
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
                    double time, std::uint64_t scan);
 
-/// All that a drive depends on.
+/// The settings that determine a drive: equal settings give equal scans.
 struct DriveConfig {
-  int scans = 100;         ///< length of the drive
+  int scans = 100;         ///< number of scans
   double speed = 8.0;      ///< [m/s]
   std::uint64_t seed = 1;  ///< of the street
   LidarConfig lidar;
@@ -42,7 +42,7 @@ class Drive {
   const Scene& scene() const { return scene_; }
   double timeOf(std::size_t i) const { return static_cast<double>(i) / config_.lidar.rate; }  ///< [s]
   Eigen::Isometry3d T_world_sensor(std::size_t i) const;
-  /// Frame i, with its pose in the map frame (the sensor's at frame 0) and its stamp.
+  /// Frame i with its stamp and its pose in the map frame, which is the sensor's frame at frame 0.
   SequenceFrame frame(std::size_t i) const;
 
  private:

@@ -9,13 +9,13 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Turns a vector about the vertical by -yaw: from the world into a box's axes.
+/// Rotates a vector about the vertical by -yaw: from the world's axes to those of a box.
 Eigen::Vector3d intoAxes(const Eigen::Vector3d& v, double yaw) {
   const double c = std::cos(yaw), s = std::sin(yaw);
   return {c * v.x() + s * v.y(), -s * v.x() + c * v.y(), v.z()};
 }
 
-/// The stretch of a ray inside a slab |coordinate| <= half.
+/// Clips the interval [enter, leave] of a ray to a slab |coordinate| <= half.
 void clipToSlab(double origin, double direction, double half, double& enter, double& leave) {
   if (direction == 0.0) {
     if (std::abs(origin) > half) leave = -kInfinity;
@@ -26,7 +26,7 @@ void clipToSlab(double origin, double direction, double half, double& enter, dou
   leave = std::min(leave, std::max(a, b));
 }
 
-/// The stretch of a ray where a quadratic a t^2 + 2 b t + c is below 0.
+/// Clips the interval [enter, leave] of a ray to where a t^2 + 2 b t + c < 0.
 void clipToQuadric(double a, double b, double c, double& enter, double& leave) {
   const double discriminant = b * b - a * c;
   if (a <= 0.0) {
@@ -58,7 +58,7 @@ bool Shape::contains(const Eigen::Vector3d& point, double time) const {
 
 std::optional<double> Shape::hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                  double time) const {
-  // In axes where the shape has half extents 1.
+  // In coordinates where the shape has half extents 1.
   const Eigen::Vector3d o = intoAxes(origin - centreAt(time), yaw).cwiseQuotient(half);
   const Eigen::Vector3d d = intoAxes(direction, yaw).cwiseQuotient(half);
   double enter = 0.0, leave = kInfinity;

@@ -6,12 +6,12 @@
 namespace bki_mapping::simulation {
 namespace {
 
-// Raw SemanticKITTI numbers.
+// Raw SemanticKITTI labels.
 constexpr std::uint32_t kCar = 10, kPerson = 30, kBuilding = 50, kFence = 51, kVegetation = 70, kTrunk = 71,
                         kPole = 80, kSign = 81, kMovingCar = 252, kMovingPerson = 254;
 constexpr double kStart = -30.0;  ///< where the street begins [m]
 
-/// Draws numbers one after the other.
+/// A sequence of random numbers.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : seed_(seed) {}
@@ -100,7 +100,7 @@ Scene makeStreet(double length, std::uint64_t seed) {
       addPedestrian(x, side * dice.between(6.6, 7.6), speed, shapes);
     }
   }
-  // Traffic: one car ahead in the sensor's lane (y = -1.5), others towards it.
+  // Traffic: one car ahead in the sensor's lane (y = -1.5), others oncoming.
   addCar(14.0, -1.5, 9.0, shapes);
   for (double x = 35.0; x < kStart + 2.5 * length; x += dice.between(30.0, 45.0))
     addCar(x, 1.5, -9.0, shapes);

@@ -13,8 +13,8 @@ bool VoxelTruth::anyPoint(const VoxelIndex& voxel, Visit&& visit) const {
   const Eigen::Vector3d corner = Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
   for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
     const Eigen::Vector3d inside(i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints));
-    const Eigen::Vector3d place = corner + (inside + Eigen::Vector3d::Constant(0.5)) / kPoints;
-    if (visit(T_world_map_ * (place * geometry_.resolution()))) return true;
+    const Eigen::Vector3d point = corner + (inside + Eigen::Vector3d::Constant(0.5)) / kPoints;
+    if (visit(T_world_map_ * (point * geometry_.resolution()))) return true;
   }
   return false;
 }

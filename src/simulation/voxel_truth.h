@@ -1,4 +1,4 @@
-/// @file What is really in the voxels of a simulated drive.
+/// @file Ground truth of the voxels of a simulated drive.
 #pragma once
 
 #include <functional>
@@ -9,35 +9,35 @@
 
 namespace bki_mapping::simulation {
 
-/// The ground truth of a scene in the voxels of its map. A voxel is told by 4 x 4 x 4 points spread evenly in
-/// it.
+/// The ground truth of a scene on the voxel grid of its map. Each voxel is sampled at 4 x 4 x 4 evenly spaced
+/// points.
 class VoxelTruth {
  public:
   VoxelTruth(Scene scene, const Eigen::Isometry3d& T_world_map, const GridGeometry& geometry);
-  /// That of a drive, whose map frame is the sensor's at its start.
+  /// The ground truth of a drive, whose map frame is the sensor's first frame.
   static VoxelTruth of(const Drive& drive, const GridGeometry& geometry) {
     return {drive.scene(), drive.T_world_sensor(0), geometry};
   }
   const GridGeometry& geometry() const { return geometry_; }
 
-  /// The raw label of most of the points that are inside of something (ties: the smaller label); none if all
-  /// are free. @param time since the start of the drive [s].
+  /// The most frequent raw label among the sample points inside of something (ties: the smaller label);
+  /// nullopt if all are free. @param time since the start of the drive [s].
   std::optional<std::uint32_t> labelAt(const VoxelIndex& voxel, double time) const;
 
-  /// Whether a shape, grown by `margin` on all sides, reaches one of the points.
-  /// @param wanted asked for the label of a shape. @param margin [m].
+  /// Whether a shape, grown by `margin` on all sides, contains one of the sample points.
+  /// @param margin [m]. @param wanted selects shapes by their label.
   bool isNear(const VoxelIndex& voxel, double time, double margin,
               const std::function<bool(std::uint32_t)>& wanted) const;
   /// The same for shapes of any label and for the ground.
   bool isNearAnything(const VoxelIndex& voxel, double time, double margin) const;
 
  private:
-  static constexpr int kPoints = 4;  // a voxel's edge
+  static constexpr int kPoints = 4;  ///< sample points along the edge of a voxel
 
-  /// Calls visit(point in the world frame) until it returns true. @return whether it did.
+  /// Calls visit(sample point in the world frame) until it returns true. @return whether it did.
   template <typename Visit>
   bool anyPoint(const VoxelIndex& voxel, Visit&& visit) const;
-  /// The shapes that may reach a voxel, grown by `margin`.
+  /// Shapes near enough to reach the voxel, grown by `margin`.
   std::vector<Shape> shapesAt(const VoxelIndex& voxel, double time, double margin) const;
 
   Scene scene_;

@@ -24,7 +24,7 @@ void draw(const std::string& name, const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) command += " " + quoted(argument);
   const int status = std::system(command.c_str());
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    throw std::runtime_error("what was measured is written, but not drawn: " + program +
+    throw std::runtime_error("the measurements are written, but not drawn: " + program +
                              " failed; it needs python3-matplotlib");
   }
 }

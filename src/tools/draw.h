@@ -1,4 +1,4 @@
-/// @file Pictures, drawn by the scripts of the package.
+/// @file Runs the plotting scripts of the package.
 #pragma once
 
 #include <string>

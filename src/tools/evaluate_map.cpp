@@ -1,4 +1,5 @@
-// Maps a sequence with labels of moving things, and measures what the map kept and what it forgot.
+// Maps a labelled sequence and measures the quality of the map: static and moving objects, classes,
+// calibration.
 #include <filesystem>
 #include <iostream>
 
@@ -6,8 +7,8 @@
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "core/quantile.h"
 #include "evaluation/quality_report.h"
-#include "evaluation/run_report.h"
 #include "io/atomic_file.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
@@ -18,25 +19,26 @@ namespace {
 using namespace bki_mapping;
 namespace po = tools::po;
 
-/// On simulated drives, ghosts are counted after every so many scans.
+/// On simulated drives, ghosts are counted after every kGhostsEvery scans.
 constexpr std::size_t kGhostsEvery = 10;
 
 po::options_description options() {
   po::options_description options("Options");
-  options.add_options()("json", po::value<std::string>()->value_name("FILE.json"), "figures to write")(
+  options.add_options()("json", po::value<std::string>()->value_name("FILE.json"),
+                        "JSON file for the figures")(
       "errors", po::value<std::string>()->value_name("FILE.png"),
-      "picture of the errors from above to draw, with their FILE.csv beside it")(
+      "picture of the errors seen from above; FILE.csv lists them")(
       "late", tools::countOption("--late", 0)->value_name("N")->default_value(3),
-      "voxels hit in the last N scans need not be cleared")(
-      "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("SHARE")->default_value(0.0),
-      "give the mapper this share of labels wrong")(
+      "voxels hit in the last N scans do not count for DA")(
+      "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("FRACTION")->default_value(0.0),
+      "fraction of the labels replaced by wrong ones")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
-      "same seed, same wrong labels");
+      "seed of --label-noise");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
 
-/// All that is compared with the map of one run.
+/// The measures of one run.
 struct Evaluation {
   DynamicsEvaluation dynamics;
   SemanticEvaluation semantics;
@@ -46,10 +48,10 @@ struct Evaluation {
   std::size_t labels = 0, unknown_labels = 0;
   std::uint32_t unknown_label = 0;
 
-  /// @param told the labels that the mapper was given.
-  void add(const Scan& scan, const std::vector<std::uint32_t>& told, const ClassTable& classes) {
+  /// @param predicted the labels given to the mapper.
+  void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes) {
     dynamics.add(scan, classes);
-    semantics.add(scan, told, classes);
+    semantics.add(scan, predicted, classes);
     if (truth) truth->add(scan);
     labels += scan.labels.size();
     for (const std::uint32_t label : scan.labels) {
@@ -73,7 +75,7 @@ struct Evaluation {
     return quality;
   }
 
-  /// One row a voxel: its centre and what became of it; errors last, so that they are seen.
+  /// One row per voxel: its centre and its outcome. Errors come last, so that they are drawn on top.
   std::string errorRows(const SemanticMap& map) const {
     std::string csv = "x,y,z,what\n";
     const auto add = [&](const VoxelIndex& voxel, const char* what) {
@@ -121,12 +123,12 @@ int evaluate(const po::variables_map& given) {
   for (std::size_t i = first; i < last; ++i) {
     Scan scan = sequence.read(i).scan();
     scan.labels_are_ids = mapper.config().label_values == LabelValues::kId;
-    Scan told = scan;
+    Scan input = scan;
     if (noise > 0.0) {
-      told.labels = withLabelNoise(scan, mapper.classes(), noise, tools::count(given, "noise-seed"));
+      input.labels = withLabelNoise(scan, mapper.classes(), noise, tools::count(given, "noise-seed"));
     }
-    times.push_back(mapper.integrate(told).totalMs());
-    evaluation.add(scan, told.labels, mapper.classes());
+    times.push_back(mapper.integrate(input).totalMs());
+    evaluation.add(scan, input.labels, mapper.classes());
     if (drive) {
       evaluation.end = drive->timeOf(sequence.number(i));
       const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;
@@ -151,8 +153,8 @@ int evaluate(const po::variables_map& given) {
 
 int main(int argc, char** argv) {
   return tools::run("evaluate_map", [&] {
-    const auto given = tools::parse(
-        argc, argv, "Measures what a map keeps of standing things and forgets of moving ones.", options());
+    const auto given =
+        tools::parse(argc, argv, "Maps a sequence and measures the quality of the map.", options());
     return given ? evaluate(*given) : 0;
   });
 }

@@ -1,4 +1,4 @@
-// Maps a sequence in SemanticKITTI's layout, without ROS: scans in, a map file and a report out.
+// Maps a sequence in SemanticKITTI's layout without ROS, and writes a map file and a report.
 #include <algorithm>
 #include <iomanip>
 #include <iostream>
@@ -20,10 +20,10 @@ namespace po = tools::po;
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("output", text("FILE.ply|FILE.pcd"), "map file to write")(
+  options.add_options()("output", text("FILE.ply|FILE.pcd"), "map file")(
       "include", text("STATES")->default_value("occupied"), "voxels in the map file: occupied,free,occluded")(
-      "report", text("FILE.json"), "report to write")(
-      "print-config", po::bool_switch(), "print the parameters in force as YAML, and map nothing");
+      "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
+                                                        "print the effective parameters as YAML, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -54,7 +54,7 @@ int mapSequence(const po::variables_map& given) {
     try {
       scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
     } catch (const ScanRefused& refusal) {
-      // The first says it all; the others mostly say the same.
+      // Report the first refusal and count the others, which mostly have the same reason.
       if (refused++ == 0)
         std::cerr << "map_sequence: scan " << sequence.name(i) << ": " << refusal.what() << "\n";
       continue;

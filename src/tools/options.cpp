@@ -68,11 +68,11 @@ po::options_description mapperOptions() {
   po::options_description options("Mapper");
   options.add_options()("classes",
                         po::value<std::string>()->default_value("semantic_kitti")->value_name("NAME|FILE"),
-                        "class table: a name of config/classes, or a YAML file")(
+                        "class table: a name in config/classes, or a YAML file")(
       "config", po::value<std::string>()->value_name("FILE"), "YAML file of parameters")(
       "set", po::value<std::vector<std::string>>()->value_name("NAME=VALUE")->composing(),
-      "set a parameter, each once, after --config; may be given often")(
-      "threads", po::value<std::string>()->value_name("N"), "threads of the update; 0 takes all cores");
+      "set a parameter, overriding --config; repeatable, once per parameter")(
+      "threads", po::value<std::string>()->value_name("N"), "threads of the map update; 0: all cores");
   return options;
 }
 
@@ -109,9 +109,10 @@ po::options_description sequenceOptions() {
   options.add_options()("sequence", po::value<std::string>()->value_name("DIR"),
                         "folder with velodyne/, labels/, poses.txt, calib.txt")(
       "labels", po::value<std::string>()->value_name("FOLDER")->default_value("labels"),
-      "name of the folder with labels")("first", countOption("--first", 0)->value_name("N")->default_value(0),
-                                        "number of the first scan, as in its file's name")(
-      "scans", countOption("--scans", 1)->value_name("N"), "how many of those there are; default all");
+      "name of the folder with the labels")("first",
+                                            countOption("--first", 0)->value_name("N")->default_value(0),
+                                            "number of the first scan, as in its file name")(
+      "scans", countOption("--scans", 1)->value_name("N"), "number of scans; default: all");
   return options;
 }
 

@@ -16,11 +16,11 @@ namespace po = tools::po;
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("output", text("FILE.bag")->required(), "bag to write")(
+  options.add_options()("output", text("FILE.bag")->required(), "output bag")(
       "cloud-topic", text("TOPIC")->default_value("/velodyne_points"), "topic of the clouds")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
       "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
-      "compression", text("KIND")->default_value("none"), "none, lz4 or bz2");
+      "compression", text("KIND")->default_value("none"), "compression: none, lz4 or bz2");
   options.add(tools::sequenceOptions());
   return options;
 }
@@ -51,7 +51,8 @@ int writeBag(const po::variables_map& given) {
     }
     bag->close();
   } catch (const rosbag::BagException& fault) {
-    static_cast<void>(bag.release());  // its destructor would write once more, throw, and end the process
+    static_cast<void>(
+        bag.release());  // leaked on purpose: its destructor would write, throw, and terminate the process
     throw writeFailure(output, fault.what());
   }
   file.commit();

@@ -9,7 +9,7 @@ namespace {
 using namespace bki_mapping;
 namespace po = tools::po;
 
-/// Names a value for the help text, and sets its default.
+/// An option with a default. @param name of its value in the help text.
 template <typename T>
 auto value(const char* name, T standard) {
   return po::value<T>()->value_name(name)->default_value(standard);
@@ -18,16 +18,17 @@ auto value(const char* name, T standard) {
 po::options_description options() {
   const simulation::LidarConfig lidar;
   po::options_description options("Options");
-  options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "folder to write")(
-      "scans", value<int>("N", 100), "how many scans")("beams", value("N", lidar.beams), "rows of the lidar")(
-      "columns", value("N", lidar.columns), "azimuth steps a turn")(
-      "rate", value("HZ", lidar.rate), "turns a second")("max-range", value("M", lidar.max_range),
-                                                         "no return beyond this [m]")(
-      "range-noise", value("M", lidar.range_noise), "standard deviation of ranges [m]")(
-      "label-noise", value("SHARE", lidar.label_noise), "share of points with a wrong label")(
+  options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
+      "scans", value<int>("N", 100), "number of scans")(
+      "beams", value("N", lidar.beams), "rows of the lidar")("columns", value("N", lidar.columns),
+                                                             "azimuth steps per revolution")(
+      "rate", value("HZ", lidar.rate), "revolutions per second")("max-range", value("M", lidar.max_range),
+                                                                 "range beyond which there is no return [m]")(
+      "range-noise", value("M", lidar.range_noise), "standard deviation of the ranges [m]")(
+      "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
       "speed", value("M/S", 8.0), "speed of the drive [m/s]")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
-      "same seed, same street and noise");
+      "seed of the street and of the noise");
   return options;
 }
 

@@ -1,10 +1,10 @@
-// SA, DA and AA on drives made by hand.
+// SA, DA and AA on small drives constructed by hand.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
-#include "evaluation/dynamics.h"
+#include "evaluation/dynamics_evaluation.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
@@ -19,7 +19,7 @@ Scan scanOf(const std::vector<std::pair<Eigen::Vector3f, std::uint32_t>>& points
   return scan;
 }
 
-/// A map in which the voxels of these points are occupied; voxels of 1 m.
+/// A map with voxels of 1 m, in which those of the given points are occupied.
 SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
   SemanticMap map(GridGeometry(1.0), 0.001, 4);
   for (const Eigen::Vector3d& point : occupied) {
@@ -32,7 +32,7 @@ SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
 }
 
 TEST(DynamicsQuality, CountsPointByPoint) {
-  // Label 10 stands, 20 moves, 0 is unlabelled, 99 is in no class. Four scans: two early, one late.
+  // Label 10 is static, 20 moves, 0 is unlabelled, 99 is in no class. Four scans: two early, one late.
   const auto classes = reference::smallTable();
   DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
   evaluation.add(scanOf({{{0.5f, 0, 0}, 10}, {{0.6f, 0, 0}, 10}, {{5.5f, 0, 0}, 20}, {{7.5f, 0, 0}, 20}}),
@@ -51,7 +51,7 @@ TEST(DynamicsQuality, CountsPointByPoint) {
                                              {9, VoxelFate::kKept}}));
   const DynamicsQuality quality = evaluation.compare(map);
   EXPECT_EQ(quality.static_points, 4u);
-  EXPECT_EQ(quality.static_kept, 3u);    // two at 0.5, one at 9.5; 2.5 is lost
+  EXPECT_EQ(quality.static_kept, 3u);    // two at 0.5, one at 9.5; the voxel of 2.5 is not occupied
   EXPECT_EQ(quality.moving_points, 3u);  // at 5.5, 5.6, 7.5; 9.5 is hit late, 11.5 is not early
   EXPECT_EQ(quality.moving_removed, 2u);
   EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.75);

@@ -1,9 +1,9 @@
-// IoU, calibration and ranking by variance on maps made by hand, and label noise.
+// IoU, calibration and ranking by variance on maps constructed by hand, and label noise.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "evaluation/semantics.h"
+#include "evaluation/semantic_evaluation.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
@@ -20,14 +20,14 @@ TEST(Confusion, KnowsIntersectionsAndUnions) {
   EXPECT_DOUBLE_EQ(c.iou(2), 3.0 / (3 + 2 + 1 + 4));
   EXPECT_DOUBLE_EQ(c.iou(3), 0.0);
   EXPECT_TRUE(std::isnan(c.iou(4)));
-  EXPECT_DOUBLE_EQ(c.meanIou(), (0.75 + 0.3) / 2);  // class 3 is true of no point
+  EXPECT_DOUBLE_EQ(c.meanIou(), (0.75 + 0.3) / 2);  // class 3 is not the true class of any point
   EXPECT_DOUBLE_EQ(c.accuracy(), 9.0 / 16.0);
   EXPECT_EQ(c.points(2), 8u);
   EXPECT_TRUE(std::isnan(Confusion().accuracy()));
   EXPECT_TRUE(std::isnan(Confusion().meanIou()));
 }
 
-/// Evidence for a class in the voxel about a point; voxels of 1 m, prior 0.
+/// Adds evidence for a class to the voxel of a point. Voxels of 1 m, prior 0.
 void add(SemanticMap& map, const Eigen::Vector3d& point, ClassId id, float evidence) {
   float plane[kBlockVoxels] = {};
   const VoxelIndex voxel = map.geometry().voxelAt(point);
@@ -39,14 +39,14 @@ class Quality : public testing::Test {
  protected:
   Quality() : map_(GridGeometry(1.0), 1e-9, 4), evaluation_(GridGeometry(1.0)) {}
 
-  /// Points in the middle of voxel x with a true and a told label (classes times ten).
-  void see(int x, std::uint32_t truth, std::uint32_t told, int times = 1) {
+  /// Points in the middle of voxel x with a true and a predicted label (classes times ten).
+  void see(int x, std::uint32_t truth, std::uint32_t predicted, int times = 1) {
     Scan scan;
     for (int n = 0; n < times; ++n) {
       scan.points.emplace_back(static_cast<float>(x) + 0.5f, 0.5f, 0.5f);
       scan.labels.push_back(truth);
     }
-    evaluation_.add(scan, std::vector<std::uint32_t>(scan.labels.size(), told), *classes_);
+    evaluation_.add(scan, std::vector<std::uint32_t>(scan.labels.size(), predicted), *classes_);
   }
   void set(int x, ClassId id, float evidence) { add(map_, {x + 0.5, 0.5, 0.5}, id, evidence); }
 
@@ -58,9 +58,9 @@ class Quality : public testing::Test {
 TEST_F(Quality, ComparesWhatMapAndInputTell) {
   see(0, 10, 10, 3);
   see(0, 10, 20);     // the map outvotes the wrong label
-  see(1, 20, 20, 2);  // the map calls it free
-  see(2, 0, 0, 5);    // unlabelled: does not count
-  see(3, 30, 77, 2);  // told no class; the map has nothing there
+  see(1, 20, 20, 2);  // free in the map
+  see(2, 0, 0, 5);    // unlabelled: skipped
+  see(3, 30, 77, 2);  // predicted label of no class; unknown in the map
   set(0, 1, 1.0f);
   set(1, kFreeClass, 1.0f);
   const SemanticQuality quality = evaluation_.compare(map_);
@@ -81,7 +81,7 @@ TEST_F(Quality, WrongVoxelsAreOccupiedByAClassThatNoPointHas) {
   see(2, 30, 30);
   set(0, 1, 1.0f);
   set(1, 1, 1.0f);           // wrong
-  set(2, kFreeClass, 1.0f);  // lost, but not of a wrong class
+  set(2, kFreeClass, 1.0f);  // free in the map: lost, but not of a wrong class
   const auto wrong = evaluation_.wrongVoxels(map_);
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_EQ(wrong[0].x, 1);
@@ -91,9 +91,9 @@ TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
   set(0, 1, 0.8f);
   set(0, 2, 0.2f);
   see(0, 10, 10, 3);
-  see(0, 20, 20, 1);  // 3 of 4 are right at probability 0.8
+  see(0, 20, 20, 1);  // 3 of 4 are correct at probability 0.8
   set(1, 2, 1.0f);
-  see(1, 20, 20, 4);  // all are right at probability 1
+  see(1, 20, 20, 4);  // all are correct at probability 1
   const SemanticQuality quality = evaluation_.compare(map_);
   EXPECT_EQ(quality.reliability.bins()[8].count + quality.reliability.bins()[7].count,
             4u);  // 0.8 may round either way
@@ -102,23 +102,23 @@ TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
 }
 
 TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {
-  // Voxel 0: unsure and wrong. Voxel 1: sure and right.
+  // Voxel 0: uncertain and wrong. Voxel 1: certain and correct.
   set(0, 1, 0.6f);
   set(0, 2, 0.4f);
   see(0, 20, 20, 4);
   set(1, 1, 50.0f);
   see(1, 10, 10, 4);
-  EXPECT_NEAR(evaluation_.compare(map_).sparsificationError, 0.0, 1e-12);
-  // Voxel 2: sure and wrong. Left out by variance, voxel 0 goes first, then 2, 1: errors left 8/12, 4/8, 0/4.
-  // By errors 0 and 2 go first alike, then 1: the same. Voxel 3, unsure and right, costs.
+  EXPECT_NEAR(evaluation_.compare(map_).sparsification_error, 0.0, 1e-12);
+  // Voxel 2: certain and wrong. By variance, voxel 0 is removed first, then 2, 1: error rates 8/12, 4/8, 0/4.
+  // By errors, 0 and 2 are removed first, then 1: the same. Voxel 3, uncertain and correct, adds an error.
   set(3, 1, 0.6f);
   set(3, 2, 0.4f);
   see(3, 10, 10, 4);
   set(2, 1, 40.0f);
   see(2, 20, 20, 4);
-  // By variance: 0 (or 3) and 3 (or 0), then 2, then 1: errors left 8/16, 4/12 , 4/8, 0/4 (or 8/12 second).
+  // By variance: 0 (or 3) and 3 (or 0), then 2, then 1: error rates 8/16, 4/12, 4/8, 0/4 (or 8/12 second).
   const double best = (8.0 / 16 + 4.0 / 12 + 0 + 0) / 4;
-  const double error = evaluation_.compare(map_).sparsificationError;
+  const double error = evaluation_.compare(map_).sparsification_error;
   EXPECT_GT(error, 0.1);
   EXPECT_LE(error, (8.0 / 16 + 8.0 / 12 + 4.0 / 8 + 0) / 4 - best + 1e-12);
 }

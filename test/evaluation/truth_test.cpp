@@ -1,5 +1,5 @@
-// Free and occupied voxels, classes and ghosts against the truth of a scene made by hand.
-#include "evaluation/truth.h"
+// Free and occupied voxels, classes and ghosts against the ground truth of a small scene.
+#include "evaluation/truth_evaluation.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::uint32_t kCar = 10, kMovingCar = 252, kRoad = 40, kPole = 80;
 
-/// Voxels of 1 m; the map's origin is 2.5 m above the ground, which so ends within voxels of z = -3.
+/// Voxels of 1 m. The map's origin is 2.5 m above the ground, whose surface is thus inside of the voxels z =
+/// -3.
 class Truth : public testing::Test {
  protected:
   Truth() {
@@ -78,31 +79,31 @@ TEST_F(Truth, VoxelsAreComparedOneByOne) {
   scan.origin = {0.0, 0.0, 0.0};
   evaluation.add(scan);
   SemanticMap map = emptyMap();
-  add(map, voxel(9, 0, -2), idOf("car"));   // right
-  add(map, voxel(30, 0, -2), idOf("car"));  // the moving car, at 1 s: right, though never hit
+  add(map, voxel(9, 0, -2), idOf("car"));   // correct
+  add(map, voxel(30, 0, -2), idOf("car"));  // the moving car at 1 s: correct, although never hit
   add(map, voxel(20, 0, -2), idOf("car"));  // it was there at 0 s: a ghost
-  add(map, voxel(0, 5, -2), idOf("road"));  // a pole: right, but of another class
-  add(map, voxel(0, 0, -1), kFreeClass);    // crossed, right
+  add(map, voxel(0, 5, -2), idOf("road"));  // a pole: correctly occupied, but of another class
+  add(map, voxel(0, 0, -1), kFreeClass);    // crossed, correct
   add(map, voxel(10, 0, -2), kFreeClass);   // the car is there: wrong
   const TruthQuality quality = evaluation.compare(map, 1.0);
-  EXPECT_EQ(quality.all.free_precision.all, 2u);
-  EXPECT_EQ(quality.all.free_precision.right, 1u);
-  EXPECT_EQ(quality.all.occupied_precision.all, 4u);
-  EXPECT_EQ(quality.all.occupied_precision.right, 3u);
-  EXPECT_EQ(quality.all.occupied_near.right, 4u) << "the ground is near the ghost";
-  EXPECT_EQ(quality.all.occupied_recall.all, 2u);
-  EXPECT_EQ(quality.all.occupied_recall.right, 2u);
-  EXPECT_GT(quality.all.free_recall.all, 5u);
-  EXPECT_EQ(quality.all.free_recall.right, 1u);
+  EXPECT_EQ(quality.all.free_precision.total, 2u);
+  EXPECT_EQ(quality.all.free_precision.correct, 1u);
+  EXPECT_EQ(quality.all.occupied_precision.total, 4u);
+  EXPECT_EQ(quality.all.occupied_precision.correct, 3u);
+  EXPECT_EQ(quality.all.occupied_near.correct, 4u) << "the ground is near the ghost";
+  EXPECT_EQ(quality.all.occupied_recall.total, 2u);
+  EXPECT_EQ(quality.all.occupied_recall.correct, 2u);
+  EXPECT_GT(quality.all.free_recall.total, 5u);
+  EXPECT_EQ(quality.all.free_recall.correct, 1u);
   EXPECT_EQ(quality.occupancy.bins()[9].right, 2u) << "the car and the pole";
   EXPECT_EQ(quality.occupancy.bins()[9].count, 2u);
   EXPECT_EQ(quality.occupancy.bins()[0].right, 0u) << "the voxel at the sensor";
   EXPECT_EQ(quality.occupancy.bins()[0].count, 1u);
   EXPECT_EQ(quality.movable, 3u);
   EXPECT_EQ(quality.ghosts, 1u);
-  EXPECT_EQ(quality.by_distance[0].occupied_precision.all, 2u) << "up to 10 m";
-  EXPECT_EQ(quality.by_distance[1].free_precision.all, 1u) << "at 10.6 m";
-  EXPECT_EQ(quality.by_distance[2].occupied_precision.all, 2u) << "20 to 40 m";
+  EXPECT_EQ(quality.by_distance[0].occupied_precision.total, 2u) << "up to 10 m";
+  EXPECT_EQ(quality.by_distance[1].free_precision.total, 1u) << "at 10.6 m";
+  EXPECT_EQ(quality.by_distance[2].occupied_precision.total, 2u) << "20 to 40 m";
   EXPECT_EQ(quality.voxels.count(idOf("pole"), idOf("road")), 1u);
   EXPECT_DOUBLE_EQ(quality.voxels.iou(idOf("car")), 2.0 / 3.0);
   EXPECT_DOUBLE_EQ(quality.meanIou(classes_), 1.0 / 3.0) << "of car and pole";
@@ -112,7 +113,7 @@ TEST_F(Truth, VoxelsAreComparedOneByOne) {
 TEST_F(Truth, AVoxelIsAGhostHalfASecondAfterTheCar) {
   TruthEvaluation evaluation(truth(), classes_);
   SemanticMap map = emptyMap();
-  add(map, voxel(20, 0, -2), idOf("car"));  // the car's tail leaves the voxel next to it at 0.24 s
+  add(map, voxel(20, 0, -2), idOf("car"));  // the rear of the car leaves the adjacent voxel at 0.24 s
   EXPECT_TRUE(evaluation.ghosts(map, 0.3).empty());
   EXPECT_TRUE(evaluation.ghosts(map, 0.6).empty());
   EXPECT_EQ(evaluation.ghosts(map, 0.9).size(), 1u);

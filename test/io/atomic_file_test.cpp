@@ -1,4 +1,4 @@
-// Files that appear whole or not at all: what they may replace, what they keep, and what they leave behind.
+// Atomic files: what they may replace, what they keep, and which temporary files they leave or remove.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -49,12 +49,12 @@ class FilesAndLinks : public testing::Test {
     EXPECT_EQ(fault.find('\n'), std::string::npos) << fault;
     EXPECT_EQ(entries(), before) << "something is left";
   }
-  /// Everything in the folder, hidden or not.
+  /// The names of all files in the folder, including hidden ones.
   std::size_t entries() const {
     const fs::directory_iterator all(folder_ / "");
     return static_cast<std::size_t>(std::distance(begin(all), end(all)));
   }
-  /// The id of a process that has ended.
+  /// The id of a process that no longer exists.
   static pid_t endedProcess() {
     const pid_t child = fork();
     if (child == 0) _exit(0);
@@ -79,7 +79,7 @@ TEST_F(FilesAndLinks, WhatIsNoRegularFileIsRefusedByKindAndStays) {
   expectRefused(folder_ / "socket", "is a socket");
   EXPECT_TRUE(fs::is_socket(folder_ / "socket"));
   close(end);
-  // A link to them is refused, too. Only root can make a device, and only root could destroy one.
+  // A link to them is refused, too. Only root can create a device, or destroy one: that case needs root.
   fs::create_symlink("pipe", folder_ / "link");
   expectRefused(folder_ / "link", "is a pipe");
   if (mknod((folder_ / "full").c_str(), S_IFCHR | 0666, static_cast<dev_t>(1 << 8 | 7)) == 0) {
@@ -176,17 +176,17 @@ TEST_F(FilesAndLinks, TemporariesOfOthersStay) {
     return folder_ / name;
   };
   const std::string removed = leave(".map.ply.bki_mapping-" + gone + "-abcDEF");
-  // In a container each run may have the same id; what this process itself writes to is locked.
+  // In a container every run may have the same id. The files of this process are locked.
   const std::string of_namesake = leave(".map.ply.bki_mapping-" + std::to_string(getpid()) + "-abcDEF");
   std::vector<std::string> kept = {
-      leave(".map.ply.bki_mapping-" + alive + "-abcDEF"),        // its process is alive
-      leave(".other.ply.bki_mapping-" + gone + "-abcDEF"),       // of another file
-      leave(".map.ply.bki_mapping-" + gone + "-abcDEF.backup"),  // of another name
+      leave(".map.ply.bki_mapping-" + alive + "-abcDEF"),        // its process still runs
+      leave(".other.ply.bki_mapping-" + gone + "-abcDEF"),       // belongs to another file
+      leave(".map.ply.bki_mapping-" + gone + "-abcDEF.backup"),  // not a name of a temporary file
       leave(".map.ply.bki_mapping-" + gone),
       leave(".map.ply.bki_mapping-x-abcDEF"),
       leave("map.ply.bki_mapping-" + gone + "-abcDEF"),
   };
-  if (geteuid() == 0) {  // another user's
+  if (geteuid() == 0) {  // owned by another user
     kept.push_back(leave(".map.ply.bki_mapping-" + gone + "-nobody"));
     ASSERT_EQ(chown(kept.back().c_str(), 12345, 12345), 0);
   }
@@ -217,7 +217,7 @@ TEST_F(FilesAndLinks, AFullDiskIsSaidWithTheFreeSpace) {
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{1000, before.rlim_max};  // as if the disk were full
+  const rlimit small{1000, before.rlim_max};  // simulates a full disk
   setrlimit(RLIMIT_FSIZE, &small);
   std::string fault;
   try {

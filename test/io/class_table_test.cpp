@@ -1,4 +1,4 @@
-// Class tables: the shipped ones, and faults that must be named.
+// Class tables: those of the package, and the messages for faulty ones.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -20,7 +20,7 @@ std::string messageOf(const std::function<void()>& action) {
   return "";
 }
 
-/// What loading a table with this text says.
+/// The message of the exception when a table with this text is loaded.
 std::string faultOf(const std::string& text) {
   const TemporaryFolder folder;
   const std::string file = folder / "file.yaml";

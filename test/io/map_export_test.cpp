@@ -1,4 +1,4 @@
-// Map files: their bytes, that PCL reads them, and that a failure leaves the old file.
+// Map files: their bytes, reading them with PCL, and that the old file survives a failure.
 #include <gtest/gtest.h>
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
@@ -107,7 +107,7 @@ TEST_F(MapFile, AFailureLeavesTheOldFile) {
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{1000, before.rlim_max};  // as if the disk were full
+  const rlimit small{1000, before.rlim_max};  // simulates a full disk
   setrlimit(RLIMIT_FSIZE, &small);
   EXPECT_THROW(write(path, kAll), std::runtime_error);
   EXPECT_THROW(write(folder_ / "map.pcd", kAll), std::runtime_error);

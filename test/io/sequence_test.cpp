@@ -1,4 +1,4 @@
-// Sequences: what is written is read back, and every fault is named.
+// Sequences: reading returns what was written, and every fault is named.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -60,7 +60,8 @@ TEST_F(SequenceFolder, ReadsWhatWasWritten) {
 }
 
 TEST_F(SequenceFolder, TheMapFrameIsTheFirstSensorFrame) {
-  // Poses are of the camera; Tr turns sensor axes (x forward) into camera axes (z forward) and shifts.
+  // Poses are those of the camera. Tr transforms sensor axes (x forward) to camera axes (z forward), with an
+  // offset.
   replace("calib.txt", "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n");
   replace("poses.txt", "1 0 0 7 0 1 0 0 0 0 1 0\n1 0 0 7 0 1 0 0 0 0 1 5\n");
   const Sequence sequence(folder_ / "drive");
@@ -119,7 +120,7 @@ TEST_F(SequenceFolder, NamesFaultsOfCalibrationAndTimes) {
   expectFault("no line 'Tr:'");
 }
 
-/// Five scans, a metre and a tenth of a second apart.
+/// Five scans, 1 m and 0.1 s apart.
 class LongerSequence : public SequenceFolder {
  protected:
   void SetUp() override {
@@ -137,7 +138,7 @@ class LongerSequence : public SequenceFolder {
       std::filesystem::rename(start + from + ending, start + to + ending);
     }
   }
-  /// Every scan has the pose and the time of its number.
+  /// Expects that every scan has the pose and time of its number.
   void expectPairedByNumber(const std::vector<std::size_t>& numbers) {
     const Sequence sequence(folder_ / "drive");
     ASSERT_EQ(sequence.size(), numbers.size());

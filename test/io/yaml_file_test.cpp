@@ -1,4 +1,4 @@
-// YAML that others wrote: whatever it says, an answer comes at once.
+// Untrusted YAML: any text is read or refused within a short time.
 #include "io/yaml_file.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 class YamlFile : public testing::Test {
  protected:
-  /// Writes a file under the name that simulated drives have for theirs.
+  /// Writes a file under the name of the settings of simulated drives.
   void write(const std::string& text) { std::ofstream(path_, std::ios::binary) << text; }
   std::string faultOf(const std::string& text) {
     write(text);
@@ -45,7 +45,7 @@ class YamlFile : public testing::Test {
   std::string path_ = folder_ / "simulation.yaml";
 };
 
-/// Each level holds the one before nine times: 9^levels nodes, were they all made.
+/// Each level contains the previous one nine times: 9^levels nodes if all were created ("billion laughs").
 std::string laughs(int levels) {
   std::string text = "l0: &l0 [x, x, x, x, x, x, x, x, x]\n";
   for (int level = 1; level < levels; ++level) {
@@ -77,7 +77,7 @@ TEST_F(YamlFile, AnAliasToWhatItIsInIsRefused) {
 TEST_F(YamlFile, NestedAliasesAreCountedBeforeTheyAreFollowed) {
   EXPECT_EQ(faultOf(laughs(3)), "");
   expectFault(laughs(10), "nodes");
-  expectFault(laughs(300), "nodes");  // more than any integer counts
+  expectFault(laughs(300), "nodes");  // more nodes than any integer can count
 }
 
 TEST_F(YamlFile, DeepNestingIsRefused) {
@@ -90,7 +90,7 @@ TEST_F(YamlFile, DeepNestingIsRefused) {
       expectFault(repeated(unclosed, depth), "line 1");
     }
   }
-  // By aliases, too: each holds the one before.
+  // Deep by aliases, too: each contains the previous one.
   std::string text = "a0: &a0 [x]\n";
   for (int i = 1; i < 40; ++i) {
     text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [*a" + std::to_string(i - 1) + "]\n";

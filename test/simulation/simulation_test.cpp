@@ -1,4 +1,4 @@
-// The simulated world: beams end on surfaces, labels are what is there, and everything is repeatable.
+// The simulation: beams end on surfaces, labels match the scene, and equal settings give equal scans.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -19,10 +19,10 @@ import xmlrpc.client
 SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
 DEVEL = os.environ['BKI_MAPPING_DEVEL']
 DOCUMENTS = ['README.md', *(f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md'))]
-TIMEOUT = 60.0  # [s] of a command, or until what is waited for
+TIMEOUT = 60.0  # maximum duration of a command, and of waiting for an event [s]
 SCANS = 6
 
-# Not run, and why.
+# Commands that are not run, and why.
 LEFT_OUT = {
     'catkin build': 'builds a whole workspace, for minutes',
     **dict.fromkeys(("sudo apt-get install --no-install-recommends $(grep -v '^#' scripts/dependencies.debian.txt)",
@@ -34,25 +34,25 @@ LEFT_OUT = {
     'scripts/fuzz --seed 7 --settings two_lidars': 'the same',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
-# What makes a command take long, and what is run in its place. All else of it is run as written.
+# Slow parts of commands and their replacements. Everything else is run as written.
 SHORTER = {
     '--scans 300': '--scans 4',
     '--scans 1000 --every 10': '--scans 50 --every 10',
     ' --curves curves': '',  # two thousand simulated scans in each mode; tools_test draws curves
 }
-SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # read by Google Benchmark
-# First words of what is a command where it stands in a line of text; one word alone names a program.
+SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # environment of Google Benchmark
+# First words of commands in a line of text; a single word is only the name of a program.
 PROGRAMS = ('benchmark_', 'build/', 'catkin', 'cmake', 'ctest', 'dynparam', 'evaluate_map', 'map_sequence',
             'play_sequence', 'ros', 'rviz', 'scripts/', 'sequence_to_bag', 'simulate_drive', 'source')
-# In a line of text, not commands: parts of one, whose other arguments the text leaves to the reader.
+# Not commands: fragments in a line of text, whose other arguments are up to the reader.
 PARTS = {
-    'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise SHARE',
+    'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise FRACTION',
     'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --report', 'map_sequence --report FILE.json',
     'rosnode kill', 'rosrun bki_mapping map_sequence', 'simulate_drive --seed 2',
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roslaunch(?!.* --ros-args)|rviz|rostopic echo)\b')
 WRONG = re.compile(r'\bERROR\b|FATAL|Traceback|\b[Uu]nknown\b|has died|command not found|No such file', re.MULTILINE)
-# rviz on a graphics card in software: a shader for images, of which there are none.
+# rviz with software rendering: a shader for images, which these displays do not use.
 HARMLESS = re.compile(r'rviz/glsl120/indexed_8bit_image')
 
 
@@ -66,7 +66,7 @@ def without_comment(line):
 
 
 def blocks_of(document):
-    """Lists of commands: of each block, and one for each command in the text."""
+    """Lists of commands: one list per block, and one per command in the text."""
     text = text_of(document)
     fenced = re.findall(r'^```(?:sh|bash|shell|console)\n(.*?)^```$', text, re.MULTILINE | re.DOTALL)
     for block in fenced:
@@ -89,7 +89,7 @@ def free_port():
 
 
 def send(process, what):
-    """A signal to all that a command has started and that still runs."""
+    """Sends a signal to all processes of a command that still run."""
     try:
         os.killpg(process.pid, what)
     except ProcessLookupError:
@@ -133,7 +133,7 @@ class Shell:
         return process.output.read()
 
     def finish(self, process):
-        """Waits for a command that ends by itself; returns what it printed."""
+        """Waits for a command that ends by itself; returns its output."""
         try:
             process.wait(TIMEOUT)
         except subprocess.TimeoutExpired:
@@ -149,7 +149,7 @@ class Shell:
         return self.finish(self.start(command))
 
     def stop(self):
-        """Control-C in all terminals, the last one first; returns what each command has printed."""
+        """Types Control-C in all terminals, the last one first; returns the output of each command."""
         printed = {}
         for process in reversed(self.running):
             send(process, signal.SIGINT)
@@ -164,7 +164,7 @@ class Shell:
         return printed
 
     def subscribers(self, topic):
-        """Nodes that listen, as the master says; None without a master."""
+        """The subscribers of a topic according to the master; None without a master."""
         try:
             with xmlrpc.client.ServerProxy(self.master) as master:
                 code, _, (_, subscribers, _) = master.getSystemState('/commands_test')
@@ -173,7 +173,7 @@ class Shell:
         return dict(subscribers).get(topic, []) if code == 1 else None
 
     def wait_for_status(self, topic, condition):
-        """Until a MappingStatus m meets the condition."""
+        """Waits until a MappingStatus m meets the condition."""
         wait_until(lambda: self.subscribers(topic) is not None, 'a ROS master')
         self.run(f'timeout {TIMEOUT:.0f} rostopic echo -n 1 --filter "{condition}" {topic}')
 
@@ -206,10 +206,10 @@ class Commands(unittest.TestCase):
 
     @classmethod
     def copy_source(cls, clone):
-        """What a clone holds, and in build/devel what scripts/demo builds."""
+        """Sets up the files of a clone and, in build/devel, the build of scripts/demo."""
         listed = subprocess.run(['git', '-C', SOURCE, 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
                                 stdout=subprocess.PIPE, text=True, check=False).stdout.split('\0')
-        if listed == ['']:  # not of git, but an archive
+        if listed == ['']:  # an archive, not a clone
             listed = [os.path.relpath(os.path.join(folder, name), SOURCE) for folder, _, names in os.walk(SOURCE)
                       for name in names if not os.path.relpath(folder, SOURCE).startswith('build')]
         for name in listed:
@@ -220,12 +220,12 @@ class Commands(unittest.TestCase):
         os.symlink(DEVEL, os.path.join(clone, 'build/devel'))
 
     def start_mapper(self, shell):
-        """The mapper that a command asks for that is to be typed beside it: that of README.md."""
+        """Starts the mapper of README.md if a command needs one in another terminal."""
         shell.start(next(line for block in blocks_of('README.md') for line in block if 'mapping.launch' in line))
         shell.wait_for_status('/mapping/status', 'm.received == 0')
 
     def type_command(self, shell, command):
-        """Types one command; returns what it printed, or nothing if it goes on."""
+        """Types one command; returns its output, or None if it keeps running."""
         for long, short in SHORTER.items():
             command = command.replace(long, short)
         if not GOES_ON.match(command):
@@ -242,7 +242,7 @@ class Commands(unittest.TestCase):
         return ''
 
     def see_it_map(self, shell, block):
-        """Waits until each mapper of a block has mapped all scans: those played by the block, or else our own."""
+        """Waits until each mapper of a block has mapped all scans: those that the block plays, or otherwise our own."""
         launches = [command for command in block if command.startswith('roslaunch') and GOES_ON.match(command)]
         if not launches:
             return

@@ -41,7 +41,7 @@ class Tools(unittest.TestCase):
         self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
 
     def rows_of_document(self):
-        """Rows of docs/files.md by the name that they begin with."""
+        """The rows of docs/files.md by the name in their first column."""
         with open(os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'docs', 'files.md')) as file:
             return {row.split('`')[1]: row for row in file.read().splitlines() if row.startswith('| `')}
 
@@ -147,7 +147,7 @@ class Tools(unittest.TestCase):
         self.assertGreater(lines['voxels_by_class']['road'], 100)
 
     def labels(self, name, change):
-        """A folder of labels beside the drive's own: each label as `change` makes it."""
+        """Writes a second folder of labels: change(label) for each label of the drive."""
         folder = os.path.join(self.drive, name)
         os.mkdir(folder)
         self.addCleanup(shutil.rmtree, folder)
@@ -172,10 +172,10 @@ class Tools(unittest.TestCase):
         self.assertEqual(by_id['labels_not_in_table'], 0)
         self.assertEqual(by_id['static_points'], raw['static_points'] + self.count_moving())
         self.assertIsNone(by_id['da'])
-        self.assertIn('ids do not tell what moves', self.table)
+        self.assertIn('ids do not say what moves', self.table)
         noisy = self.evaluation('label_values=id', more=['--labels', 'ids', '--label-noise', '0.3'])
         self.assertAlmostEqual(noisy['accuracy_input'], 0.7, delta=0.02)
-        # Raw numbers taken for ids: most are none, and that is said.
+        # Raw labels taken for ids: most are not in the table, which is reported.
         wrong = self.evaluation('label_values=id')
         self.assertGreater(wrong['labels_not_in_table'], 0.5 * raw['static_points'])
         self.assertRegex(self.table, r'\d+ of \d+ labels are not in the class table semantic_kitti')

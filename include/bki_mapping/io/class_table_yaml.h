@@ -7,9 +7,10 @@
 
 namespace bki_mapping {
 
-/// Reads a class table. The file's form is described in docs/classes.md.
-/// @param name_or_file a name of config/classes (without .yaml), or the path of a file.
-/// @throws std::invalid_argument in one sentence: no such name or file, bad YAML, unknown key, bad value.
+/// Reads a class table; docs/classes.md describes the format.
+/// @param name_or_file a table of config/classes (its name without .yaml), or the path of a file.
+/// @throws std::invalid_argument in one sentence: unknown name or file, invalid YAML, unknown key or bad
+/// value.
 ClassTable loadClassTable(const std::string& name_or_file);
 
 }  // namespace bki_mapping

@@ -8,12 +8,12 @@
 
 namespace bki_mapping {
 
-/// Reads a YAML file of nested maps as names with `/` between the parts, and values as text.
-/// @throws std::invalid_argument in one sentence: no such file, bad YAML (see yaml_file.h), a value that is a
-/// list, a name given twice.
+/// Reads a YAML file of nested maps into a flat map: names joined by `/`, values as text.
+/// @throws std::invalid_argument in one sentence: no such file, invalid YAML (see yaml_file.h), a value that
+/// is a list, or a name that occurs twice.
 std::map<std::string, std::string> loadParameterFile(const std::string& file);
 
-/// The mapper's settings as such a file, each with its meaning, values and unit as a comment.
+/// The mapper's parameters as such a file, with the meaning, allowed values and unit of each as a comment.
 std::string parameterYaml(const MapperConfig& config);
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file Maps as PLY and PCD files.
+/// @file Exports maps as PLY and PCD files.
 #pragma once
 
 #include <set>
@@ -10,7 +10,7 @@
 
 namespace bki_mapping {
 
-/// One voxel as files have it; docs/files.md describes the fields.
+/// One voxel of a map file; docs/files.md describes the fields.
 struct VoxelRecord {
   float x, y, z;  ///< centre, map frame [m]
   std::uint8_t red, green, blue;
@@ -19,7 +19,7 @@ struct VoxelRecord {
   float probability, variance, entropy, evidence;
 };
 
-/// The states named in a list like "occupied,free". @throws std::invalid_argument on any other word.
+/// Parses a list of states such as "occupied,free". @throws std::invalid_argument on an unknown word.
 std::set<VoxelState> parseStates(const std::string& list);
 
 /// Appends the voxels of one block that are in the given states.
@@ -30,11 +30,11 @@ void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::
 std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
                                        const std::set<VoxelState>& states);
 
-/// Writes a map file whole or not at all; the ending chooses the format, .ply or .pcd (both binary).
-/// @throws std::invalid_argument on another ending, std::runtime_error if the file cannot be written.
+/// Writes a map file by AtomicFile. The extension, .ply or .pcd, chooses the format (both binary).
+/// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const std::set<VoxelState>& states);
-/// @throws std::invalid_argument if exportMap would refuse the ending.
+/// Checks the extension before long work. @throws std::invalid_argument if exportMap does not support it.
 void checkMapFileName(const std::string& path);
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file Scans from a folder in SemanticKITTI's layout.
+/// @file Reads and writes sequences of scans in SemanticKITTI's layout.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,7 +13,7 @@ namespace bki_mapping {
 struct SequenceFrame {
   std::vector<Eigen::Vector3f> points;  ///< [m]
   std::vector<float> remissions;
-  std::vector<std::uint32_t> labels;  ///< raw class numbers (lower 16 bits of the file's)
+  std::vector<std::uint32_t> labels;  ///< raw labels (lower 16 bits of the values in the file)
   Eigen::Isometry3d T_map_sensor = Eigen::Isometry3d::Identity();
   std::uint64_t stamp = 0;  ///< [ns], after kFirstStamp
 
@@ -22,25 +22,25 @@ struct SequenceFrame {
 
 /// A folder with velodyne/NNNNNN.bin, LABELS/NNNNNN.label, poses.txt (3x4 row-major, camera frame of scan 0),
 /// calib.txt (Tr: sensor to camera) and, optionally, times.txt [s]; without it scans are 0.1 s apart. Line
-/// N + 1 of poses and times belongs to the scan of number N, whether or not others are missing. The map frame
-/// is the sensor's frame at the first line's pose. Rotations are made orthonormal.
+/// N + 1 of poses and times belongs to scan NNNNNN = N, even if earlier scans are missing. The map frame is
+/// the sensor's frame at the pose in the first line. Rotations are orthonormalised.
 class Sequence {
  public:
-  /// Added to all times, because ROS takes time 0 to mean "the latest" [ns].
+  /// Offset added to all times [ns], because time 0 means "the latest" to tf.
   static constexpr std::uint64_t kFirstStamp = 1000000000;
 
-  /// @param labels name of the folder with labels.
-  /// @throws std::runtime_error in one sentence: a missing folder or file, a scan whose name is no number, an
-  /// unreadable number, a singular or missing calibration, a scan without a pose or time.
+  /// @param labels name of the folder with the labels.
+  /// @throws std::runtime_error in one sentence: a missing folder or file, a scan whose name is not a number,
+  /// a value that is not a number, a singular or missing calibration, a scan without a pose or time.
   explicit Sequence(const std::string& folder, const std::string& labels = "labels");
 
-  /// Scans that there are; `i` below counts them, gaps left out.
+  /// Number of scans that exist; the index `i` below runs over these, without gaps.
   std::size_t size() const { return poses_.size(); }
-  /// File name of a frame without its ending.
+  /// File name of a scan without its extension.
   const std::string& name(std::size_t i) const { return names_[i]; }
-  /// The number in its name.
+  /// The number in the file name.
   std::size_t number(std::size_t i) const { return numbers_[i]; }
-  /// Which numbers between the first and the last scan are missing, as a clause; "" if none.
+  /// The scans missing between the first and the last one, as a clause; "" if there are none.
   std::string gaps() const;
   /// @throws std::runtime_error if the files cannot be read, or the numbers of points and labels differ.
   SequenceFrame read(std::size_t i) const;
@@ -53,10 +53,10 @@ class Sequence {
   std::vector<std::uint64_t> stamps_;
 };
 
-/// Writes frames in the same layout, with Tr the identity.
+/// Writes frames in the same layout; Tr is the identity.
 class SequenceWriter {
  public:
-  /// Makes the folders. @throws std::runtime_error if that fails, or `folder` already holds scans.
+  /// Creates the folders. @throws std::runtime_error if that fails, or if `folder` already holds scans.
   explicit SequenceWriter(const std::string& folder);
   /// @throws std::runtime_error if a file cannot be written.
   void write(const SequenceFrame& frame);

@@ -1,4 +1,4 @@
-#include "evaluation/dynamics.h"
+#include "evaluation/dynamics_evaluation.h"
 
 #include "bki_mapping/map/map_query.h"
 
@@ -16,9 +16,9 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
     if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
-    const std::uint32_t number = number_.insert(index, fresh);
-    if (number == fresh) voxels_.push_back({index});
-    Voxel& voxel = voxels_[number];
+    const std::uint32_t n = index_of_.insert(index, fresh);
+    if (n == fresh) voxels_.push_back({index});
+    Voxel& voxel = voxels_[n];
     const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
     const SemanticClass& known = *classes.find(*id);
     voxel.ground_points += !moving && known.ground;

@@ -1,4 +1,4 @@
-#include "evaluation/truth.h"
+#include "evaluation/truth_evaluation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 namespace bki_mapping::simulation {
 namespace {
 
-/// Of this many beams one tells which voxels were crossed.
+/// One beam in this many is followed to find crossed voxels, which bounds the time of add().
 constexpr std::size_t kBeamStride = 16;
-/// Something that can move leaves a voxel this long before it is a ghost [s], looked at in such steps [s].
+/// A voxel is a ghost if nothing movable was near for kGhostAge [s], sampled every kGhostStep [s].
 constexpr double kGhostAge = 0.5, kGhostStep = 0.1;
 
 }  // namespace
@@ -39,9 +39,9 @@ double TruthQuality::occupiedIou(const ClassTable& classes) const {
 
 TruthEvaluation::Seen& TruthEvaluation::seen(const VoxelIndex& index) {
   const auto fresh = static_cast<std::uint32_t>(voxels_.size());
-  const std::uint32_t number = number_.insert(index, fresh);
-  if (number == fresh) voxels_.push_back({index});
-  return voxels_[number];
+  const std::uint32_t n = index_of_.insert(index, fresh);
+  if (n == fresh) voxels_.push_back({index});
+  return voxels_[n];
 }
 
 void TruthEvaluation::add(const Scan& scan) {
@@ -101,9 +101,9 @@ void TruthEvaluation::countGhosts(const SemanticMap& map, double time) {
 
 TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const {
   TruthQuality quality;
-  const auto add = [&](Tally SpaceQuality::*tally, std::size_t bin, bool right) {
-    (quality.all.*tally).add(right);
-    (quality.by_distance[bin].*tally).add(right);
+  const auto add = [&](Proportion SpaceQuality::*figure, std::size_t bin, bool correct) {
+    (quality.all.*figure).add(correct);
+    (quality.by_distance[bin].*figure).add(correct);
   };
   for (const Seen& voxel : voxels_) {
     const std::size_t bin = distanceBin(voxel.index);
@@ -127,7 +127,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
     if (view.state == VoxelState::kFree) return add(&SpaceQuality::free_precision, bin, truth == kFreeClass);
     add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
     add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
-    if (number_.find(index) == GridTable::kNone) quality.voxels.add(truth, view.label);
+    if (index_of_.find(index) == GridTable::kNone) quality.voxels.add(truth, view.label);
     quality.movable += classes_.find(view.label)->dynamic;
   });
   quality.ghosts = ghosts(map, time).size();

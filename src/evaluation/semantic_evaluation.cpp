@@ -1,4 +1,4 @@
-#include "evaluation/semantics.h"
+#include "evaluation/semantic_evaluation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,13 +12,13 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Points of a voxel, how many of them are wrong, and by what they are ranked.
+/// A voxel in the order of removal: its rank, its points, and how many of them are wrong.
 struct Ranked {
   double rank;
   std::size_t points, wrong;
 };
 
-/// Mean, over all shares left out from the front, of the share of wrong points among those left.
+/// Error rate among the remaining points, averaged over all fractions removed from the front.
 double meanErrorLeft(const std::vector<Ranked>& voxels, double points, double wrong) {
   double area = 0.0, left = points;
   for (const Ranked& voxel : voxels) {
@@ -48,8 +48,8 @@ double sparsificationError(std::vector<Ranked> voxels) {
 
 }  // namespace
 
-std::size_t Confusion::count(ClassId truth, ClassId told) const {
-  const auto found = counts_.find({truth, told});
+std::size_t Confusion::count(ClassId truth, ClassId predicted) const {
+  const auto found = counts_.find({truth, predicted});
   return found == counts_.end() ? 0 : found->second;
 }
 
@@ -100,21 +100,21 @@ double Reliability::error() const {
   return error / count;
 }
 
-void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>& told,
+void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>& predicted,
                              const ClassTable& classes) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto truth = classes.classOf(scan.labels[i], labelValues(scan));
     if (!truth || truth == classes.unlabelled() || !geometry_.contains(point)) continue;
-    input_.add(*truth, classes.classOf(told[i], labelValues(scan)).value_or(kFreeClass));
+    input_.add(*truth, classes.classOf(predicted[i], labelValues(scan)).value_or(kFreeClass));
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
-    const std::uint32_t number = number_.insert(index, fresh);
-    if (number == fresh) {
+    const std::uint32_t n = index_of_.insert(index, fresh);
+    if (n == fresh) {
       voxels_.push_back(index);
       points_.emplace_back();
     }
-    ++points_[number][*truth];
+    ++points_[n][*truth];
   }
 }
 
@@ -134,7 +134,7 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
     ranked.push_back(voxel);
     quality.reliability.add(static_cast<double>(view.probability), voxel.points, voxel.points - voxel.wrong);
   }
-  quality.sparsificationError = sparsificationError(std::move(ranked));
+  quality.sparsification_error = sparsificationError(std::move(ranked));
   return quality;
 }
 
@@ -158,7 +158,7 @@ std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& cl
     if (counterRandom(seed, scan.stamp, i, 0) >= rate) continue;
     const auto own = classes.classOf(labels[i], labelValues(scan));
     const double u = counterRandom(seed, scan.stamp, i, 1);
-    // One of those that are not its own.
+    // Draw among the classes other than its own.
     const auto is_own = [&](const SemanticClass* c) { return own == c->id; };
     const auto mine = std::find_if(others.begin(), others.end(), is_own);
     const std::size_t choices = others.size() - (mine == others.end() ? 0 : 1);

@@ -1,0 +1,93 @@
+/// @file Measures how well a map keeps static objects and clears moving ones.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/grid_table.h"
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/map/semantic_map.h"
+
+namespace bki_mapping {
+
+/// The accuracies of the DynamicMap benchmark (Zhang et al., ITSC 2023), counted over the points of the
+/// scans.
+struct DynamicsQuality {
+  std::size_t static_points = 0;  ///< labelled points of static objects, in all scans
+  std::size_t static_kept = 0;    ///< of these, those in occupied voxels
+  /// Static points, and those of them kept, by class flag: ground, dynamic (could move, but stands still),
+  /// and neither.
+  std::size_t ground_points = 0, ground_kept = 0, standing_points = 0, standing_kept = 0, other_points = 0,
+              other_kept = 0;
+  std::size_t floor_voxels = 0;    ///< voxels with static points of ground
+  std::size_t floor_holes = 0;     ///< of these, those that are not occupied
+  std::size_t moving_points = 0;   ///< points of moving objects in the first half of the scans, in voxels
+                                   ///< that no point of the last scans hits
+  std::size_t moving_removed = 0;  ///< of these, those in voxels that are not occupied
+
+  double staticAccuracy() const { return fraction(static_kept, static_points); }  ///< SA
+  double groundAccuracy() const { return fraction(ground_kept, ground_points); }
+  double standingAccuracy() const { return fraction(standing_kept, standing_points); }
+  double otherAccuracy() const { return fraction(other_kept, other_points); }
+  double holes() const { return fraction(floor_holes, floor_voxels); }
+  double dynamicAccuracy() const { return fraction(moving_removed, moving_points); }   ///< DA
+  double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
+  double harmonicAccuracy() const {                                                    ///< HA
+    const double sum = staticAccuracy() + dynamicAccuracy();
+    return sum == 0.0 ? 0.0 : 2.0 * staticAccuracy() * dynamicAccuracy() / sum;
+  }
+
+ private:
+  /// NaN if `whole` is 0.
+  static double fraction(std::size_t part, std::size_t whole) {
+    return static_cast<double>(part) / static_cast<double>(whole);
+  }
+};
+
+/// The outcome for a voxel, by its points: of static or of moving objects.
+enum class VoxelFate {
+  kKept,       ///< static, and occupied
+  kLost,       ///< static, but not occupied
+  kForgotten,  ///< moved, and not occupied
+  kLeft,       ///< moved, but still occupied
+};
+
+/// Collects the labelled points of a drive, voxel by voxel, and compares a map with them.
+class DynamicsEvaluation {
+ public:
+  /// SemanticKITTI's raw labels of moving objects, 252 to 259.
+  static std::set<std::uint32_t> movingOfSemanticKitti();
+
+  /// @param scans number of scans that will be added. @param late voxels hit in this many last scans need not
+  /// be cleared.
+  DynamicsEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving, std::size_t scans,
+                     std::size_t late)
+      : geometry_(geometry), moving_(std::move(moving)), scans_(scans), late_(late) {}
+
+  /// Adds the next scan. Skips points that are not finite, unlabelled, or have a label outside of the class
+  /// table. Ids of the class table do not say what moves: points labelled by id all count as static.
+  void add(const Scan& scan, const ClassTable& classes);
+
+  DynamicsQuality compare(const SemanticMap& map) const;
+  /// The outcome for each voxel that has points of static or of early moving objects.
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map) const;
+
+ private:
+  struct Voxel {
+    VoxelIndex index;
+    std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
+    bool hit_late = false;
+  };
+
+  GridGeometry geometry_;
+  std::set<std::uint32_t> moving_;
+  std::size_t scans_, late_, added_ = 0;
+  GridTable index_of_;
+  std::vector<Voxel> voxels_;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,98 @@
+/// @file Measures the classes of a map, and how well its probabilities and variances predict errors.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/grid_table.h"
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping {
+
+/// Confusion matrix of points. The predicted class kFreeClass means: not occupied, or of no class.
+class Confusion {
+ public:
+  void add(ClassId truth, ClassId predicted, std::size_t points = 1) {
+    counts_[{truth, predicted}] += points;
+  }
+  std::size_t count(ClassId truth, ClassId predicted) const;
+  std::size_t points(ClassId truth) const;  ///< of this true class
+
+  /// Intersection over union of a class. NaN if the class is neither true nor predicted for any point.
+  double iou(ClassId id) const;
+  /// Mean IoU over the classes that are true for some point. NaN without points.
+  double meanIou() const;
+  /// Fraction of the points whose predicted class is the true one. NaN without points.
+  double accuracy() const;
+
+ private:
+  std::map<std::pair<ClassId, ClassId>, std::size_t> counts_;
+};
+
+/// Reliability diagram: predicted probabilities in ten bins of equal width, and how often the prediction was
+/// correct.
+class Reliability {
+ public:
+  struct Bin {
+    std::size_t count = 0, right = 0;
+    double probability = 0.0;  ///< sum of the predicted probabilities
+  };
+
+  /// Adds `count` predictions of equal probability. @param right how many of them are correct.
+  void add(double probability, std::size_t count, std::size_t right);
+  const std::array<Bin, 10>& bins() const { return bins_; }
+  /// Expected calibration error: the mean, over all predictions, of |accuracy - mean probability| in their
+  /// bin. NaN without predictions.
+  double error() const;
+
+ private:
+  std::array<Bin, 10> bins_;
+};
+
+/// Accuracy of the map, and of the labels given to the mapper, at the labelled points (protocol of Gan et
+/// al., RA-L 2020: the final map is compared with the ground truth at every point that is not unlabelled).
+struct SemanticQuality {
+  Confusion map;    ///< predicted by the voxel that contains the point
+  Confusion input;  ///< predicted by the label given to the mapper
+
+  Reliability reliability;  ///< of the class's probability, over the points in occupied voxels
+
+  /// Area under the sparsification error curve (AUSE; Ilg et al., ECCV 2018). Removing the voxels with the
+  /// largest variance first leaves more errors than removing those with the most errors first; this is the
+  /// difference of the error rates, averaged over all fractions removed. 0: variance ranks errors perfectly.
+  double sparsification_error = 0.0;
+};
+
+/// Counts labelled points in each voxel, and compares a map with them.
+class SemanticEvaluation {
+ public:
+  explicit SemanticEvaluation(const GridGeometry& geometry) : geometry_(geometry) {}
+
+  /// Adds the points of a scan. Skips those that are not finite, unlabelled, or have a true label outside of
+  /// the class table.
+  /// @param predicted the labels given to the mapper, one for each of scan.labels, which are the true ones.
+  void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes);
+
+  SemanticQuality compare(const SemanticMap& map) const;
+  /// Occupied voxels whose class is not the true one of any point in them.
+  std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map) const;
+
+ private:
+  GridGeometry geometry_;
+  Confusion input_;
+  GridTable index_of_;
+  std::vector<VoxelIndex> voxels_;
+  std::vector<std::map<ClassId, std::size_t>> points_;  ///< in each voxel, by true class
+};
+
+/// The labels of a scan with errors: each is replaced, with probability `rate`, by that of another class of
+/// the table, drawn uniformly. Equal seeds and stamps give equal labels.
+/// @param rate 0 to 1.
+std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& classes, double rate,
+                                          std::uint64_t seed);
+
+}  // namespace bki_mapping
