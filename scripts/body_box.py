@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
 """Checks the argument body_box of mapping.launch: body_box.py BOX CONFIG.
 
-Ends with one sentence if BOX is not "x0 y0 z0 x1 y1 z1", or if CONFIG, the file of parameters, names inputs: the box
-filters one topic. roslaunch calls it before it starts anything.
+Exits with one sentence if BOX is not "x0 y0 z0 x1 y1 z1", or if the parameter file CONFIG names inputs, because the box
+filters a single topic. roslaunch runs it before any node.
 """
 import os
 import sys
 
 import yaml
 
-FARTHEST = 1000.0  # pcl/CropBox moves what is farther to here, without a word [m]
+FARTHEST = 1000.0  # pcl/CropBox clamps larger coordinates to this without a warning [m]
 FORM = "six numbers in metres, 'x0 y0 z0 x1 y1 z1'; for example body_box:='-0.6 -0.4 -0.5 0.6 0.4 0.3'"
 
 
 def fault_of(box):
-    """Why this is no box; None if it is one."""
+    """Why the box is invalid; None if it is valid."""
     try:
         corners = [float(part) for part in box.split()]
     except ValueError:

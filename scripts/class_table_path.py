@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints a class table as the mapper understands it from any folder: an absolute path, or a name as it is."""
+"""Prints a class table independently of the working folder: a path made absolute, or a name unchanged."""
 import os
 import sys
 

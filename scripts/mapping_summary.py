@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Follows a running mapper until it has dealt with a number of scans, saves the map and sums up."""
+"""Waits until a running mapper has processed a number of scans, saves the map and writes a summary."""
 import argparse
 import os
 import sys
@@ -11,7 +11,7 @@ from bki_mapping.srv import SaveMap
 
 
 class Follower:
-    """Collects one status a scan."""
+    """Collects the status after each scan."""
 
     def __init__(self, scans):
         self.scans = scans
@@ -27,9 +27,9 @@ class Follower:
             self.done.set()
 
 
-def quantile(values, share):
+def quantile(values, p):
     values = sorted(values)
-    return values[min(len(values) - 1, int(share * len(values)))]
+    return values[min(len(values) - 1, int(p * len(values)))]
 
 
 def summary(follower):
@@ -38,7 +38,7 @@ def summary(follower):
                if name.startswith('dropped_')}
     return '\n'.join([
         f'clouds: {status.received} received, {status.integrated} mapped, dropped: {dropped}',
-        f'time a scan: median {quantile(follower.times, 0.5):.1f} ms, 99th percentile '
+        f'time per scan: median {quantile(follower.times, 0.5):.1f} ms, 99th percentile '
         f'{quantile(follower.times, 0.99):.1f} ms ({os.cpu_count()} cores)',
         f'map: {status.blocks} blocks, {status.map_bytes / 1e6:.1f} MB',
     ]) + '\n'
@@ -46,10 +46,10 @@ def summary(follower):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--scans', type=int, required=True, help='how many clouds to wait for')
-    parser.add_argument('--map', required=True, help='map file to write, .ply or .pcd')
-    parser.add_argument('--summary', required=True, help='text file to write')
-    parser.add_argument('--timeout', type=float, default=600.0, help='seconds to wait')
+    parser.add_argument('--scans', type=int, required=True, help='number of clouds to wait for')
+    parser.add_argument('--map', required=True, help='map file, .ply or .pcd')
+    parser.add_argument('--summary', required=True, help='text file for the summary')
+    parser.add_argument('--timeout', type=float, default=600.0, help='maximum time to wait [s]')
     arguments = parser.parse_args()
 
     follower = Follower(arguments.scans)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Plays the bag named by the parameter ~bag with rosbag play, to which all arguments go.
+"""Plays the bag named by the parameter ~bag with rosbag play, and passes on all arguments.
 
-With --check BAG TOPIC it prints the bag's absolute path, or says what is wrong: roslaunch calls that before it
-starts anything, in the folder of the shell (nodes run in another).
+With --check BAG TOPIC it prints the absolute path of the bag, or exits with one sentence. roslaunch runs this before
+any node, in the folder where it was called; nodes run in another folder.
 """
 import os
 import sys
@@ -13,12 +13,12 @@ import roslib.packages
 
 
 def clouds_of(path):
-    """The topics with clouds, or one sentence that ends the program."""
+    """The topics with clouds. Exits with one sentence if the bag cannot be read."""
     try:
-        with rosbag.Bag(path, skip_index=True) as bag:  # the index of a long bag takes a while
+        with rosbag.Bag(path, skip_index=True) as bag:  # reading the index of a long bag takes long
             topics = bag.get_type_and_topic_info().topics
     except rosbag.ROSBagUnindexedException:
-        sys.exit(f"bag '{path}' was not recorded to its end; run: rosbag reindex '{path}'")
+        sys.exit(f"bag '{path}' has no index because its recording was interrupted; run: rosbag reindex '{path}'")
     except (OSError, rosbag.ROSBagException) as fault:
         why = fault.strerror if isinstance(fault, OSError) else fault
         sys.exit(f"bag '{path}' cannot be read ({why}); check bag:=FILE")
@@ -33,7 +33,7 @@ def check(given, topic):
     if topic not in clouds:
         sys.exit(f"bag '{path}' has no clouds on {topic}; it has some on: {', '.join(clouds)}; choose with "
                  'cloud_topic:=TOPIC')
-    sys.stdout.write(path)  # roslaunch takes a line's end for a part of the path
+    sys.stdout.write(path)  # no newline: roslaunch would make it part of the path
 
 
 def play(arguments):
@@ -41,7 +41,7 @@ def play(arguments):
     try:
         path = rosgraph.Master(name).getParam(name + 'bag')
     except rosgraph.MasterError:
-        sys.exit(f'the parameter {name}bag is not set; start this with replay.launch')
+        sys.exit(f'the parameter {name}bag is not set; start play_bag.py by replay.launch')
     player = roslib.packages.find_node('rosbag', 'play')[0]
     os.execv(player, [player, '--bags', path, *arguments])
 

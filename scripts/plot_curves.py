@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the curves that benchmark_sequence --curves measured: plot_curves.py DIR."""
+"""Draws the curves measured by benchmark_sequence --curves: plot_curves.py DIR."""
 import csv
 import os
 import sys
@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 
 def read(folder, name):
-    """Rows by mode, numbers as floats."""
+    """The rows of a CSV file by mode, as floats."""
     modes = {}
     with open(os.path.join(folder, name), newline='') as file:
         for row in csv.DictReader(file):
@@ -56,8 +56,8 @@ def draw_growth(folder):
 
 
 def draw_points(folder):
-    figure, axes = new_axes('Time of a scan against its points (64 beams, 450 to 3600 columns)',
-                            'points of the scan')
+    figure, axes = new_axes('Time of a scan against its number of points (64 beams, 450 to 3600 columns)',
+                            'points in the scan')
     for mode, rows in read(folder, 'points.csv').items():
         axes.plot([row['points'] for row in rows], [row['median_ms'] for row in rows], 'o-', label=mode)
     axes.set_xlim(left=0)

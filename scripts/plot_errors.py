@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws what evaluate_map --errors measured, from above: plot_errors.py FILE.csv FILE.png."""
+"""Draws the errors measured by evaluate_map --errors, from above: plot_errors.py FILE.csv FILE.png."""
 import csv
 import sys
 
@@ -8,14 +8,14 @@ matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 
-# From what is right to what is worst: what comes later is drawn on top.
+# Correct voxels first and the worst errors last, because later ones are drawn on top.
 KINDS = {
-    'kept': ('#d0d0d0', 'standing, kept'),
-    'forgotten': ('#a8dba8', 'moved, forgotten'),
+    'kept': ('#d0d0d0', 'static, kept'),
+    'forgotten': ('#a8dba8', 'moved, cleared'),
     'wrong class': ('#f0b000', 'occupied, but of another class'),
-    'lost': ('#1f5fd0', 'standing, but lost (a hole)'),
-    'left': ('#e05020', 'moved, but left'),
-    'ghost': ('#c000c0', 'ghost: nothing there for half a second'),
+    'lost': ('#1f5fd0', 'static, but not occupied (hole)'),
+    'left': ('#e05020', 'moved, but still occupied'),
+    'ghost': ('#c000c0', 'ghost: nothing movable near for 0.5 s'),
 }
 
 
@@ -38,7 +38,7 @@ def main():
     width = 12.0
     height = min(max(width * size[1] / size[0], 2.0), 12.0)
     figure, axes = plt.subplots(figsize=(width, height + 1.2))
-    dot = (72.0 * 0.92 * width * 0.3 / size[0]) ** 2  # about a voxel of 0.3 m
+    dot = (72.0 * 0.92 * width * 0.3 / size[0]) ** 2  # about the size of a voxel of 0.3 m
     patches = []
     for kind, (color, name) in KINDS.items():
         if points[kind]:

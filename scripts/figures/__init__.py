@@ -1,1 +1,1 @@
-"""The paper's figures again: see scripts/reproduce."""
+"""Reproduces the paper's figures; see scripts/reproduce."""

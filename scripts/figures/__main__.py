@@ -1,4 +1,4 @@
-"""Measures and draws everything; scripts/reproduce calls it."""
+"""Measures and draws all figures; called by scripts/reproduce."""
 import argparse
 import os
 
@@ -8,11 +8,11 @@ matplotlib.use('Agg')
 from . import complexity, frontier, plane, tradeoff  # noqa: E402
 from .programs import Programs  # noqa: E402
 
-INTRODUCTION = '''# The paper's figures again
+INTRODUCTION = '''# The paper's figures, reproduced
 
-Zhong and Peng, "Real-time Semantic 3D Dense Occupancy Mapping with Efficient Free Space Representations": its comparisons,
-made with this package. All figures here were measured by `scripts/reproduce` in one run, on {cores} cores; times are medians
-over the scans.
+The comparisons of Zhong and Peng, "Real-time Semantic 3D Dense Occupancy Mapping with Efficient Free Space Representations",
+made with this package. `scripts/reproduce` measured all figures in one run on {cores} cores; times are medians over the
+scans.
 
 '''
 
@@ -21,16 +21,16 @@ def main():
     parser = argparse.ArgumentParser(prog='figures', description=__doc__)
     parser.add_argument('--programs', required=True, help='folder with the programs of the package')
     parser.add_argument('--presets', required=True, help='folder with the presets')
-    parser.add_argument('--output', required=True, help='folder to write')
-    parser.add_argument('--scans', type=int, default=60, help='length of the simulated drive')
-    parser.add_argument('--sequence', help="a sequence in SemanticKITTI's layout, too")
+    parser.add_argument('--output', required=True, help='output folder')
+    parser.add_argument('--scans', type=int, default=60, help='number of scans of the simulated drive')
+    parser.add_argument('--sequence', help="additional sequence in SemanticKITTI's layout")
     given = parser.parse_args()
     output = os.path.abspath(given.output)
     programs = Programs(given.programs, os.path.join(output, 'scratch'))
     drive = programs.simulate(f'drive{given.scans}', scans=given.scans)
     cases = [(drive, 'simulated', f'a simulated drive of {given.scans} scans')]
     if given.sequence:
-        cases.append((given.sequence, 'sequence', 'the sequence given'))
+        cases.append((given.sequence, 'sequence', 'the given sequence'))
 
     parts = [plane.draw(programs, output)]
     for sequence, name, title in cases:

@@ -1,4 +1,4 @@
-"""How the time of a scan grows, as measured exponents: time ~ x^e, fitted over all measurements of a row."""
+"""Measured complexity of a scan: the exponents e of time ~ x^e, each fitted to all measurements of a row."""
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -16,7 +16,7 @@ RESOLUTIONS = (0.4, 0.3, 0.2, 0.15, 0.1)
 COLUMNS = (450, 900, 1800, 3600)
 SAMPLES = (1, 2, 4, 8, 16)
 RANGES = (10, 20, 40, 80)
-REPEATS = 3  # runs of each measurement, of which the fastest counts
+REPEATS = 3  # runs of each measurement; the fastest one counts
 
 
 def exponent(xs, times):
@@ -24,7 +24,7 @@ def exponent(xs, times):
 
 
 def measure(programs, drives):
-    """Rows: what is varied, mode, its value, median time. `drives` by number of columns."""
+    """Rows of varied quantity, mode, value and median time [ms]. `drives` maps the number of columns to a drive."""
     rows = []
 
     def add(what, mode, value, sequence, settings):
@@ -35,7 +35,7 @@ def measure(programs, drives):
 
     for mode, settings in MODES.items():
         for columns in COLUMNS:
-            exact = {'downsample_resolution': 0.0, **settings}  # so that points are not merged
+            exact = {'downsample_resolution': 0.0, **settings}  # do not merge points
             add('points', mode, columns, drives[columns], exact)
         for resolution in RESOLUTIONS:
             add('1 / resolution', mode, 1.0 / resolution, drives[1800], {'resolution': resolution, **settings})
@@ -44,7 +44,7 @@ def measure(programs, drives):
     for mode in ('uniform', 'linear'):
         for count in SAMPLES:
             settings = {'free_space/mode': mode, 'free_space/samples_per_beam': count}
-            add('samples a beam', f'{mode}, 1 sample', count, drives[1800], settings)
+            add('samples per beam', f'{mode}, 1 sample', count, drives[1800], settings)
     return rows
 
 
@@ -52,20 +52,20 @@ def draw(programs, output, scans):
     drives = {columns: programs.simulate(f'columns{columns}', scans=min(scans, 12), columns=columns)
               for columns in COLUMNS}
     rows = measure(programs, drives)
-    whats = ['points', 'samples a beam', '1 / resolution', 'range']
+    whats = ['points', 'samples per beam', '1 / resolution', 'range']
     figure, axes = plt.subplots(1, len(whats), figsize=(17, 4))
     table = []
     for mode in MODES:
         line = [mode]
-        for place, what in zip(axes, whats):
+        for ax, what in zip(axes, whats):
             own = [row for row in rows if row[0] == what and row[1] == mode]
             line.append(f'{exponent([r[2] for r in own], [r[3] for r in own]):.2f}' if own else '')
             if own:
-                place.loglog([r[2] for r in own], [r[3] for r in own], 'o-', markersize=4, label=mode)
+                ax.loglog([r[2] for r in own], [r[3] for r in own], 'o-', markersize=4, label=mode)
         table.append(line)
-    for place, what in zip(axes, whats):
-        place.set_xlabel(what)
-        place.grid(True, which='both', alpha=0.3)
+    for ax, what in zip(axes, whats):
+        ax.set_xlabel(what)
+        ax.grid(True, which='both', alpha=0.3)
     axes[0].set_ylabel(f'time of a scan [ms], median, best of {REPEATS}')
     axes[2].legend(fontsize=7)
     figure.tight_layout()
@@ -74,10 +74,10 @@ def draw(programs, output, scans):
     return f'''## Complexity
 
 Exponents e of time ~ x^e, fitted to the measurements of [complexity.csv](complexity.csv): points of a scan (64 beams,
-{COLUMNS[0]} to {COLUMNS[-1]} columns, without down-sampling), samples a beam ({SAMPLES[0]} to {SAMPLES[-1]}), 1 / resolution
+{COLUMNS[0]} to {COLUMNS[-1]} columns, without down-sampling), samples per beam ({SAMPLES[0]} to {SAMPLES[-1]}), 1 / resolution
 ({RESOLUTIONS[0]} to {RESOLUTIONS[-1]} m, kernel of 0.3 m) and range ({RANGES[0]} to {RANGES[-1]} m). A hit reaches the voxels
-in a ball of the kernel's length, so 1 / resolution counts to the third power at most; lines and surfaces share voxels, which
-brings it down.
+in a ball with the radius kernel/length, so the exponent of 1 / resolution is at most 3; it is lower because neighbouring
+hits and beams reach the same voxels.
 
 ![complexity](complexity.png)
 

@@ -1,4 +1,4 @@
-"""Every mode and option: what it keeps and forgets, against its time."""
+"""Accuracy of every mode, option and preset against its time."""
 import os
 
 import matplotlib.pyplot as plt
@@ -10,7 +10,7 @@ def line(extent='mapped', weight='bilinear'):
     return {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
 
 
-# What turns plain lines into the preset `robot`, one after the other.
+# The steps from plain lines to the preset `robot`.
 STEPS = {
     '+ hits before misses': {'free_space/hits_before_misses': 'true'},
     '+ free_gain/static 0.1': {'free_gain/static': 0.1},
@@ -55,21 +55,21 @@ def row_of(name, figures):
 
 
 def draw_calibration(figures_of, name, output):
-    """Reliability curves of the class's probability and, on simulated drives, of occupancy. Returns the section."""
+    """Draws reliability diagrams of the class's probability and, on simulated drives, of occupancy; returns the section."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.4))
     rows = []
     for preset, figures in figures_of.items():
         truth = figures.get('truth', {})
         curves = (('class', figures['reliability']), ('occupancy', truth.get('occupancy_reliability', [])))
-        for place, (what, bins) in zip(axes, curves):
+        for ax, (what, bins) in zip(axes, curves):
             seen = [b for b in bins if b['count'] > 0]
-            place.plot([b['probability'] for b in seen], [b['right'] for b in seen], 'o-', markersize=4, label=preset)
+            ax.plot([b['probability'] for b in seen], [b['right'] for b in seen], 'o-', markersize=4, label=preset)
             rows += [[preset, what, b['count'], b['probability'], b['right']] for b in seen]
-    for place, what in zip(axes, ("of the voxel's class, at points", 'of being occupied, of voxels')):
-        place.plot((0, 1), (0, 1), 'k:')
-        place.set_xlabel('probability ' + what)
-        place.set_ylabel('share that is so')
-        place.grid(True, alpha=0.3)
+    for ax, what in zip(axes, ("of the voxel's class, at points", 'of being occupied, of voxels')):
+        ax.plot((0, 1), (0, 1), 'k:')
+        ax.set_xlabel('probability ' + what)
+        ax.set_ylabel('fraction that is correct')
+        ax.grid(True, alpha=0.3)
     axes[0].legend(fontsize=8)
     figure.tight_layout()
     save(figure, output, f'calibration_{name}.png')
@@ -79,7 +79,7 @@ def draw_calibration(figures_of, name, output):
         return '' if value is None else f'{100 * value:.1f}'
     table = [[preset, percent(f['calibration_error']), percent(f.get('truth', {}).get('occupancy_calibration_error')),
               percent(f['sparsification_error'])] for preset, f in figures_of.items()]
-    return f'''Reliability: how often what was told with a probability is so ([calibration_{name}.csv](calibration_{name}.csv)).
+    return f'''Reliability: how often a prediction of a given probability is correct ([calibration_{name}.csv](calibration_{name}.csv)).
 
 ![calibration](calibration_{name}.png)
 
@@ -87,7 +87,7 @@ def draw_calibration(figures_of, name, output):
 
 
 def draw_frontier(rows, name, title, output):
-    """AA against time; the scale spreads what is near 100 %."""
+    """Draws AA against time, on a scale that is logarithmic in the distance from 100 %."""
     figure, axes = plt.subplots(figsize=(12, 5.6))
     for number, row in enumerate(rows, 1):
         preset = row[0].startswith('preset')
@@ -124,8 +124,8 @@ def draw(programs, sequence, name, title, presets, output):
     write_csv(output, f'frontier_{name}.csv', header, rows)
     return f'''## The frontier: {title}
 
-Every mode, option and preset: accuracy against time. Figures are shares in % as docs/files.md defines them; each `+` adds
-to the row above it. [frontier_{name}.csv](frontier_{name}.csv):
+Accuracy of every mode, option and preset against time. Figures are fractions in %, defined in docs/files.md; each `+` adds
+an option to the row above. [frontier_{name}.csv](frontier_{name}.csv):
 
 ![frontier](frontier_{name}.png)
 

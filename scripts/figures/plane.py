@@ -1,4 +1,4 @@
-"""A scan in the plane, and what each representation of free space makes of it (after the paper's Figures 1 and 2)."""
+"""A scan in a plane, mapped with each representation of free space (after the paper's Figures 1 and 2)."""
 import os
 
 import matplotlib.pyplot as plt
@@ -12,10 +12,10 @@ PILLARS = [(4.0, 2.5, 0.8), (-3.0, -2.0, 0.6), (1.0, -4.0, 0.5), (-5.5, 3.5, 0.7
 HALF = (9.0, 6.5)  # half extents of the room [m]
 SENSOR = (-1.0, 0.5)
 PATTERNS = {
-    'hits alone': {'free_space/mode': 'none'},
+    'hits only': {'free_space/mode': 'none'},
     'even, every metre': {'free_space/mode': 'even', 'free_space/gap': 1.0},
-    'uniform, 5 a beam': {'free_space/mode': 'uniform', 'free_space/samples_per_beam': 5},
-    'linear, 5 a beam': {'free_space/mode': 'linear', 'free_space/samples_per_beam': 5},
+    'uniform, 5 per beam': {'free_space/mode': 'uniform', 'free_space/samples_per_beam': 5},
+    'linear, 5 per beam': {'free_space/mode': 'linear', 'free_space/samples_per_beam': 5},
     'whole lines': {'free_space/mode': 'line', 'free_space/weight': 'uniform', 'free_space/extent': 'observed'},
 }
 WEIGHTS = {f'lines, {weight}': {'free_space/mode': 'line', 'free_space/weight': weight,
@@ -24,7 +24,7 @@ DENSITIES = {**{name: PATTERNS[name] for name in list(PATTERNS)[1:4]}, **WEIGHTS
 
 
 def ranges(directions):
-    """Distance from the sensor to the room's walls or a pillar along unit vectors."""
+    """Distance from the sensor to the nearest wall or pillar along unit vectors."""
     origin = np.array(SENSOR)
     with np.errstate(divide='ignore'):
         walls = np.where(directions > 0, np.array(HALF) - origin, -np.array(HALF) - origin) / directions
@@ -39,7 +39,7 @@ def ranges(directions):
 
 
 def write_scan(folder):
-    """One scan of the room as a sequence in SemanticKITTI's layout; returns the hits relative to the sensor."""
+    """Writes one scan of the room as a sequence in SemanticKITTI's layout; returns the hits relative to the sensor."""
     for name in ('velodyne', 'labels'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     azimuth = (np.arange(BEAMS) + 0.5) / BEAMS * 2 * np.pi
@@ -57,14 +57,14 @@ def write_scan(folder):
 
 
 def samples_of(programs, scan, settings):
-    """Where a mode samples: voxels of 5 cm, whose evidence is the number of samples in them (a point counts 1)."""
+    """The samples of a mode, as voxels of 5 cm: by the counting kernel, their evidence is the number of samples in them."""
     exact = {'kernel/type': 'counting', 'resolution': 0.05, 'downsample_resolution': 0.0, **settings}
     voxels = programs.map(scan, exact, 'occupied,free')[1]
     return voxels[voxels['state'] == FREE]
 
 
 def plot_training_data(axes, programs, scan, hits, settings):
-    """Samples as points, whole beams as lines; returns the voxels of the samples."""
+    """Draws samples as points and whole beams as lines; returns the voxels of the samples."""
     free = samples_of(programs, scan, settings)
     if settings['free_space/mode'] == 'line':
         for x, y in hits:
@@ -84,14 +84,14 @@ def show_room(axes, hits, title):
 
 
 def draw_patterns(programs, scan, hits, output):
-    """Figure 1: where each pattern samples, and how many samples that is on each square metre by distance."""
+    """Figure 1: the samples of each pattern, and their density by distance from the sensor."""
     figure, axes = plt.subplots(1, len(PATTERNS), figsize=(18, 3.2))
     rings = np.arange(0.0, 6.0, 1.0)
     rows = []
-    for place, (name, settings) in zip(axes, PATTERNS.items()):
-        free = plot_training_data(place, programs, scan, hits, settings)
-        show_room(place, hits, name)
-        if name in ('hits alone', 'whole lines'):
+    for ax, (name, settings) in zip(axes, PATTERNS.items()):
+        free = plot_training_data(ax, programs, scan, hits, settings)
+        show_room(ax, hits, name)
+        if name in ('hits only', 'whole lines'):
             continue
         distance = np.hypot(free['x'], free['y'])
         for ring in rings:
@@ -106,7 +106,7 @@ def draw_patterns(programs, scan, hits, output):
 
 
 def draw_densities(programs, scan, hits, output):
-    """Figure 2: training data above, inference below."""
+    """Figure 2: training data in the upper row, inference in the lower."""
     figure, axes = plt.subplots(2, len(DENSITIES), figsize=(20, 6.4))
     rows = []
     for column, (name, settings) in enumerate(DENSITIES.items()):
@@ -114,7 +114,7 @@ def draw_densities(programs, scan, hits, output):
         show_room(axes[0][column], hits, name)
         fine = {'resolution': 0.1, 'kernel/length': 0.3, **settings}
         report, voxels = programs.map(scan, fine, 'occupied,free')
-        plane = voxels[np.abs(voxels['z'] - 0.05) < 0.01]  # the voxels that the beams lie in
+        plane = voxels[np.abs(voxels['z'] - 0.05) < 0.01]  # the layer of voxels that contains the beams
         for state, colors in ((FREE, 'Blues'), (OCCUPIED, 'Reds')):
             part = plane[plane['state'] == state]
             axes[1][column].scatter(part['x'], part['y'], c=np.log10(part['evidence']), s=3, marker='s', linewidths=0,
@@ -128,7 +128,7 @@ def draw_densities(programs, scan, hits, output):
     save(figure, output, 'figure2.png')
     header = ['representation', 'samples_or_beams', 'free_voxels', 'occupied_voxels']
     write_csv(output, 'figure2.csv', header, rows)
-    return markdown(['representation', 'samples or beams', 'free voxels of the plane', 'occupied ones'], rows)
+    return markdown(['representation', 'samples or beams', 'free voxels in the plane', 'occupied voxels'], rows)
 
 
 def draw(programs, output):
@@ -136,18 +136,18 @@ def draw(programs, output):
     hits = write_scan(scan)
     return f'''## Where free space is sampled (after Figure 1)
 
-One scan of {BEAMS} beams in a plane room; samples are seen through the counting kernel in voxels of 5 cm.
+One scan of {BEAMS} beams in a two-dimensional room. The counting kernel in voxels of 5 cm shows the samples.
 
 ![patterns](figure1.png)
 
-Samples on each square metre, by distance from the sensor ([figure1.csv](figure1.csv)): `linear` spreads them most evenly
-near the sensor, as Theorem 1 says; `uniform` and `even` crowd there.
+Samples per square metre, by distance from the sensor ([figure1.csv](figure1.csv)): `linear` is the most even near the
+sensor, as Theorem 1 says; `uniform` and `even` are densest there.
 
 {draw_patterns(programs, scan, hits, output)}
-## What comes of it (after Figure 2)
+## The resulting maps (after Figure 2)
 
-Training data above; below, what the sparse kernel of 0.3 m makes of it in voxels of 0.1 m, by evidence (the darker, the
-more, on a scale from 0.001 to 10): free blue, occupied red ([figure2.csv](figure2.csv)).
+Upper row: training data. Lower row: the map with the sparse kernel of 0.3 m in voxels of 0.1 m, free in blue and occupied in
+red; darker voxels have more evidence, on a logarithmic scale from 0.001 to 10 ([figure2.csv](figure2.csv)).
 
 ![densities](figure2.png)
 

@@ -1,4 +1,4 @@
-"""Runs the programs of the package and reads what they write."""
+"""Runs the programs of the package and reads their output."""
 import json
 import os
 import subprocess
@@ -9,11 +9,11 @@ import numpy as np
 VOXEL = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('red', 'u1'), ('green', 'u1'), ('blue', 'u1'),
                   ('label', '<u2'), ('state', 'u1'), ('probability', '<f4'), ('variance', '<f4'), ('entropy', '<f4'),
                   ('evidence', '<f4')])
-FREE, OCCUPIED = 1, 2  # states of voxels in map files
+FREE, OCCUPIED = 1, 2  # voxel states in map files
 
 
 def read_ply(path):
-    """The voxels of a map file (docs/files.md) as a structured array."""
+    """Reads the voxels of a map file (docs/files.md) into a structured array."""
     with open(path, 'rb') as file:
         content = file.read()
     end = content.index(b'end_header\n') + len(b'end_header\n')
@@ -25,7 +25,7 @@ def read_ply(path):
 
 
 class Programs:
-    """Calls the programs in one folder; files in between go to a scratch folder."""
+    """Runs the programs of one folder; intermediate files go to a scratch folder."""
 
     def __init__(self, folder, scratch):
         self.folder, self.scratch = folder, scratch
@@ -47,7 +47,7 @@ class Programs:
             return json.load(file)
 
     def map(self, sequence, settings, states=None, more=()):
-        """Maps a sequence: the report of map_sequence and, where states are asked for, the voxels in them."""
+        """Maps a sequence; returns the report of map_sequence and, if states are given, the voxels in these states."""
         more = list(more)
         path = os.path.join(self.scratch, 'map.ply')
         if states:
@@ -56,11 +56,11 @@ class Programs:
         return report, read_ply(path) if states else None
 
     def evaluate(self, sequence, settings, more=()):
-        """The figures of evaluate_map."""
+        """Returns the figures of evaluate_map."""
         return self._with('evaluate_map', '--json', sequence, settings, more)
 
     def simulate(self, name, **options):
-        """A simulated drive; returns its folder, and makes it only once."""
+        """Simulates a drive unless it exists; returns its folder."""
         folder = os.path.join(self.scratch, name)
         if not os.path.isdir(folder):
             words = [word for key, value in options.items() for word in ('--' + key.replace('_', '-'), str(value))]
@@ -69,5 +69,5 @@ class Programs:
 
 
 def median_samples(report):
-    """Free samples (after down-sampling) or beams of a scan, in the median."""
+    """Median number of free samples (after down-sampling) or beams of a scan."""
     return float(np.median([scan['free_samples_or_beams'] for scan in report['scans']]))

@@ -1,4 +1,4 @@
-"""CSV files and tables of the report."""
+"""Writes the CSV files and tables of the report."""
 import csv
 import os
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Documents name only what exists: paths of the tree, targets of links, and the version of the package."""
+"""Documents name only existing paths and link targets, and the version of the package."""
 import glob
 import os
 import re
@@ -24,7 +24,7 @@ FILES = list(all_files())
 
 
 def words_of(text):
-    """Words in code spans and blocks, without the punctuation around them."""
+    """The words in code spans and blocks, without surrounding punctuation."""
     spans = re.findall(r'^```.*?\n(.*?)^```$', text, re.MULTILINE | re.DOTALL)
     spans += re.findall(r'`([^`\n]+)`', re.sub(r'^```.*?^```$', '', text, flags=re.MULTILINE | re.DOTALL))
     for span in spans:
@@ -33,7 +33,7 @@ def words_of(text):
 
 
 def missing_paths(text):
-    """Words that look like paths of the tree, or like source files, and are none."""
+    """Words that look like paths of the tree or source files, but do not exist."""
     missing = []
     for word in words_of(text):
         if PLACEHOLDER.search(word):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A test that has nothing to test on is shown by ctest as skipped, not as passed."""
+"""ctest shows a test without its data as skipped, not as passed."""
 import json
 import os
 import re
@@ -17,7 +17,7 @@ class Skips(unittest.TestCase):
         cls.tests = {test['name']: test for test in json.loads(listed.stdout)['tests']}
 
     def outcome(self, name, **data):
-        """What ctest makes of a test's exit status and output, with this data alone."""
+        """The result that ctest derives from exit status and output of a test, with only this data."""
         properties = {p['name']: p['value'] for p in self.tests[name]['properties']}
         environment = {key: value for key, value in os.environ.items() if key != 'BKI_MAPPING_TEST_DATA'}
         run = subprocess.run(self.tests[name]['command'], capture_output=True, text=True, timeout=60, check=False,
@@ -41,7 +41,7 @@ class Skips(unittest.TestCase):
         self.assertEqual(self.outcome('grid_geometry_test'), 'passed')
 
     def test_no_test_skips_a_part_of_itself(self):
-        """ctest would hide what skips among tests that do not: it has a program of its own, listed here."""
+        """ctest would hide a skipped case among others of the same program, so that each has a separate program, listed here."""
         for folder, _, files in os.walk(os.path.join(ROOT, 'test')):
             for name in files:
                 with open(os.path.join(folder, name)) as file:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""A simulated drive played by play_sequence, and the same drive replayed from a bag, give the map of map_sequence to
-the byte: through the launch files that users start, whose paths are those of the shell. What cannot be played ends."""
+"""A simulated drive played by play_sequence, and the same drive replayed from a bag, give the same bytes as
+map_sequence, through the launch files that users start, with paths relative to the shell. What cannot be played ends
+the launch."""
 import os
 import resource
 import shutil
@@ -24,7 +25,7 @@ from harness import TIMEOUT, Listener, program, wait_until  # noqa: E402
 
 SCANS = 6
 PACKAGE = roslib.packages.get_pkg_dir('bki_mapping')
-PRESET = os.path.join(PACKAGE, 'config/presets/robot.yaml')  # of the launch files
+PRESET = os.path.join(PACKAGE, 'config/presets/robot.yaml')  # default of the launch files
 
 
 def run(name, *arguments):
@@ -97,7 +98,7 @@ class Replay(unittest.TestCase):
             self.assertTrue(self.map_of_launch(*launch) == expected, launch)
 
     def ends(self, words, *launch):
-        """What cannot be played ends the launch, and is said in one line."""
+        """What cannot be played ends the launch with one line."""
         server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, 'rviz:=false'], cwd=self.folder,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         try:
@@ -119,8 +120,8 @@ class Replay(unittest.TestCase):
         self.ends(f"bag '{self.path('text.bag')}' cannot be read (", 'replay.launch', 'bag:=text.bag')
         with open(self.bag, 'rb') as whole, open(self.path('cut.bag'), 'wb') as file:
             file.write(whole.read(100000))
-        self.ends(f"bag '{self.path('cut.bag')}' was not recorded to its end; run: rosbag reindex ",
-                  'replay.launch', 'bag:=cut.bag')
+        self.ends(f"bag '{self.path('cut.bag')}' has no index because its recording was interrupted; run: rosbag "
+                  'reindex ', 'replay.launch', 'bag:=cut.bag')
         self.ends(f"bag '{self.bag}' has no clouds on /points; it has some on: /velodyne_points; choose with "
                   'cloud_topic:=TOPIC', 'replay.launch', 'bag:=my drive.bag', 'cloud_topic:=/points')
         with rosbag.Bag(self.path('empty.bag'), 'w'):
@@ -182,7 +183,7 @@ class Replay(unittest.TestCase):
             self.assertIn(words, result.stderr)
 
     def test_a_full_disk_is_said_in_one_sentence(self):
-        def limit():  # as if the disk were full
+        def limit():  # simulates a full disk
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
         folder = os.path.join(self.folder, 'full')

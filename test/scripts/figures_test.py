@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The figures of scripts/reproduce: on small cases, each is drawn, and its table says what it must."""
+"""Each figure of scripts/reproduce is drawn for a small case, and its table has the expected values."""
 import csv
 import math
 import os
@@ -45,13 +45,13 @@ class Figures(unittest.TestCase):
     def test_plane(self):
         self.expect_pictures(plane.draw(self.programs, self.output), 2)
 
-        def crowding(pattern):  # near the sensor against far from it
+        def crowding(pattern):  # density near the sensor, relative to far from it
             density = [float(row['samples_per_m2']) for row in self.rows('figure1.csv') if row['pattern'] == pattern]
             return density[0] / density[3]
-        self.assertLess(crowding('linear, 5 a beam'), 2.5)
-        self.assertGreater(crowding('uniform, 5 a beam'), 5)
+        self.assertLess(crowding('linear, 5 per beam'), 2.5)
+        self.assertGreater(crowding('uniform, 5 per beam'), 5)
         free = {row['representation']: int(row['free_voxels']) for row in self.rows('figure2.csv')}
-        self.assertGreater(free['lines, uniform'], 1.3 * free['linear, 5 a beam'])
+        self.assertGreater(free['lines, uniform'], 1.3 * free['linear, 5 per beam'])
 
     def test_tradeoff_and_views(self):
         modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}

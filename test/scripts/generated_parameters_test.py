@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""config/default.yaml, cfg/Mapping.cfg and the tables of docs/parameters.md are those that the parameters give."""
+"""config/default.yaml, cfg/Mapping.cfg and the tables of docs/parameters.md are up to date with the parameters."""
 import os
 import shutil
 import subprocess
