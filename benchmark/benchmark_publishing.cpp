@@ -1,4 +1,4 @@
-// What publishing costs while the map grows: a simulated drive, every map topic with one subscriber.
+// Times publishing while the map of a simulated drive grows: every map topic, with one subscriber each.
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <topic_tools/shape_shifter.h>
@@ -16,7 +16,7 @@
 namespace {
 
 using namespace bki_mapping;
-using namespace bki_mapping::ros_shell;
+using namespace bki_mapping::ros_interface;
 namespace po = tools::po;
 
 po::options_description options() {
@@ -24,8 +24,8 @@ po::options_description options() {
   options.add_options()(
       "scans", tools::countOption("--scans", 50, 1000000)->value_name("N")->default_value(400),
       "length of the drive")("every", tools::countOption("--every", 1)->value_name("N")->default_value(5),
-                             "scans between publishing")("csv", po::value<std::string>()->value_name("FILE"),
-                                                         "write every time, too")(
+                             "scans between two publications")(
+      "csv", po::value<std::string>()->value_name("FILE"), "table of all times")(
       "view-range", tools::realOption("--view-range", 0.0)->value_name("M")->default_value(0.0),
       "parameter view_range [m]");
   return options;
@@ -90,7 +90,7 @@ int measure(const po::variables_map& given) {
   }
   csv.close();
   if (given.count("csv") > 0 && !csv) throw std::runtime_error("the CSV file cannot be written");
-  // The first fifth against the last: what grows with the map shows.
+  // The first fifth against the last shows which times grow with the map.
   const std::size_t n = times[0].size(), fifth = std::max<std::size_t>(n / 5, 1);
   std::printf("map: %zu blocks after %zu scans, %zu in the end\n", blocks[fifth / 2], (fifth / 2) * every,
               blocks.back());
@@ -115,7 +115,7 @@ int main(int argc, char** argv) {
                      "grows. Needs a roscore.",
                      options());
     if (!given) return 0;
-    if (!ros::master::check()) throw std::runtime_error("no ROS master answers; start roscore");
+    if (!ros::master::check()) throw std::runtime_error("no ROS master is running; start roscore");
     return measure(*given);
   });
 }

@@ -7,7 +7,7 @@ bki_mapping_room(ros SOURCES
     label_reader.cpp
     live_settings.cpp
     load_advice.cpp
-    map_publishing.cpp
+    publisher_set.cpp
     mapping_diagnostics.cpp
     mapping_server.cpp
     mapping_services.cpp

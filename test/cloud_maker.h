@@ -14,7 +14,7 @@
 
 #include "ros/point_field.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 /// A cloud of one row with x, y, z and further fields, one after the other.
 class CloudMaker {
@@ -92,4 +92,4 @@ class CloudMaker {
   std::vector<Field> fields_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

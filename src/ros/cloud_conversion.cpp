@@ -6,7 +6,7 @@
 
 #include "ros/no_returns.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 double pointTime(const FieldReader& time, const std::uint8_t* point) {
   return time.integer() ? 1e-9 * time(point) : time(point);
@@ -79,4 +79,4 @@ sensor_msgs::PointCloud2 makeCloud(const std::vector<Eigen::Vector3f>& points,
   return cloud;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -8,7 +8,7 @@
 
 #include "ros/point_field.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 class ColorReader : public LabelReader {
@@ -34,7 +34,7 @@ class ColorReader : public LabelReader {
   }
 
  private:
-  /// 0xRRGGBB, or kNoLabel for values that are no colour.
+  /// 0xRRGGBB, or kNoLabel if the values are not a colour.
   std::uint32_t colorAt(const std::uint8_t* point) const {
     std::uint32_t color = 0;
     if (fields_.size() == 1) {
@@ -64,7 +64,7 @@ class ColorReader : public LabelReader {
       }
     }
     if (!nearest_ && least > 0) best = kNoLabel;
-    // A camera's picture can hold millions of colours; few repeat then.
+    // Bounds memory: a camera image can have millions of colours, few of which repeat.
     if (class_of_.size() < 65536) class_of_[color] = best;
     return best;
   }
@@ -92,4 +92,4 @@ std::unique_ptr<LabelReader> makeColorReader(const sensor_msgs::PointCloud2& clo
   return std::make_unique<ColorReader>(cloud, input, classes);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

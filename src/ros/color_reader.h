@@ -1,12 +1,12 @@
-/// @file Labels that are colours of the class table.
+/// @file Reads labels that are encoded as colours of the class table.
 #pragma once
 
 #include "ros/label_reader.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// For encodings rgb and bgr. Where classes share a colour, it means the one with the smallest id.
+/// Reader for the encodings rgb and bgr. A colour of several classes means the one with the smallest id.
 std::unique_ptr<LabelReader> makeColorReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
                                              const ClassTable& classes);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

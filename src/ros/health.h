@@ -1,15 +1,15 @@
-/// @file A verdict for /diagnostics.
+/// @file The health reported on /diagnostics.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Level and message of a status: the level is one of diagnostic_msgs/DiagnosticStatus.
+/// A level of diagnostic_msgs/DiagnosticStatus, and its message.
 struct Health {
   std::uint8_t level = 0;
   std::string message;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

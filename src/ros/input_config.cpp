@@ -2,7 +2,7 @@
 
 #include "core/sensor_model_parameters.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 std::vector<NamedParameter<InputConfig>> inputParameters() {
   using C = InputConfig;
@@ -57,4 +57,4 @@ std::vector<NamedParameter<InputConfig>> ownInputParameters() {
   return parameters;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

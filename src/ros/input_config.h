@@ -7,7 +7,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 /// How a cloud carries the class of a point.
 enum class LabelEncoding {
@@ -40,4 +40,4 @@ std::vector<NamedParameter<InputConfig>> inputParameters();
 /// All parameters below `inputs/NAME/`: the above, `topic`, `min_range` and `max_range`.
 std::vector<NamedParameter<InputConfig>> ownInputParameters();
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -4,16 +4,16 @@
 #include "ros/point_field.h"
 #include "ros/score_reader.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Every point has the label 0.
+/// Gives every point the label 0.
 class NoLabels : public LabelReader {
  public:
   void append(const std::uint8_t*, CloudLabels& out) override { out.labels.push_back(0); }
 };
 
-/// A field of any datatype with the label number.
+/// Reads the label from a field of any datatype.
 class NumberReader : public LabelReader {
  public:
   NumberReader(const sensor_msgs::PointCloud2& cloud, const std::string& field, const ClassTable& classes,
@@ -22,7 +22,7 @@ class NumberReader : public LabelReader {
 
   void append(const std::uint8_t* point, CloudLabels& out) override {
     const std::uint32_t label = field_.label(point);
-    if (label != last_) {  // neighbours mostly have the same
+    if (label != last_) {  // saves most look-ups: neighbouring points mostly have the same label
       last_ = label;
       known_ = classes_.classOf(label, values_).has_value();
     }
@@ -55,4 +55,4 @@ std::unique_ptr<LabelReader> makeLabelReader(const sensor_msgs::PointCloud2& clo
   }
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

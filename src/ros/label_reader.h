@@ -1,4 +1,4 @@
-/// @file Labels of points in every encoding.
+/// @file Reads the labels of points, in every encoding.
 #pragma once
 
 #include <sensor_msgs/PointCloud2.h>
@@ -12,35 +12,35 @@
 #include "ros/input_config.h"
 #include "ros/point_field.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 /// The labels of a cloud's points.
 struct CloudLabels {
-  std::vector<std::uint32_t> labels;  ///< one a point; kNoLabel where there is none
-  bool are_ids = false;               ///< ids of the class table, or as `label_values` says
-  SoftLabels soft;                    ///< of encodings scores and top_k; else empty
-  /// What was found instead of a class, and how often; at most kMostUnknown values are told apart.
+  std::vector<std::uint32_t> labels;  ///< one per point; kNoLabel for points without a label
+  bool are_ids = false;               ///< whether they are class ids; otherwise `label_values` decides
+  SoftLabels soft;                    ///< for the encodings scores and top_k; otherwise empty
+  /// Values that are not in the class table, and how often each occurred; at most kMaxUnknown of them.
   std::map<std::uint32_t, std::size_t> unknown;
 
-  static constexpr std::size_t kMostUnknown = 64;
+  static constexpr std::size_t kMaxUnknown = 64;
   void countUnknown(std::uint32_t value) {
-    if (unknown.size() < kMostUnknown || unknown.count(value) > 0) ++unknown[value];
+    if (unknown.size() < kMaxUnknown || unknown.count(value) > 0) ++unknown[value];
   }
 };
 
-/// Reads labels point by point.
+/// Reads the label of one point at a time.
 class LabelReader {
  public:
   virtual ~LabelReader() = default;
-  /// Appends the label of a point. @param point its first byte.
+  /// Appends the label of a point. @param point its first byte in the cloud.
   virtual void append(const std::uint8_t* point, CloudLabels& out) = 0;
 };
 
-/// A reader for the input's encoding. The cloud's sizes must have been checked.
-/// @param classes must live as long as the reader.
-/// @throws std::invalid_argument in one sentence: fields are missing, or do not fit the encoding or the
-/// table.
+/// A reader for the input's encoding. @pre checkSizes(cloud) has passed.
+/// @param classes must outlive the reader.
+/// @throws std::invalid_argument in one sentence: fields are missing, or do not match the encoding or the
+/// class table.
 std::unique_ptr<LabelReader> makeLabelReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
                                              const ClassTable& classes, LabelValues label_values);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -8,16 +8,16 @@
 
 #include "bki_mapping/mapping/parameters.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// dynamic_reconfigure requires identifiers.
+/// The name as dynamic_reconfigure requires it: an identifier.
 std::string identifierOf(std::string name) {
   std::replace(name.begin(), name.end(), '/', '_');
   return name;
 }
 
-/// All values by identifier.
+/// The values of a configuration by identifier.
 std::map<std::string, std::string> valuesOf(const MappingConfig& config) {
   dynamic_reconfigure::Config message;
   config.__toMessage__(message);
@@ -29,7 +29,7 @@ std::map<std::string, std::string> valuesOf(const MappingConfig& config) {
   return values;
 }
 
-/// Names and values of all parameters of both kinds.
+/// The values of all parameters by name.
 std::map<std::string, std::string> valuesOf(const ServerConfig& server, const MapperConfig& mapper) {
   std::map<std::string, std::string> values;
   for (const auto& p : serverParameters()) values[p.name] = p.get(server);
@@ -43,7 +43,7 @@ LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConf
                            const MapperConfig& mapper, Apply apply, std::function<void()> answered)
     : server_(server), mapper_(mapper), apply_(std::move(apply)), answered_(std::move(answered)) {
   ros::NodeHandle node(private_node, "reconfigure");
-  ros::param::del(node.getNamespace());  // what an earlier run left there
+  ros::param::del(node.getNamespace());  // values of an earlier run
   offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(mutex_, node);
   offered_->updateConfig(show(server_, mapper_));
   offered_->setCallback([this](MappingConfig& config, std::uint32_t) { onChange(config); });
@@ -98,4 +98,4 @@ void LiveSettings::onChange(MappingConfig& config) {
   config.last_refusal = last_refusal_;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -11,35 +11,35 @@
 
 #include "ros/server_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Parameters that clients see beside those that change while mapping; a change of one is refused.
+/// Parameters that clients see although they cannot change while mapping; a change of one is refused.
 inline const std::vector<std::string>& shownAtStart() {
   static const std::vector<std::string> names = {"resolution", "frame_id", "classes"};
   return names;
 }
 
-/// Name of the setting that holds lastRefusal: a server of dynamic_reconfigure can refuse in no other way.
+/// Setting that reports lastRefusal: dynamic_reconfigure has no other way to report a refusal.
 constexpr char kLastRefusal[] = "last_refusal";
 
-/// Offers the parameters of cfg/Mapping.cfg in the namespace `~reconfigure`, so that what dynamic_reconfigure
-/// writes to the parameter server does not mix with parameters read at the start.
+/// Offers the parameters of cfg/Mapping.cfg in the namespace `~reconfigure`, which keeps the values that
+/// dynamic_reconfigure writes to the parameter server apart from the parameters read at the start.
 class LiveSettings {
  public:
-  /// Takes over new settings. @throws std::invalid_argument if it cannot.
+  /// Applies new settings. @throws std::invalid_argument if they are not allowed.
   using Apply = std::function<void(const ServerConfig&, const MapperConfig&)>;
 
-  /// @param answered called when a change was taken over or refused.
+  /// @param answered called after each change was applied or refused.
   LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server, const MapperConfig& mapper,
                Apply apply, std::function<void()> answered);
 
-  /// Why the last change was refused; "" if it was not.
+  /// Why the last change was refused; "" if it was applied.
   const std::string& lastRefusal() const { return last_refusal_; }
 
-  /// A configuration with the given settings.
+  /// The dynamic_reconfigure configuration of the given settings.
   static MappingConfig show(const ServerConfig& server, const MapperConfig& mapper);
-  /// Sets what a configuration says. @throws std::invalid_argument if a value is not allowed, or the name of
-  /// one that cannot change.
+  /// Sets the settings of a configuration. @throws std::invalid_argument if a value is not allowed, or if a
+  /// parameter differs that cannot change while mapping.
   static void take(const MappingConfig& from, ServerConfig& server, MapperConfig& mapper);
 
  private:
@@ -50,8 +50,8 @@ class LiveSettings {
   Apply apply_;
   std::function<void()> answered_;
   std::string last_refusal_;
-  boost::recursive_mutex mutex_;  ///< of offered_
+  boost::recursive_mutex mutex_;  ///< protects offered_
   std::unique_ptr<dynamic_reconfigure::Server<MappingConfig>> offered_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

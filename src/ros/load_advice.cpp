@@ -5,22 +5,22 @@
 
 #include "bki_mapping/core/named_parameter.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Median times of a scan [ms], of SemanticKITTI 04 with two threads. A test compares them with
+/// Median times of a scan [ms] on SemanticKITTI 04 with two threads. A test compares them with
 /// docs/performance.md.
 struct Medians {
   double none = 5.1;
-  double linear = 10.4;    ///< one sample a beam
-  double linear_5 = 22.9;  ///< five
-  double uniform = 11.5;   ///< one
+  double linear = 10.4;    ///< one sample per beam
+  double linear_5 = 22.9;  ///< five samples per beam
+  double uniform = 11.5;   ///< one sample per beam
   double even = 45.9;      ///< gap 1 m
   double line_mapped = 25.5;
   double line_observed = 37.0;
 };
 
-/// The time of a mode on 04 [ms].
+/// The measured time of a mode [ms].
 double timeOf(const FreeSpaceConfig& free_space) {
   const Medians measured;
   if (free_space.mode == "none") return measured.none;
@@ -32,13 +32,13 @@ double timeOf(const FreeSpaceConfig& free_space) {
   return one + (measured.linear_5 - measured.linear) / 4.0 * (free_space.samples_per_beam - 1);
 }
 
-/// Times after a change, in that of now.
+/// Times after a change, as fractions of the present time.
 struct Savings {
   double coarser;  ///< resolution, kernel and down-sampling twice as coarse
-  double nearer;   ///< half the range
+  double nearer;   ///< half the maximum range
 };
 
-/// The middle of the ranges in docs/tuning.md, with which a test compares them.
+/// The centres of the ranges in docs/tuning.md; a test compares them.
 Savings savingsOf(const FreeSpaceConfig& free_space) {
   if (free_space.mode == "none") return {0.68, 0.76};
   if (free_space.mode != "line") return {0.63, 0.85};
@@ -87,9 +87,9 @@ std::string loadAdvice(const MapperConfig& config, double integration_ms, double
     text += "; sensor_model/max_range " + numberText(range / 2.0) + " about " +
             milliseconds(integration_ms * savings.nearer);
   } else {
-    text += "; sensor_model/max_range leaves out what is far";
+    text += "; sensor_model/max_range leaves out distant points";
   }
   return text;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,19 +1,19 @@
-/// @file What to change when mapping cannot keep up.
+/// @file Advice for when mapping cannot keep up with the clouds.
 #pragma once
 
 #include <string>
 
 #include "bki_mapping/mapping/mapper_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// How one integration compares with the time between clouds.
-/// @param integration_ms median time of an integration [ms]. @param received_hz clouds a second [Hz].
-/// @return their product: above 1, clouds must be dropped; 0 if either is not known.
+/// The load: integration time divided by the time between clouds. Above 1, clouds must be dropped.
+/// @param integration_ms median time of an integration [ms]. @param received_hz rate of clouds [Hz].
+/// @return 0 if either is unknown (0).
 double loadOf(double integration_ms, double received_hz);
 
-/// One sentence that says how far mapping is behind and which settings would help, each with an estimate of
-/// the time then, from measurements (docs/performance.md, docs/tuning.md). "" while the load is at most 1.
+/// One sentence: how much too slow mapping is, and which settings would help, each with the integration time
+/// estimated from the measurements in docs/performance.md and docs/tuning.md. "" if the load is at most 1.
 std::string loadAdvice(const MapperConfig& config, double integration_ms, double received_hz);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file What the publishers of map topics have in common.
+/// @file MapPublisher, the publisher of one map topic. PublisherSet owns one for each topic.
 #pragma once
 
 #include <geometry_msgs/PoseStamped.h>
@@ -17,23 +17,23 @@
 #include "parallel/index_numbering.h"
 #include "ros/server_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// The state of a server that publishers show.
+/// The state of the server from which messages are built.
 struct MapSnapshot {
   std_msgs::Header header;  ///< map frame, stamp of the last scan
   const SemanticMapper& mapper;
   const std::vector<geometry_msgs::PoseStamped>& trajectory;  ///< sensor poses of integrated scans
   const ServerConfig& config;
-  Eigen::Vector3d sensor;  ///< where the last beams started, map frame [m]
+  Eigen::Vector3d sensor;  ///< origin of the last scan, map frame [m]
 
-  /// Whether a cube around a point is within view_range of the sensor, or there is no such limit.
+  /// Whether a cube is within view_range of the sensor; true without such a limit.
   /// @param edge of the cube [m].
   bool inView(const Eigen::Vector3d& centre, double edge) const {
     const double beyond = (centre - sensor).cwiseAbs().maxCoeff() - 0.5 * edge;
     return config.view_range <= 0.0 || beyond <= config.view_range;
   }
-  /// Whether a height is within view_min_z and view_max_z.
+  /// Whether a height is between view_min_z and view_max_z.
   bool heightInView(double z) const { return z >= config.view_min_z && z <= config.view_max_z; }
   bool inView(const BlockIndex& block) const {
     const GridGeometry& geometry = mapper.map().geometry();
@@ -41,7 +41,7 @@ struct MapSnapshot {
   }
 };
 
-/// Which blocks changed since they were last published.
+/// The blocks that changed since the last publication.
 class ChangedBlocks {
  public:
   void add(const std::vector<GridIndex>& blocks) {
@@ -58,7 +58,7 @@ class ChangedBlocks {
   }
   bool all() const { return all_; }
   bool empty() const { return !all_ && blocks_.size() == 0; }
-  /// Changed, made or erased blocks; not filled where all() is true.
+  /// Blocks that were changed, created or erased; empty if all() is true.
   const std::vector<GridIndex>& blocks() const { return blocks_.members(); }
 
  private:
@@ -66,19 +66,19 @@ class ChangedBlocks {
   bool all_ = false;
 };
 
-/// Publishes one topic. Messages are built only while somebody listens.
+/// Publishes one topic. Builds messages only while the topic has subscribers.
 class MapPublisher {
  public:
   virtual ~MapPublisher() = default;
   virtual bool wanted() const { return publisher_.getNumSubscribers() > 0; }
   std::string topic() const { return publisher_.getTopic(); }
-  /// Publishes what is new since the last call, or all of it; then nothing is new.
+  /// Publishes the changes since the last call, or the whole map, and clears `changed`.
   void publish(const MapSnapshot& snapshot) {
     publishNew(snapshot);
     changed.clear();
   }
-  /// Calls build(). A message that memory does not hold is left out, and said; mapping goes on, and the topic
-  /// is tried again when it is next due.
+  /// Calls build(). If memory does not suffice for the message, logs an error and skips it: mapping goes on,
+  /// and the topic is published again when it is next due.
   template <typename Build>
   void tryTo(Build&& build) {
     try {
@@ -90,9 +90,9 @@ class MapPublisher {
                          topic().c_str(), fault.what());
     }
   }
-  /// Called instead of publish while nobody listens.
+  /// Called instead of publish while there is no subscriber.
   virtual void rest() { changed.clear(); }
-  /// The topics look different from now on, or somebody asks for all of it.
+  /// Requests the whole map at the next publication: settings changed, or a user asked for it.
   virtual void startOver() { changed.addAll(); }
 
   ChangedBlocks changed;
@@ -103,20 +103,21 @@ class MapPublisher {
   ros::Publisher publisher_;
 };
 
-/// What a publisher is made from.
+/// What the constructor of a publisher needs.
 struct PublisherContext {
   ros::NodeHandle& node;
   const ServerConfig& config;
-  std::function<MapSnapshot()> snapshot;  ///< the map as it is now
+  std::function<MapSnapshot()> snapshot;  ///< returns the present state
 
-  /// A topic with whole maps: whoever starts to listen makes `owner` publish again.
+  /// Advertises a topic with whole maps: a new subscriber makes `owner` publish again.
   template <typename Message>
   ros::Publisher advertiseWhole(const std::string& topic, MapPublisher& owner) const {
     return advertise<Message>(
         topic, [&owner](const ros::SingleSubscriberPublisher&) { owner.changed.addAll(); }, config.latch);
   }
-  /// A topic with updates. `send(subscriber, snapshot)` gives the whole map to one new subscriber alone; what
-  /// was new is published before, so that the whole map is as new as the last update.
+  /// Advertises a topic with updates. `send(subscriber, snapshot)` sends the whole map only to a new
+  /// subscriber. Pending changes are published first, so that this map and the last update are of the same
+  /// state.
   template <typename Message, typename Send>
   ros::Publisher advertiseUpdates(const std::string& topic, MapPublisher& owner, Send&& send) const {
     const auto connected = [&owner, send, make = snapshot](const ros::SingleSubscriberPublisher& subscriber) {
@@ -137,7 +138,7 @@ struct PublisherContext {
   }
 };
 
-/// One of each: the registry of publishers.
+/// The registry of publishers: one of each.
 std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context);
 
 std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context);
@@ -150,4 +151,4 @@ std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& conte
 std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

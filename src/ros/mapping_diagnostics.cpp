@@ -5,12 +5,12 @@
 #include "ros/load_advice.h"
 #include "ros/point_account.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-/// "3 queue full, 1 empty" of the clouds dropped between two statuses.
+/// The clouds dropped between two statuses by reason, such as "3 queue full, 1 empty".
 std::string newDrops(const MappingStatus& before, const MappingStatus& now) {
   std::string text;
   for (const DropKind& kind : dropKinds()) {
@@ -40,7 +40,7 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
       !advice.empty()) {
     warn(advice);
   }
-  // A map that was reset is empty at one report, perhaps.
+  // A map may be empty at one report because it was reset.
   if (now.blocks == 0 && before.blocks == 0 && before.integrated > 0 &&
       now.points_used > before.points_used) {
     warn("the map is empty, though " + std::to_string(now.points_used - before.points_used) +
@@ -90,4 +90,4 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("map [bytes]", now_.map_bytes);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -10,24 +10,26 @@
 #include "ros/health.h"
 #include "ros/scan_ledger.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Judges the time between two reports.
-/// - ERROR: clouds came and none was integrated.
-/// - WARN: clouds were dropped, mapping is slower than clouds come, is paused, no cloud has come, or the map
-///   stays empty though points are used.
-/// - What judgePoints says of the points of integrated clouds.
+/// Assesses the time between two reports.
+/// - ERROR: clouds were received, and none was integrated.
+/// - WARN: clouds were dropped, mapping is paused or slower than clouds arrive, no cloud was received, or the
+/// map
+///   stays empty although points are used.
+/// - The result of judgePoints for the points of integrated clouds.
 Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config,
              const Health& points = {});
 
-/// Reports every `period`.
+/// Publishes a report every `period` seconds.
 class MappingDiagnostics {
  public:
-  /// @param name of the diagnostic status, as rqt_robot_monitor shows it. @param period [s of wall time].
+  /// @param name of the diagnostic status, as rqt_robot_monitor shows it. @param period [s, wall time].
   MappingDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, double period);
 
-  /// Reports if it is time to.
-  /// @param status, points asked for only then: the status, and what is to be said of points since last time.
+  /// Reports if a report is due. Only then calls status() and points().
+  /// @param status returns the MappingStatus. @param points returns the Health of the points since the last
+  /// report.
   template <typename Status, typename Points>
   void update(Status&& status, Points&& points, const MapperConfig& config) {
     const auto now = std::chrono::steady_clock::now();
@@ -47,4 +49,4 @@ class MappingDiagnostics {
   Health health_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

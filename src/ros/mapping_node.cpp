@@ -1,4 +1,4 @@
-// The mapping server as a node of its own.
+// Runs the mapping server as a node.
 #include <ros/ros.h>
 
 #include <iostream>
@@ -12,7 +12,7 @@ namespace {
 
 const char kHelp[] =
     "mapping_node: maps labelled point clouds (topic cloud_in, tf) as semantic 3D occupancy.\n"
-    "It takes ROS arguments alone: __name:=NAME, TOPIC:=OTHER, _PARAMETER:=VALUE. Parameters, topics and "
+    "It takes only ROS arguments: __name:=NAME, TOPIC:=OTHER, _PARAMETER:=VALUE. Parameters, topics and "
     "services are\n"
     "described in docs/parameters.md and docs/ros.md; launch/mapping.launch starts it with its defaults.\n";
 
@@ -27,14 +27,15 @@ int main(int argc, char** argv) {
       return 0;
     }
     std::cerr << "mapping_node: option '" << arguments[1]
-              << "' is unknown; it takes ROS arguments alone (see --help)\n";
+              << "' is unknown; mapping_node takes only ROS arguments (see --help)\n";
     return 1;
   }
   ros::init(argc, argv, "mapping");
-  bki_mapping::ros_shell::endOnTerminate();
-  const ros::NodeHandle node, private_node("~");  // while one lives, ROS can still say what went wrong
+  bki_mapping::ros_interface::endOnTerminate();
+  const ros::NodeHandle node,
+      private_node("~");  // while a handle exists, ROS keeps the log open for the error below
   try {
-    bki_mapping::ros_shell::MappingServer server(node, private_node);
+    bki_mapping::ros_interface::MappingServer server(node, private_node);
     ros::spin();
   } catch (const std::exception& fault) {
     ROS_FATAL("%s", fault.what());

@@ -5,9 +5,9 @@
 
 #include "ros/mapping_server.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// The mapping server inside a nodelet manager.
+/// Runs the mapping server in a nodelet manager.
 class MappingNodelet : public nodelet::Nodelet {
  private:
   void onInit() override {
@@ -22,6 +22,6 @@ class MappingNodelet : public nodelet::Nodelet {
   std::unique_ptr<MappingServer> server_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface
 
-PLUGINLIB_EXPORT_CLASS(bki_mapping::ros_shell::MappingNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(bki_mapping::ros_interface::MappingNodelet, nodelet::Nodelet)

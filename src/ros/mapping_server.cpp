@@ -8,10 +8,10 @@
 #include "bki_mapping/mapping/parameters.h"
 #include "ros/pose_conversion.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// How long the thread sleeps while nothing, or while a transform, is waited for [s].
+/// How long the thread waits for a callback [s]: with an empty queue, and while clouds wait for transforms.
 constexpr double kIdleWait = 0.1, kTransformWait = 0.005;
 
 }  // namespace
@@ -28,7 +28,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
 
   poses_ = std::make_unique<PoseSource>(node_);
   publishing_ =
-      std::make_unique<MapPublishing>(PublisherContext{node_, config_, [this] { return snapshot(); }});
+      std::make_unique<PublisherSet>(PublisherContext{node_, config_, [this] { return snapshot(); }});
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
   offerServices();
@@ -45,7 +45,7 @@ MappingServer::~MappingServer() {
   running_ = false;
   thread_.join();
   const std::string summary = ledger_.summary(waiting_.size());
-  if (ros::isShuttingDown()) {  // the console of ROS is closed by then
+  if (ros::isShuttingDown()) {  // rosconsole is already closed
     std::printf("%s: %s\n", private_node_.getNamespace().c_str(), summary.c_str());
     std::fflush(stdout);
   } else {
@@ -57,7 +57,7 @@ void MappingServer::subscribe() {
   for (const InputConfig& input : allInputs(config_, mapper_->config())) {
     const std::size_t number = readers_.size();
     readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
-    // No limit here: the queue that counts what it drops is waiting_, and it takes clouds over between scans.
+    // Queue size 0: no limit. waiting_ is the queue that drops clouds, because it counts them.
     const boost::function<void(const CloudEvent&)> call = [this, number](const CloudEvent& event) {
       onCloud(number, event);
     };
@@ -85,8 +85,8 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
 void MappingServer::work() {
   while (running_) {
     queue_.callOne(ros::WallDuration(waiting_.size() == 0 ? kIdleWait : kTransformWait));
-    // Messages first, so that the queue that counts holds every cloud; but a flood of them must not keep
-    // the mapper from mapping.
+    // Handle messages first, so that every cloud is in waiting_ and counted. The limit keeps a flood of
+    // messages from starving the mapper.
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
     checkClock();
     processQueue();
@@ -104,7 +104,7 @@ void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
   ledger_.received(now);
   if (paused_)
     return drop({cloud, input, now}, DropReason::kPaused, "mapping is paused; call ~resume to go on");
-  // It has waited for this call while the last scan was mapped.
+  // Latency counts from the reception: the cloud may have waited in queue_ while a scan was mapped.
   const double since = std::max(0.0, ros::Time::now().toSec() - event.getReceiptTime().toSec());
   const auto received =
       now - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::min(since, 60.0)));
@@ -142,8 +142,8 @@ void MappingServer::map(const WaitingCloud& waiting) {
     if (!mapper_->map().geometry().contains(scan.scan.origin)) {
       return drop(waiting, DropReason::kBadTransform,
                   "tf puts the sensor so far from the origin of '" + config_.frame_id + "' (" +
-                      numberText(scan.scan.origin.norm()) + " m) that the map cannot hold it; mend what " +
-                      "publishes the transforms from '" + config_.frame_id + "' to '" +
+                      numberText(scan.scan.origin.norm()) + " m) that the map cannot hold it; correct the " +
+                      "publisher of the transforms from '" + config_.frame_id + "' to '" +
                       shortText(cloud.header.frame_id) + "'");
     }
     integrate(waiting, scan);
@@ -170,7 +170,7 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   if (readers_[waiting.input].originDoubtful(*waiting.cloud) && !warned_of_origin_[waiting.input]) {
     warned_of_origin_[waiting.input] = true;
     ROS_WARN(
-        "Clouds of %s are in the map frame '%s', so that beams start at its origin; set sensor_frame_id to "
+        "Clouds of %s are in the map frame '%s', so beams start at its origin; set sensor_frame_id to "
         "the sensor's frame",
         cloud_subscribers_[waiting.input].getTopic().c_str(), config_.frame_id.c_str());
   }
@@ -197,7 +197,7 @@ void MappingServer::appendPose(const std_msgs::Header& header, const Eigen::Isom
   sensor.header.frame_id = config_.frame_id;
   sensor.header.stamp = header.stamp;
   sensor.pose = toPose(T_map_sensor);
-  // A robot that stands still for hours needs one pose, not all.
+  // Keeps one pose, not thousands, while the robot stands still.
   if (trajectory_.size() > 1) {
     const auto& last = trajectory_[trajectory_.size() - 2].pose.position;
     const Eigen::Vector3d moved = T_map_sensor.translation() - Eigen::Vector3d(last.x, last.y, last.z);
@@ -285,4 +285,4 @@ MapSnapshot MappingServer::snapshot() const {
   return snapshot;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file The mapper as a ROS service: clouds and tf in, maps out. Node and nodelet are shells around it.
+/// @file The server behind node and nodelet: takes clouds and tf, and publishes the map.
 #pragma once
 
 #include <bki_mapping/SaveMap.h>
@@ -14,26 +14,26 @@
 #include <vector>
 
 #include "ros/live_settings.h"
-#include "ros/map_publishing.h"
 #include "ros/mapping_diagnostics.h"
 #include "ros/point_account.h"
 #include "ros/pose_source.h"
+#include "ros/publisher_set.h"
 #include "ros/scan_ledger.h"
 #include "ros/scan_queue.h"
 #include "ros/scan_reader.h"
 #include "ros/sentence_throttle.h"
 #include "ros/time_watch.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Owns a mapper and one thread. Subscriptions, services and publishers run on that thread through a queue of
-/// their own; the threads of a nodelet manager are never blocked.
+/// Owns a mapper and one thread. All callbacks and publishers run on this thread, by a callback queue of its
+/// own, so that mapping never blocks the threads of a nodelet manager.
 class MappingServer {
  public:
   /// @param node resolves topics. @param private_node holds parameters and services.
   /// @throws std::invalid_argument if a parameter is unknown or not allowed.
   MappingServer(ros::NodeHandle node, ros::NodeHandle private_node);
-  /// Stops the thread after the work in hand.
+  /// Finishes the present scan and stops the thread.
   ~MappingServer();
 
  private:
@@ -52,21 +52,21 @@ class MappingServer {
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
 
-  /// Deals with the first waiting cloud whose transform is there or has been waited for long enough.
+  /// Processes the first waiting cloud whose transform is available, or whose tf_timeout is over.
   void processQueue();
   void map(const WaitingCloud& waiting);
   void integrate(const WaitingCloud& waiting, const PlacedScan& placed);
   void reset();
   void checkClock();
   void onTimeJump(const ros::Time& new_time, const std::string& what);
-  /// Says once of each input that points were left out since its range is not known.
+  /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
   void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
-  /// Forgets blocks and poses outside of the window about the sensor.
+  /// Erases blocks and poses outside of the window around the sensor.
   void moveWindow();
-  /// Counts a cloud as dropped and says so, but repeats no sentence within 5 s.
+  /// Counts a cloud as dropped and logs the reason, each sentence at most once in 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
-  /// Judges the points since the last call, input by input, and says what is wrong with them.
+  /// Assesses the points of each input since the last call, and logs warnings.
   Health judgeAllPoints();
   MappingStatus status();
   MapSnapshot snapshot() const;
@@ -75,7 +75,7 @@ class MappingServer {
   ros::NodeHandle node_, private_node_;
   ServerConfig config_;
   std::unique_ptr<SemanticMapper> mapper_;
-  std::vector<ScanReader> readers_;   ///< one an input
+  std::vector<ScanReader> readers_;   ///< one per input
   std::vector<PointAccount> points_;  ///< of each input, since the last report
   ScanLedger ledger_;
   ScanQueue waiting_;
@@ -92,7 +92,7 @@ class MappingServer {
   std::vector<ros::Subscriber> cloud_subscribers_;
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_publisher_;
-  std::unique_ptr<MapPublishing> publishing_;
+  std::unique_ptr<PublisherSet> publishing_;
   std::unique_ptr<MappingDiagnostics> diagnostics_;
   std::unique_ptr<LiveSettings> live_settings_;
 
@@ -100,4 +100,4 @@ class MappingServer {
   std::thread thread_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

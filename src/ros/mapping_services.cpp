@@ -2,10 +2,10 @@
 #include "bki_mapping/io/map_export.h"
 #include "ros/mapping_server.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Of an answer; it holds a path [bytes].
+/// Maximum length of an answer, which contains a path given by the client [bytes].
 constexpr std::size_t kLongestAnswer = 1000;
 
 }  // namespace
@@ -58,7 +58,7 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     if (request.path.empty() || request.path.front() != '/') {
       throw std::invalid_argument("path '" + request.path + "' must be absolute");
     }
-    if (request.path.find('\0') != std::string::npos) {  // the file system would read up to there
+    if (request.path.find('\0') != std::string::npos) {  // the file system would cut the path there
       throw std::invalid_argument("path '" + request.path + "' must not hold a zero byte");
     }
     const std::string include = request.include.empty() ? "occupied" : request.include;
@@ -74,4 +74,4 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
   return true;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

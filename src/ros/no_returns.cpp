@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 Eigen::Vector3f directionOf(const Eigen::Vector3f& point) {
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();
@@ -34,4 +34,4 @@ std::vector<Eigen::Vector3f> directionsOfHoles(const std::vector<Eigen::Vector3f
   return directions;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -9,26 +9,26 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "ros/point_field.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-/// Shares of points used below which there is a fault.
+/// Fractions of points used, below which the level is WARN and ERROR.
 constexpr double kFew = 0.1, kHardlyAny = 0.001;
-/// Points that are used or left out for a fault tell something if they are this share of all.
-constexpr double kTelling = 0.01;
-/// Labels of an account are told apart up to this many values.
-constexpr std::size_t kMostUnknown = 64;
+/// Minimum fraction of points that are used or left out for a fault; fewer are no basis for an assessment.
+constexpr double kSignificant = 0.01;
+/// Maximum number of different unknown labels that are counted.
+constexpr std::size_t kMaxUnknown = 64;
 
-/// "12 %", with as many digits as tell it from 0 and 100.
-std::string percent(double share) {
+/// A fraction as "12 %"; with three decimals near 0 and 100, to distinguish it from these.
+std::string percent(double fraction) {
   const double rounded =
-      share > 0.99 || share < 0.01 ? std::round(1e5 * share) / 1e3 : std::round(100.0 * share);
+      fraction > 0.99 || fraction < 0.01 ? std::round(1e5 * fraction) / 1e3 : std::round(100.0 * fraction);
   return numberText(rounded) + " %";
 }
 
-/// "have labels that ...; remedy".
+/// A clause about points of unknown labels, with the remedy.
 std::string unknownLabels(const PointAccount& account, const InputConfig& input, const std::string& classes) {
   const auto most = std::max_element(account.unknown_labels.begin(), account.unknown_labels.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
@@ -45,7 +45,7 @@ std::string unknownLabels(const PointAccount& account, const InputConfig& input,
          (colors ? "color_match" : "label_values");
 }
 
-/// "sensor_model/min_range 2 m", or the input's own.
+/// Names a limit, such as "sensor_model/min_range 2 m", or as the input's own.
 std::string limit(const std::string& name, double value, double common) {
   return (value == common ? "sensor_model/" : "the input's ") + name + " " + numberText(value) + " m";
 }
@@ -102,7 +102,7 @@ void PointAccount::add(const PointCounts& of_scan, const std::map<std::uint32_t,
   ++clouds;
   counts += of_scan;
   for (const auto& [label, count] : labels) {
-    if (unknown_labels.size() < kMostUnknown || unknown_labels.count(label) > 0)
+    if (unknown_labels.size() < kMaxUnknown || unknown_labels.count(label) > 0)
       unknown_labels[label] += count;
   }
 }
@@ -124,7 +124,7 @@ Health judgePoints(const PointAccount& account, const std::string& topic, const 
   }
   const double sound = used + static_cast<double>(faults);
   Health health;
-  if (worst_fault && sound >= kTelling * all && used < kFew * sound) {
+  if (worst_fault && sound >= kSignificant * all && used < kFew * sound) {
     health.level = used < kHardlyAny * sound ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN;
     worst = worst_fault;
   } else if (worst && used + static_cast<double>(counts.no_returns) < kHardlyAny * all) {
@@ -140,4 +140,4 @@ Health judgePoints(const PointAccount& account, const std::string& topic, const 
   return health;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file What became of the points of integrated clouds, and whether that is healthy.
+/// @file Counts how the points of integrated clouds were used, and assesses whether that is healthy.
 #pragma once
 
 #include <bki_mapping/MappingStatus.h>
@@ -11,18 +11,18 @@
 #include "ros/health.h"
 #include "ros/input_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Why a point is no hit, and its counters.
+/// A reason for which points are left out, and its counters.
 struct PointKind {
   const char* name;
   std::size_t PointCounts::*in_scan;
   std::uint64_t MappingStatus::*in_status;
-  /// Whether healthy sensors, with settings that suit them, can have many: beams without a return, points out
-  /// of range or of no interest.
+  /// Whether many such points are normal for a healthy sensor with suitable settings: beams without a return,
+  /// points out of range, unlabelled points.
   bool may_be_many;
 };
-/// All kinds of points that are neither used nor beams without a return.
+/// All reasons for which points are left out.
 const std::vector<PointKind>& pointKinds();
 
 /// The points of an input since the last report.
@@ -34,13 +34,15 @@ struct PointAccount {
   void add(const PointCounts& of_scan, const std::map<std::uint32_t, std::size_t>& labels);
 };
 
-/// Judges whether clouds that are integrated have anything to say.
-/// - Of the points used or left out for a fault (label, min_range, too far for the map) less than 10 % are
-///   used: WARN; less than 0.1 %: ERROR. They must be 1 % of all points to be judged.
-/// - Less than 0.1 % of all points are used or beams without a return, whatever the reason: WARN.
-/// @param topic of the input. @param mapper the settings of all inputs. @param classes name of the table.
-/// @return a sentence that names the reason with the most points, and the remedy.
+/// Assesses whether integrated clouds contribute to the map.
+/// - Of the points that are used, or left out for a fault (label, min_range, outside of the map), less than
+/// 10 % are
+///   used: WARN; less than 0.1 %: ERROR. Applies if these are at least 1 % of all points.
+/// - Less than 0.1 % of all points are used or beams without a return: WARN.
+/// @param topic of the input. @param mapper settings common to all inputs. @param classes name of the class
+/// table.
+/// @return a sentence with the most frequent reason, and the remedy; OK without a message if all is well.
 Health judgePoints(const PointAccount& account, const std::string& topic, const InputConfig& input,
                    const MapperConfig& mapper, const std::string& classes);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

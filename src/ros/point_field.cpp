@@ -8,7 +8,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using sensor_msgs::PointField;
@@ -42,14 +42,14 @@ T load(const std::uint8_t* bytes, bool swap) {
   return value;
 }
 
-/// The names of the first fields of a cloud, for a sentence.
+/// The names of the first fields of a cloud, for a message.
 std::string namesOf(const sensor_msgs::PointCloud2& cloud) {
-  constexpr std::size_t kMost = 20;
+  constexpr std::size_t kMax = 20;
   std::string names;
-  for (std::size_t f = 0; f < cloud.fields.size() && f < kMost; ++f) {
+  for (std::size_t f = 0; f < cloud.fields.size() && f < kMax; ++f) {
     names += (f == 0 ? "" : ", ") + shortText(cloud.fields[f].name, 40);
   }
-  if (cloud.fields.size() > kMost) names += ", and " + std::to_string(cloud.fields.size() - kMost) + " more";
+  if (cloud.fields.size() > kMax) names += ", and " + std::to_string(cloud.fields.size() - kMax) + " more";
   return names.empty() ? "none" : names;
 }
 
@@ -79,7 +79,7 @@ FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const std::strin
 FieldReader::FieldReader(const sensor_msgs::PointCloud2& cloud, const PointField& field,
                          std::uint32_t component)
     : swap_((cloud.is_bigendian != 0) != hostIsBigEndian()) {
-  const std::string& name = field.name;  // one that was asked for
+  const std::string& name = field.name;  // requested by the settings, so of reasonable length
   datatype_ = field.datatype;
   const std::size_t size = sizeOf(field.datatype);
   if (size == 0) {
@@ -135,7 +135,7 @@ std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const 
   std::vector<FieldReader> readers;
   for (const std::string& name : splitList(list)) {
     const PointField& field = find(cloud, name);
-    // Made one by one: a count that does not fit into point_step is refused before memory is taken for it.
+    // One by one, without reserve(): a count beyond point_step is refused before memory is allocated for it.
     for (std::uint32_t c = 0; c < std::max(field.count, 1u); ++c) readers.emplace_back(cloud, field, c);
   }
   return readers;
@@ -160,9 +160,9 @@ void checkSizes(const sensor_msgs::PointCloud2& cloud) {
   const std::uint64_t needed =
       cloud.height == 0 ? 0 : (std::uint64_t{cloud.height} - 1) * cloud.row_step + row;
   if (needed > cloud.data.size()) {
-    throw std::invalid_argument("the cloud says it has " + std::to_string(needed) +
+    throw std::invalid_argument("the cloud claims " + std::to_string(needed) +
                                 " bytes of points, but holds " + std::to_string(cloud.data.size()));
   }
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

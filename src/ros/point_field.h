@@ -1,4 +1,4 @@
-/// @file Fields of sensor_msgs/PointCloud2, of any datatype, offset and byte order.
+/// @file Reads fields of sensor_msgs/PointCloud2, of any datatype, offset and byte order.
 #pragma once
 
 #include <sensor_msgs/PointCloud2.h>
@@ -8,31 +8,32 @@
 #include <string>
 #include <vector>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Stands for a label that is no number, no colour of the table, or no class at all.
+/// The label of a point without one: the field holds no valid number, no colour of the table, or no usable
+/// score.
 constexpr std::uint32_t kNoLabel = 0xffffffffu;
 
 bool hostIsBigEndian();
 
-/// Reads one component of one field. The cloud's sizes must have been checked.
+/// Reads one component of one field. @pre checkSizes(cloud) has passed.
 class FieldReader {
  public:
-  /// @throws std::invalid_argument in one sentence: the field is missing, there twice, of an unknown
-  /// datatype, or beyond point_step.
+  /// @throws std::invalid_argument in one sentence: the field is missing, occurs twice, has an unknown
+  /// datatype, or extends beyond point_step.
   FieldReader(const sensor_msgs::PointCloud2& cloud, const std::string& name);
-  /// @param field of the cloud. @param component of it, if its count is above 1.
+  /// @param component index of the component, below field.count.
   FieldReader(const sensor_msgs::PointCloud2& cloud, const sensor_msgs::PointField& field,
               std::uint32_t component);
 
   /// The value. @param point first byte of a point.
   double operator()(const std::uint8_t* point) const;
-  /// The 32 bits of a FLOAT32, INT32 or UINT32 as they are; the rounded value of other datatypes, or none if
-  /// that is no number of 32 bits.
+  /// The bits of a FLOAT32, INT32 or UINT32; for other datatypes the rounded value, or nullopt if that does
+  /// not fit into 32 bits.
   std::optional<std::uint32_t> bits(const std::uint8_t* point) const;
-  /// The label number that the value names, rounded; kNoLabel if it names none.
+  /// The value rounded to a label; kNoLabel if it is not a valid one.
   std::uint32_t label(const std::uint8_t* point) const;
-  bool integer() const;  ///< whether the datatype is a whole number
+  bool integer() const;  ///< whether the datatype is an integer
 
  private:
   std::uint8_t datatype_;
@@ -40,13 +41,13 @@ class FieldReader {
   bool swap_;
 };
 
-/// Readers of all components of all fields of a list like "a,b".
+/// Readers of all components of all fields in a list such as "a,b".
 std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list);
 
-/// The parts of a list like "a, b", without blanks.
+/// The items of a list such as "a, b", without spaces.
 std::vector<std::string> splitList(const std::string& list);
 
-/// @throws std::invalid_argument if rows or points do not fit into the data.
+/// Checks that all points are within the data. @throws std::invalid_argument otherwise.
 void checkSizes(const sensor_msgs::PointCloud2& cloud);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

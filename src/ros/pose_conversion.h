@@ -1,4 +1,4 @@
-/// @file Poses between tf and Eigen.
+/// @file Converts poses between tf and Eigen.
 #pragma once
 
 #include <geometry_msgs/Pose.h>
@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 inline Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& t) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -40,4 +40,4 @@ inline geometry_msgs::Pose toPose(const Eigen::Isometry3d& T) {
   return pose;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

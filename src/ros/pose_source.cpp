@@ -7,19 +7,19 @@
 #include "ros/pose_conversion.h"
 #include "ros/time_watch.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 namespace {
 
 /// tf2's tolerance on the square of a quaternion's norm.
 constexpr double kNormTolerance = 1e-2;
 
-/// tf2 takes frames with a leading slash for those without.
+/// tf2 ignores a leading slash of frame names.
 std::string withoutSlash(const std::string& frame) {
   return frame.empty() || frame.front() != '/' ? frame : frame.substr(1);
 }
 
-/// Why a transform is no pose; "" if it is one.
+/// Why a transform is not a valid pose; "" if it is one.
 std::string faultOf(const geometry_msgs::Transform& transform) {
   const Eigen::Vector3d t(transform.translation.x, transform.translation.y, transform.translation.z);
   const Eigen::Vector4d q(transform.rotation.x, transform.rotation.y, transform.rotation.z,
@@ -52,10 +52,10 @@ void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_s
     const std::string why = "the transform from '" + shortText(withoutSlash(transform.header.frame_id)) +
                             "' to '" + shortText(child) + "' of time " +
                             numberText(transform.header.stamp.toSec()) + " is no pose: " + fault +
-                            "; mend what publishes it";
+                            "; correct its publisher";
     if (const auto before = findRefused(child); before != refused_.end()) refused_.erase(before);
     refused_.push_back({child, transform.header.stamp, why});
-    if (refused_.size() > kMostRefused) refused_.pop_front();
+    if (refused_.size() > kMaxRefused) refused_.pop_front();
     if (throttle_.allow(why, SentenceThrottle::Clock::now()))
       ROS_WARN("Refused a transform: %s", why.c_str());
     return;
@@ -74,10 +74,11 @@ void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_s
 void PoseSource::put(const geometry_msgs::TransformStamped& transform, bool is_static) {
   try {
     buffer_.setTransform(transform, "bki_mapping", is_static);
-  } catch (const std::exception& fault) {  // tf2 adds 10 s to the stamp, which may be beyond all of ros::Time
+  } catch (
+      const std::exception& fault) {  // tf2 adds 10 s to the stamp, which may exceed the range of ros::Time
     const std::string why = "the transform to '" + shortText(transform.child_frame_id) + "' of time " +
                             numberText(transform.header.stamp.toSec()) + ": " + fault.what() +
-                            "; mend the clock of what publishes it";
+                            "; correct the clock of its publisher";
     if (throttle_.allow(why, SentenceThrottle::Clock::now()))
       ROS_WARN("Refused a transform: %s", why.c_str());
   }
@@ -90,7 +91,7 @@ std::deque<PoseSource::Refused>::const_iterator PoseSource::findRefused(const st
 const PoseSource::Refused* PoseSource::refusedBetween(const std::string& target,
                                                       const std::string& source) const {
   for (std::string frame : {withoutSlash(source), withoutSlash(target)}) {
-    // As many steps as tf2 takes: frames may lead in a circle.
+    // Limited like in tf2, because frames may form a cycle.
     for (std::uint32_t step = 0; step < tf2::BufferCore::MAX_GRAPH_DEPTH; ++step) {
       const auto refused = findRefused(frame);
       if (refused != refused_.end()) return &*refused;
@@ -118,7 +119,7 @@ std::optional<StampedPose> PoseSource::find(const std::string& target, const std
   try {
     const auto pose = buffer_.lookupTransform(target, source, stamp);
     return StampedPose{toIsometry(pose.transform), pose.header.stamp};
-  } catch (const tf2::TransformException&) {  // it may have gone since canTransform
+  } catch (const tf2::TransformException&) {  // it may have expired since canFind
     return std::nullopt;
   }
 }
@@ -171,4 +172,4 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
                                    " s newer; let clouds come sooner, or check the clocks"};
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,48 +1,41 @@
-/// @file Statistics of the last values of a series.
+/// @file Statistics over the recent past: quantiles of values, and rates of events.
 #pragma once
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstddef>
 #include <deque>
-#include <vector>
 
-namespace bki_mapping::ros_shell {
+#include "core/quantile.h"
 
-/// Quantiles of the last values.
+namespace bki_mapping::ros_interface {
+
+/// Quantiles of the last `max_size` values.
 class RollingStatistics {
  public:
-  explicit RollingStatistics(std::size_t most = 200) : most_(most) {}
+  explicit RollingStatistics(std::size_t max_size = 200) : max_size_(max_size) {}
 
   void add(double value) {
     values_.push_back(value);
-    if (values_.size() > most_) values_.pop_front();
+    if (values_.size() > max_size_) values_.pop_front();
   }
   std::size_t size() const { return values_.size(); }
 
-  /// The smallest value that at least a share `q` of the values does not exceed; 0 if there are none.
-  double quantile(double q) const {
-    if (values_.empty()) return 0.0;
-    std::vector<double> sorted(values_.begin(), values_.end());
-    const double rank = std::ceil(q * static_cast<double>(sorted.size()));
-    const auto place = static_cast<std::ptrdiff_t>(std::max(rank, 1.0)) - 1;
-    std::nth_element(sorted.begin(), sorted.begin() + place, sorted.end());
-    return sorted[static_cast<std::size_t>(place)];
-  }
+  /// 0 if there are no values.
+  double quantile(double p) const { return bki_mapping::quantile({values_.begin(), values_.end()}, p); }
   double median() const { return quantile(0.5); }
 
  private:
-  std::size_t most_;
+  std::size_t max_size_;
   std::deque<double> values_;
 };
 
-/// How often something happened in the last seconds.
+/// The rate of events over a sliding time window.
 class RateMeter {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// @param window length of the time looked back on [s].
+  /// @param window length of the window [s].
   explicit RateMeter(double window = 5.0) : window_(window) {}
 
   void tick(Clock::time_point now) {
@@ -51,7 +44,7 @@ class RateMeter {
     times_.push_back(now);
     forget(now);
   }
-  /// Events a second [Hz]; counts from the first event while the window is not full yet.
+  /// Events per second [Hz]; until the window is full, averaged over the time since the first event.
   double rate(Clock::time_point now) {
     forget(now);
     if (times_.empty()) return 0.0;
@@ -72,4 +65,4 @@ class RateMeter {
   std::deque<Clock::time_point> times_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

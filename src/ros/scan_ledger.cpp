@@ -2,7 +2,7 @@
 
 #include "ros/point_account.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 const std::vector<DropKind>& dropKinds() {
   using S = MappingStatus;
@@ -57,7 +57,7 @@ void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason, cons
 
 void ScanLedger::unknownLabels(const std::map<std::uint32_t, std::size_t>& counts) {
   for (const auto& [label, count] : counts) {
-    if (unknown_.size() < kMostUnknown || unknown_.count(label) > 0) unknown_[label] += count;
+    if (unknown_.size() < kMaxUnknown || unknown_.count(label) > 0) unknown_[label] += count;
   }
 }
 
@@ -100,4 +100,4 @@ std::string ScanLedger::summary(std::size_t waiting) const {
   return text;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file The account of every cloud: received = integrated + dropped + waiting.
+/// @file Accounts for every cloud: received = integrated + dropped + waiting.
 #pragma once
 
 #include <bki_mapping/MappingStatus.h>
@@ -11,7 +11,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "ros/rolling_statistics.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 /// Why a cloud is not in the map.
 enum class DropReason {
@@ -38,33 +38,32 @@ struct DropKind {
 /// All reasons, in the order of the enumeration.
 const std::vector<DropKind>& dropKinds();
 
-/// Counts clouds and measures how long they took. Not for several threads at once.
+/// Counts clouds and measures their times. Not thread-safe.
 class ScanLedger {
  public:
   using Clock = RateMeter::Clock;
 
   void received(Clock::time_point now);
-  /// @param latency from the reception to the map [s].
+  /// @param latency from the reception of the cloud to the end of its integration [s].
   void integrated(const std_msgs::Header& header, const ScanStats& stats, double latency,
                   Clock::time_point now);
-  /// @param why with the remedy.
+  /// @param why a sentence with the remedy.
   void dropped(const std_msgs::Header& header, DropReason reason, const std::string& why);
-  /// Labels that are not in the class table.
+  /// Adds counts of labels that are not in the class table.
   void unknownLabels(const std::map<std::uint32_t, std::size_t>& counts);
   void timeJumped() { ++status_.time_jumps; }
 
   std::uint64_t droppedClouds() const;
   const RollingStatistics& integration() const { return integration_; }  ///< [ms]
 
-  /// The status; rates and quantiles as of `now`. @param waiting clouds in the queue, as the queue counts
-  /// them.
+  /// The status, with the rates as of `now`. @param waiting number of clouds in the queue.
   MappingStatus status(Clock::time_point now, std::size_t waiting);
-  /// All counts in one line, for the log.
+  /// The counts in one line, for the log.
   std::string summary(std::size_t waiting) const;
 
  private:
-  /// Unknown labels are told apart up to this many values.
-  static constexpr std::size_t kMostUnknown = 64;
+  /// Maximum number of different unknown labels that are counted.
+  static constexpr std::size_t kMaxUnknown = 64;
 
   MappingStatus status_;
   RollingStatistics latency_, integration_;
@@ -72,4 +71,4 @@ class ScanLedger {
   std::map<std::uint32_t, std::uint64_t> unknown_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file Clouds that wait to be mapped.
+/// @file The queue of clouds that wait for their transforms or for the mapper.
 #pragma once
 
 #include <sensor_msgs/PointCloud2.h>
@@ -7,46 +7,46 @@
 #include <deque>
 #include <optional>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Which cloud a full queue gives up.
+/// Which cloud a full queue drops.
 enum class QueuePolicy { kDropOldest, kDropNewest };
 
 struct WaitingCloud {
   sensor_msgs::PointCloud2ConstPtr cloud;
-  std::size_t input = 0;                           ///< which of the server's inputs it came from
-  std::chrono::steady_clock::time_point received;  ///< when it came
+  std::size_t input = 0;                           ///< index of the server's input that received it
+  std::chrono::steady_clock::time_point received;  ///< time of reception
 };
 
-/// A bounded queue from which clouds are taken in their order, past those that must still wait.
+/// A bounded queue. Clouds leave it in order of reception; one that is not ready does not block later ones.
 class ScanQueue {
  public:
   std::size_t size() const { return clouds_.size(); }
 
-  /// Adds a cloud. @return the one given up for it, or the cloud itself, if more than `most` would wait.
-  std::optional<WaitingCloud> push(WaitingCloud cloud, std::size_t most, QueuePolicy policy) {
-    if (clouds_.size() >= most && policy == QueuePolicy::kDropNewest) return cloud;
+  /// Adds a cloud. @return the cloud dropped by the policy if there would be more than `max_size`.
+  std::optional<WaitingCloud> push(WaitingCloud cloud, std::size_t max_size, QueuePolicy policy) {
+    if (clouds_.size() >= max_size && policy == QueuePolicy::kDropNewest) return cloud;
     clouds_.push_back(std::move(cloud));
-    return clouds_.size() > most ? pop(clouds_.begin()) : std::nullopt;
+    return clouds_.size() > max_size ? pop(clouds_.begin()) : std::nullopt;
   }
 
-  /// Takes out the first cloud for which ready(cloud) is true.
+  /// Removes and returns the first cloud for which ready(cloud) is true.
   template <typename Ready>
   std::optional<WaitingCloud> takeIf(Ready&& ready) {
-    for (auto place = clouds_.begin(); place != clouds_.end(); ++place) {
-      if (ready(*place)) return pop(place);
+    for (auto cloud = clouds_.begin(); cloud != clouds_.end(); ++cloud) {
+      if (ready(*cloud)) return pop(cloud);
     }
     return std::nullopt;
   }
 
  private:
-  std::optional<WaitingCloud> pop(std::deque<WaitingCloud>::iterator place) {
-    WaitingCloud cloud = std::move(*place);
-    clouds_.erase(place);
+  std::optional<WaitingCloud> pop(std::deque<WaitingCloud>::iterator position) {
+    WaitingCloud cloud = std::move(*position);
+    clouds_.erase(position);
     return cloud;
   }
 
   std::deque<WaitingCloud> clouds_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

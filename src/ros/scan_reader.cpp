@@ -5,12 +5,13 @@
 
 #include "ros/cloud_conversion.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Points are moved with the pose of the middle of such a time slice [s]: 1 ms is 3 cm at 100 km/h.
+/// All points of a time slice are transformed by the pose at its middle [s]. In 1 ms a car at 100 km/h moves
+/// 3 cm.
 constexpr double kTimeSlice = 1e-3;
-/// Points may be stamped this long before or after their cloud [s]; beyond it the field is no time.
+/// Maximum time between a point and the stamp of its cloud [s]; a field with larger values is not a time.
 constexpr double kLongestScan = 10.0;
 
 ros::Time later(const ros::Time& stamp, double seconds) {
@@ -18,12 +19,12 @@ ros::Time later(const ros::Time& stamp, double seconds) {
   return time > 0.0 && time < 4e9 ? stamp + ros::Duration(seconds) : stamp;
 }
 
-/// The points relative to the scan's origin, in the axes of the map frame.
-void place(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
+/// Transforms a point of the cloud to the scan: relative to its origin, in the axes of the map frame.
+void moveToScan(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
   point = (T_map_cloud * point.cast<double>() - origin).cast<float>();
 }
 
-/// Moves each point with the pose of its time. @return what is missing, if a pose is.
+/// Transforms each point by the pose at its time. @return the missing pose, if there is one.
 std::optional<MissingPose> undistort(const CloudContent& content, const ros::Time& stamp,
                                      const std::string& map_frame, const std::string& frame,
                                      const PoseSource& poses, Scan& scan) {
@@ -42,7 +43,7 @@ std::optional<MissingPose> undistort(const CloudContent& content, const ros::Tim
       if (!found) return poses.explain(map_frame, frame, time);
       pose = pose_of_slice.emplace(slice, found->T_target_source).first;
     }
-    place(pose->second, scan.origin, scan.points[i]);
+    moveToScan(pose->second, scan.origin, scan.points[i]);
   }
   return std::nullopt;
 }
@@ -65,7 +66,7 @@ bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& 
     const double end = pointTime(time, last) + kTimeSlice;
     return !(end > 0.0 && end < kLongestScan) || known(header.frame_id, later(*stamp, end));
   } catch (const std::invalid_argument&) {
-    return true;  // read() says what is wrong
+    return true;  // read() throws the same with the message
   }
 }
 
@@ -88,7 +89,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
     scan.origin = sensor->T_target_source.translation();
     if (content.times.empty()) {
       scan.points = content.points;
-      for (Eigen::Vector3f& point : scan.points) place(frame->T_target_source, scan.origin, point);
+      for (Eigen::Vector3f& point : scan.points) moveToScan(frame->T_target_source, scan.origin, point);
     } else if (const auto missing =
                    undistort(content, sensor->stamp, map_frame_, header.frame_id, poses, scan)) {
       return *missing;
@@ -96,7 +97,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   }
   const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
   for (const Eigen::Vector3f& direction : content.no_returns) scan.no_returns.push_back(rotation * direction);
-  scan.stamp = sensor->stamp.toNSec();  // that of the cloud, or of the latest pose if the cloud has none
+  scan.stamp = sensor->stamp.toNSec();  // of the cloud; of the latest pose if the cloud has none
   scan.labels = std::move(content.labels.labels);
   scan.labels_are_ids = content.labels.are_ids;
   scan.soft = std::move(content.labels.soft);
@@ -107,4 +108,4 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   return placed;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file Scans from clouds and tf.
+/// @file Makes scans from clouds and tf.
 #pragma once
 
 #include <sensor_msgs/PointCloud2.h>
@@ -11,32 +11,34 @@
 #include "ros/input_config.h"
 #include "ros/pose_source.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// A scan, and where it was taken.
+/// A scan, and the pose of the sensor.
 struct PlacedScan {
   Scan scan;
-  Eigen::Isometry3d T_map_sensor;                       ///< at the cloud's stamp
-  std::map<std::uint32_t, std::size_t> unknown_labels;  ///< values that mean no class, and points with them
+  Eigen::Isometry3d T_map_sensor;  ///< at the cloud's stamp
+  std::map<std::uint32_t, std::size_t>
+      unknown_labels;  ///< labels that are not in the class table, with their counts
 };
 
 /// Reads the clouds of one input.
 class ScanReader {
  public:
-  /// @param classes must live as long as the reader.
+  /// @param classes must outlive the reader.
   ScanReader(const InputConfig& input, const std::string& map_frame, const ClassTable& classes,
              LabelValues label_values)
       : input_(input), map_frame_(map_frame), classes_(classes), label_values_(label_values) {}
 
-  /// The scan of a cloud, or why its pose is missing (perhaps only yet).
-  /// @throws std::invalid_argument in one sentence if the cloud does not have what the input's settings name.
+  /// The scan of a cloud, or why its pose is missing; the pose may become available later.
+  /// @throws std::invalid_argument in one sentence if the cloud lacks fields that the input's settings name.
   std::variant<PlacedScan, MissingPose> read(const sensor_msgs::PointCloud2& cloud,
                                              const PoseSource& poses) const;
 
-  /// Whether tf can tell by now where the cloud was taken; cheaper than read.
+  /// Whether tf has the poses of the cloud. Cheaper than read().
   bool ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const;
 
-  /// Whether the cloud is in the map frame and no other frame is named for the beams' origin.
+  /// Whether the origin of the beams is doubtful: the cloud is in the map frame, and sensor_frame_id is not
+  /// set.
   bool originDoubtful(const sensor_msgs::PointCloud2& cloud) const {
     return input_.sensor_frame_id.empty() && cloud.header.frame_id == map_frame_;
   }
@@ -47,8 +49,9 @@ class ScanReader {
     return input_.sensor_frame_id.empty() ? cloud.header.frame_id : input_.sensor_frame_id;
   }
 
-  /// When the poses of a cloud are looked up: at its stamp, or, for a stamp of 0, at the latest time at which
-  /// both frames have one, so that both are of the same time. None while there is no such time.
+  /// The time at which the poses of a cloud are looked up: its stamp, or, for a stamp of 0, the latest time
+  /// at which both frames have a pose, so that both poses are of the same time. nullopt if there is no such
+  /// time.
   std::optional<ros::Time> timeOf(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const {
     if (!cloud.header.stamp.isZero()) return cloud.header.stamp;
     return poses.latestCommon(map_frame_, sensorFrame(cloud), cloud.header.frame_id);
@@ -60,4 +63,4 @@ class ScanReader {
   LabelValues label_values_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

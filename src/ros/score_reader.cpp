@@ -6,13 +6,13 @@
 
 #include "ros/point_field.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// What scores and top_k have in common: from scores to shares.
-class ShareReader : public LabelReader {
+/// Common part of scores and top_k: normalises scores to a soft label.
+class SoftLabelReader : public LabelReader {
  public:
-  explicit ShareReader(ScoreType type) : type_(type) {}
+  explicit SoftLabelReader(ScoreType type) : type_(type) {}
 
   void append(const std::uint8_t* point, CloudLabels& out) override {
     scores_.clear();
@@ -22,18 +22,18 @@ class ShareReader : public LabelReader {
     out.soft.startPoint();
     if (type_ == ScoreType::kLogit) exponentiate();
     const Score* best = nullptr;
-    if (usable_) best = appendShares(out.soft);
+    if (usable_) best = appendProbabilities(out.soft);
     if (!best && any_known) out.countUnknown(kNoLabel);
     out.labels.push_back(best ? best->id : kNoLabel);
   }
 
  protected:
-  /// Hands the classes of a point with their scores to add(). @return false if it has counted why there are
-  /// none.
+  /// Passes the classes of a point and their scores to add(). @return false if no label of the point is
+  /// known; its labels are then counted as unknown.
   virtual bool collect(const std::uint8_t* point, CloudLabels& out) = 0;
 
-  /// A score of minus infinity is that of an impossible class. Of NaN or infinity nothing can be made, and
-  /// without it the shares of the others would be too large.
+  /// A score of minus infinity means an impossible class. NaN or infinity makes the point unusable: without
+  /// this score, the probabilities of the other classes would be too large.
   void add(ClassId id, double score) {
     usable_ = usable_ && !std::isnan(score) && score != INFINITY;
     if (std::isfinite(score)) scores_.push_back({id, score});
@@ -51,8 +51,8 @@ class ShareReader : public LabelReader {
     for (Score& s : scores_) s.value = std::exp(s.value - most);
   }
 
-  /// Leaves out what is not positive, and adds up several labels of one class. Scores are in units of the
-  /// largest then, since sums of others may be beyond the range of numbers.
+  /// Drops scores that are not positive, and sums those of the same class. Scores are first divided by the
+  /// largest, so that the sums do not overflow.
   void mergeEqual() {
     double most = 0.0;
     for (const Score& s : scores_) most = std::max(most, s.value);
@@ -69,15 +69,15 @@ class ShareReader : public LabelReader {
     scores_.resize(kept);
   }
 
-  /// @return the likeliest class, if there is any.
-  const Score* appendShares(SoftLabels& soft) {
+  /// @return the most probable class; nullptr if there is none.
+  const Score* appendProbabilities(SoftLabels& soft) {
     mergeEqual();
     double sum = 0.0;
     for (const Score& s : scores_) sum += s.value;
     const Score* best = nullptr;
     for (const Score& s : scores_) {
-      const auto share = static_cast<float>(s.value / sum);
-      if (share > 0.0f) soft.add({s.id, share});  // it may be too small for a float
+      const auto probability = static_cast<float>(s.value / sum);
+      if (probability > 0.0f) soft.add({s.id, probability});  // it may underflow to 0
       if (!best || s.value > best->value) best = &s;
     }
     return best;
@@ -88,11 +88,11 @@ class ShareReader : public LabelReader {
   std::vector<Score> scores_;
 };
 
-/// One score a class.
-class ScoresReader : public ShareReader {
+/// Reads one score per class.
+class ScoresReader : public SoftLabelReader {
  public:
   ScoresReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input, const ClassTable& classes)
-      : ShareReader(input.score_type) {
+      : SoftLabelReader(input.score_type) {
     const auto parts = splitList(input.score_fields);
     if (parts.size() == 1 && parts[0].find('=') == std::string::npos) {
       const std::vector<FieldReader> fields = readersOf(cloud, parts[0]);
@@ -130,12 +130,12 @@ class ScoresReader : public ShareReader {
   std::vector<std::pair<ClassId, FieldReader>> fields_;
 };
 
-/// The likeliest labels with their scores.
-class TopKReader : public ShareReader {
+/// Reads the most probable labels and their scores.
+class TopKReader : public SoftLabelReader {
  public:
   TopKReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input, const ClassTable& classes,
              LabelValues values)
-      : ShareReader(input.score_type),
+      : SoftLabelReader(input.score_type),
         labels_(readersOf(cloud, input.label_field)),
         scores_(readersOf(cloud, input.score_fields)),
         classes_(classes),
@@ -143,7 +143,7 @@ class TopKReader : public ShareReader {
     if (labels_.empty() || labels_.size() != scores_.size()) {
       throw std::invalid_argument("label_field names " + std::to_string(labels_.size()) +
                                   " labels a point, score_fields " + std::to_string(scores_.size()) +
-                                  " scores; top_k needs as many of each");
+                                  " scores; top_k needs equal numbers of both");
     }
   }
 
@@ -178,4 +178,4 @@ std::unique_ptr<LabelReader> makeScoreReader(const sensor_msgs::PointCloud2& clo
   return std::make_unique<TopKReader>(cloud, input, classes, label_values);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

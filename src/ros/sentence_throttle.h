@@ -1,4 +1,4 @@
-/// @file Keeps repeated sentences out of the log.
+/// @file Limits how often a message is logged.
 #pragma once
 
 #include <algorithm>
@@ -6,15 +6,15 @@
 #include <map>
 #include <string>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Lets each sentence through at most once in 5 s. Sentences that differ in their numbers alone are one.
+/// Lets each sentence through at most once in 5 s. Sentences that differ only in numbers count as the same.
 class SentenceThrottle {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds kPause{5};
-  /// Different sentences let through in that time: whoever sends nonsense must not choose how much is logged.
-  static constexpr std::size_t kMost = 64;
+  /// Maximum number of different sentences in that time: a faulty sender must not be able to flood the log.
+  static constexpr std::size_t kMax = 64;
 
   bool allow(const std::string& sentence, Clock::time_point now) {
     std::string key = sentence;
@@ -23,11 +23,11 @@ class SentenceThrottle {
     for (auto said = said_.begin(); said != said_.end();) {
       said = now - said->second >= kPause ? said_.erase(said) : std::next(said);
     }
-    return said_.size() < kMost && said_.emplace(std::move(key), now).second;
+    return said_.size() < kMax && said_.emplace(std::move(key), now).second;
   }
 
  private:
   std::map<std::string, Clock::time_point> said_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

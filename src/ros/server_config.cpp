@@ -7,7 +7,7 @@
 
 #include "bki_mapping/mapping/parameters.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 std::string textOf(const std::string& name, XmlRpc::XmlRpcValue value) {
@@ -194,4 +194,4 @@ void setParameters(const std::map<std::string, std::string>& values, ServerConfi
   mapper = both.mapper;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -15,7 +15,7 @@
 #include "ros/scan_queue.h"
 #include "ros/time_watch.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 enum class ColorMode { kSemantics, kProbability, kVariance, kHeight };
 
@@ -59,4 +59,4 @@ void readParameters(const ros::NodeHandle& private_node, ServerConfig& server, M
 void setParameters(const std::map<std::string, std::string>& values, ServerConfig& server,
                    MapperConfig& mapper);
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

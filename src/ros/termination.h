@@ -1,16 +1,16 @@
-/// @file How programs end.
+/// @file Shutdown of programs.
 #pragma once
 
 #include <ros/init.h>
 
 #include <csignal>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// Lets SIGTERM end a program as ROS lets SIGINT: ros::ok() becomes false, and destructors have their say. To
-/// be called after ros::init.
+/// Makes SIGTERM end a program as SIGINT does under ROS: ros::ok() becomes false, and destructors run. Call
+/// it after ros::init.
 inline void endOnTerminate() {
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

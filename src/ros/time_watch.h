@@ -1,4 +1,4 @@
-/// @file Notices when time jumps back.
+/// @file Detects that time jumped back.
 #pragma once
 
 #include <ros/time.h>
@@ -6,16 +6,16 @@
 #include <algorithm>
 #include <vector>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 enum class OnTimeJump { kKeep, kReset };
 
-/// Watches /clock, and the stamps of each input for players that publish none.
+/// Watches /clock and, for players without /clock, the stamps of each input.
 class TimeWatch {
  public:
-  /// A cloud may be this much older than the one before it without time having jumped [s].
+  /// A cloud may be this much older than the previous one without a time jump: out of order [s].
   static constexpr double kOutOfOrder = 1.0;
-  /// A cloud agrees with the one before it if it is at most this much newer [s].
+  /// Two consecutive clouds agree on the time if the second is at most this much newer [s].
   static constexpr double kLongestPause = 10.0;
 
   /// @return whether simulated time went back since the last call.
@@ -26,9 +26,9 @@ class TimeWatch {
     return back;
   }
 
-  /// @return whether two clouds of an input in a row agree that it is now earlier, by more than clouds out of
-  /// order are, than other clouds that agreed had said. Of one cloud alone, ahead or behind, nothing follows;
-  /// nor of a stamp of 0.
+  /// @return whether two consecutive clouds of an input agree on a time that is more than kOutOfOrder before
+  /// the latest time on which two clouds agreed. A single cloud with a wrong stamp, or a stamp of 0, does not
+  /// count.
   bool stampsWentBack(std::size_t input, const ros::Time& stamp) {
     if (input >= inputs_.size()) inputs_.resize(input + 1);
     if (stamp.isZero()) return false;
@@ -41,18 +41,18 @@ class TimeWatch {
     return back;
   }
 
-  /// Time starts anew.
+  /// Forgets all stamps.
   void restart() { inputs_.clear(); }
 
  private:
-  /// Stamps [s].
+  /// Stamps of one input [s].
   struct Input {
     double last = 0.0;    ///< of the last cloud
-    double latest = 0.0;  ///< the latest with which the cloud after it agreed; 0: none yet
+    double latest = 0.0;  ///< latest stamp with which the next cloud agreed; 0: none yet
   };
 
   ros::Time clock_;
   std::vector<Input> inputs_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-// Plays a sequence in SemanticKITTI's layout as clouds, tf and /clock.
+// Publishes a sequence in SemanticKITTI's layout as clouds, tf and /clock.
 #include <bki_mapping/MappingStatus.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
@@ -19,24 +19,23 @@ namespace {
 using namespace bki_mapping;
 namespace po = tools::po;
 
-/// How long to wait for a first listener, and for an acknowledgement [s].
+/// Timeouts for the first subscriber and for an acknowledgement [s].
 constexpr double kListenerWait = 60.0, kAcknowledgeWait = 60.0;
-constexpr double kClockStep = 0.01;  ///< [s] of wall time
+constexpr double kClockStep = 0.01;  ///< interval of /clock [s of wall time]
 
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()(
-      "rate", tools::realOption("--rate", 0.0)->value_name("FACTOR")->default_value(1.0),
-      "1 is real time, 2 twice as fast; 0 waits until `mapping/status` acknowledges each scan")(
+  options.add_options()("rate", tools::realOption("--rate", 0.0)->value_name("FACTOR")->default_value(1.0),
+                        "factor of real time; 0: wait until `mapping/status` acknowledges each scan")(
       "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
       "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
-      "check", "read the first scan, print the folder's absolute path, and end; for launch files");
+      "check", "check the sequence, print its absolute path, and exit; for launch files");
   options.add(tools::sequenceOptions());
   return options;
 }
 
-/// Publishes frames and, between them, the time.
+/// Publishes frames, and the time between them.
 class Player {
  public:
   explicit Player(const tools::FrameNames& names) : names_(names) {
@@ -44,13 +43,13 @@ class Player {
         "cloud_in", 10,
         [this](const ros::SingleSubscriberPublisher& link) { listeners_.insert(link.getSubscriberName()); });
     tf_ = node_.advertise<tf2_msgs::TFMessage>("/tf", 100,
-                                               true);  // latched: who comes late still gets the last
+                                               true);  // latched: a late subscriber gets the last pose
     clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 10);
     status_ = node_.subscribe("mapping/status", 100, &Player::onStatus, this);
   }
 
-  /// @param mapper whether it must be the mapper that listens, and not rviz alone: the mapper would miss the
-  /// first cloud, and never acknowledge it.
+  /// Waits until the clouds have a subscriber. @param mapper wait for the mapper, not just for rviz: a mapper
+  /// that misses the first cloud would never acknowledge it.
   void waitForListener(bool mapper) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kListenerWait);
     const auto missing = [&] {
@@ -68,7 +67,7 @@ class Player {
   }
 
   void publish(const SequenceFrame& frame) {
-    acknowledged_ = 0;  // a mapper that has mapped the sequence before acknowledged this stamp then
+    acknowledged_ = 0;  // the mapper may have acknowledged this stamp in an earlier run
     publishClock(frame.stamp);
     tf_.publish(tools::tfMessage(frame, names_));
     cloud_.publish(tools::cloudMessage(frame, names_));
@@ -101,19 +100,20 @@ class Player {
   ros::NodeHandle node_;
   ros::Publisher cloud_, tf_, clock_;
   ros::Subscriber status_;
-  std::set<std::string> listeners_;  ///< nodes that have subscribed to the clouds
-  std::string mapper_;               ///< the node that publishes the status; empty: none yet
+  std::set<std::string> listeners_;  ///< nodes subscribed to the clouds
+  std::string mapper_;               ///< node that publishes the status; empty: unknown yet
   std::uint64_t acknowledged_ = 0;
 };
 
-/// An absolute path; ~ is what shells leave in sequence:=~/DIR.
+/// The absolute path. Expands ~, which shells leave in sequence:=~/DIR.
 std::filesystem::path absolutePath(const std::string& path) {
   const char* home = std::getenv("HOME");
   if (path.rfind("~/", 0) == 0 && home != nullptr) return home + path.substr(1);
   return std::filesystem::absolute(path).lexically_normal();
 }
 
-/// Launch files resolve the folder where roslaunch runs, and give it to the node, which runs elsewhere.
+/// Takes --sequence from the parameter ~sequence: launch files resolve the folder relative to where roslaunch
+/// was called, because the node runs in another folder.
 void takeFolderOfParameter(po::variables_map& given) {
   std::string folder;
   if (!given.count("sequence") && ros::param::get("~sequence", folder)) {
@@ -126,7 +126,7 @@ int check(const po::variables_map& given) {
   if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
   const std::string folder = absolutePath(given["sequence"].as<std::string>()).string();
   Sequence(folder, given["labels"].as<std::string>()).read(0);
-  std::cout << folder;  // roslaunch takes a line's end for a part of the path
+  std::cout << folder;  // no newline: roslaunch would make it part of the path
   return 0;
 }
 
@@ -170,13 +170,13 @@ int main(int argc, char** argv) {
     ros::removeROSArgs(argc, argv, arguments);
     std::vector<char*> pointers;
     for (std::string& argument : arguments) pointers.push_back(argument.data());
-    const auto given =
-        tools::parse(static_cast<int>(pointers.size()), pointers.data(),
-                     "Plays a sequence in SemanticKITTI's layout: cloud_in, /tf and /clock.", options());
+    const auto given = tools::parse(
+        static_cast<int>(pointers.size()), pointers.data(),
+        "Publishes a sequence in SemanticKITTI's layout as cloud_in, /tf and /clock.", options());
     if (!given) return 0;
     if (given->count("check")) return check(*given);
     ros::init(argc, argv, "play_sequence");
-    ros_shell::endOnTerminate();
+    ros_interface::endOnTerminate();
     takeFolderOfParameter(*given);
     return play(*given);
   });

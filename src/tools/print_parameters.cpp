@@ -1,4 +1,4 @@
-/// @file Prints the facts of all parameters as JSON, for scripts/generate_parameters.
+/// @file Prints the properties of all parameters as JSON, for scripts/generate_parameters.
 #include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -27,10 +27,10 @@ const char* nameOf(ParameterType type) {
   }
 }
 
-/// Numbers are text, as people read and write them.
+/// Numbers are strings, formatted as in parameter files.
 template <typename Config>
 Json jsonOf(const std::vector<NamedParameter<Config>>& parameters) {
-  const std::vector<std::string>& shown = ros_shell::shownAtStart();
+  const std::vector<std::string>& shown = ros_interface::shownAtStart();
   Json list = Json::array();
   for (const auto& p : parameters) {
     Json facts = {{"name", p.name},
@@ -56,9 +56,9 @@ Json jsonOf(const std::vector<NamedParameter<Config>>& parameters) {
 int main() {
   using namespace bki_mapping;
   std::cout << Json{{"mapper", jsonOf(mapperParameters())},
-                    {"node", jsonOf(ros_shell::serverParameters())},
-                    {"inputs", jsonOf(ros_shell::inputParameters())},
-                    {"refusal", ros_shell::kLastRefusal}}
+                    {"node", jsonOf(ros_interface::serverParameters())},
+                    {"inputs", jsonOf(ros_interface::inputParameters())},
+                    {"refusal", ros_interface::kLastRefusal}}
                    .dump(2)
             << "\n";
   return std::cout.good() ? 0 : 1;

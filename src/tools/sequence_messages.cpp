@@ -6,7 +6,7 @@
 namespace bki_mapping::tools {
 
 sensor_msgs::PointCloud2 cloudMessage(const SequenceFrame& frame, const FrameNames& names) {
-  sensor_msgs::PointCloud2 cloud = ros_shell::makeCloud(frame.points, frame.remissions, frame.labels);
+  sensor_msgs::PointCloud2 cloud = ros_interface::makeCloud(frame.points, frame.remissions, frame.labels);
   cloud.header.frame_id = names.sensor;
   cloud.header.stamp.fromNSec(frame.stamp);
   return cloud;
@@ -18,7 +18,7 @@ tf2_msgs::TFMessage tfMessage(const SequenceFrame& frame, const FrameNames& name
   message.transforms[0].header.frame_id = names.map;
   message.transforms[0].header.stamp.fromNSec(frame.stamp);
   message.transforms[0].child_frame_id = names.sensor;
-  message.transforms[0].transform = ros_shell::toTransform(frame.T_map_sensor);
+  message.transforms[0].transform = ros_interface::toTransform(frame.T_map_sensor);
   return message;
 }
 

@@ -15,7 +15,7 @@ struct FrameNames {
   std::string sensor = "velodyne";
 };
 
-/// The frame's points with intensity and raw label, in the sensor frame.
+/// The frame's points with intensities and raw labels, in the sensor frame.
 sensor_msgs::PointCloud2 cloudMessage(const SequenceFrame& frame, const FrameNames& names);
 /// The pose of the sensor in the map frame.
 tf2_msgs::TFMessage tfMessage(const SequenceFrame& frame, const FrameNames& names);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""body_box of mapping.launch: what is in the box neither occupies nor clears, and the rest reaches the mapper as it is."""
+"""body_box of mapping.launch: points in the box neither occupy nor clear, and the others reach the mapper unchanged."""
 import os
 import subprocess
 import sys
@@ -30,7 +30,7 @@ def inside(point):
 
 
 def scan_with_body():
-    """Points and labels, of which a part is in the box, between the others."""
+    """Points and labels; those in the box are scattered among the others."""
     far, labels = random_scan(7, points=120, reach=12.0)
     far = [p for p in far if not inside(p)]
     body = [p for p in random_scan(8, points=400, reach=3.0)[0] if inside(p)][:len(far)]
@@ -52,7 +52,7 @@ def map_of(stamp):
 
 
 def map_after(points, labels, *arguments):
-    """The map of a single scan through mapping.launch, and the status after it."""
+    """The map of a single scan through mapping.launch, and the status after the scan."""
     with Mapping(PARAMETERS, *arguments) as mapping:
         status = mapping.scan(points, labels)
         return map_of(status.header.stamp), status
@@ -105,7 +105,7 @@ class BodyBox(unittest.TestCase):
         self.assertEqual(transports, {'INTRAPROCESS'})
 
     def test_a_box_in_a_frame_of_its_own(self):
-        """The cloud's frame is turned by 90 degrees and moved against that of the box."""
+        """The frame of the cloud is rotated by 90 degrees and shifted relative to that of the box."""
         static = TransformStamped()
         static.header.frame_id, static.child_frame_id = 'sensor', 'base'
         t, q = static.transform.translation, static.transform.rotation
@@ -120,7 +120,7 @@ class BodyBox(unittest.TestCase):
         kept, labels = outside(self.points, self.labels)
         expected = map_after(in_sensor(kept), labels)[0]
         with Mapping(PARAMETERS, f'body_box:={BOX}', 'body_frame:=base') as mapping:
-            # CropBox loses clouds until it has the transform; a cloud all inside of the box is empty after it.
+            # CropBox drops clouds until it has the transform. It empties a cloud that is entirely inside of the box.
             def has_transform():
                 mapping.robot.scan([(0.0, 1.0, -0.5)], [CAR])
                 time.sleep(0.1)

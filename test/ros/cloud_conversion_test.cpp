@@ -1,4 +1,4 @@
-// Clouds of every make are read right, and wrong ones refused in one sentence.
+// Clouds of every layout are read correctly, and faulty ones are refused in one sentence.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -12,7 +12,7 @@
 #include "ros/no_returns.h"
 #include "ros/pose_conversion.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using sensor_msgs::PointField;
@@ -113,13 +113,13 @@ TEST(Cloud, ThousandsOfFieldsCostWhatTheyHold) {
   const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(readersOf(cloud, "label").size(), kComponents);
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
-  // Nobody chooses how much is said.
+  // A sender cannot control the length of the message.
   const std::string fault = faultOf(cloud, "class");
   EXPECT_LT(fault.size(), 3000u);
   EXPECT_NE(fault.find("and 4985 more"), std::string::npos) << fault;
 }
 
-/// A cloud at the origin with any float fields; each row of values is a point.
+/// A cloud at the origin with arbitrary float fields; each row of values is a point.
 sensor_msgs::PointCloud2 cloudOf(const std::vector<std::string>& names,
                                  const std::vector<std::vector<float>>& points) {
   sensor_msgs::PointCloud2 cloud;
@@ -246,7 +246,7 @@ TEST(Labels, TopKNamesTheLikeliest) {
   input.label_encoding = LabelEncoding::kTopK;
   input.label_field = "first,second";
   input.score_fields = "p1,p2";
-  // 10 and 252 are both cars; 12345 is in no table.
+  // 10 and 252 are both cars; 12345 is not in the table.
   const auto cloud = cloudOf({"first", "p1", "second", "p2"},
                              {{40, 0.6f, 10, 0.2f}, {10, 0.3f, 252, 0.3f}, {12345, 0.9f, 40, 0.1f}});
   const CloudLabels labels = readCloud(cloud, input, classes(), LabelValues::kRaw).labels;
@@ -259,7 +259,7 @@ TEST(Labels, TopKNamesTheLikeliest) {
   EXPECT_THROW(readCloud(cloud, input, classes(), LabelValues::kRaw), std::invalid_argument);
 }
 
-/// The shares of the only point of a cloud with the scores of a car and a road.
+/// The soft label of the only point of a cloud with the scores of a car and a road.
 std::vector<ClassShare> sharesOf(double car, double road, ScoreType type, std::uint8_t datatype) {
   CloudMaker maker({{1, 2, 3}});
   maker.add("car", datatype, {car}).add("road", datatype, {road});
@@ -279,17 +279,18 @@ TEST(Labels, ScoresOfAnySizeBecomeSharesInProportion) {
   constexpr auto kProbability = ScoreType::kProbability, kLogit = ScoreType::kLogit;
   constexpr std::uint8_t kFloat = PointField::FLOAT32, kDouble = PointField::FLOAT64;
   const double inf = INFINITY, great = std::numeric_limits<double>::max();
-  expect(sharesOf(1e39, 3e39, kProbability, kDouble), 0.25f, 0.75f);  // beyond a float
-  expect(sharesOf(great, great, kProbability, kDouble), 0.5f, 0.5f);  // their sum is beyond a double
-  expect(sharesOf(3e38, 3e38, kProbability, kFloat), 0.5f, 0.5f);     // their sum is beyond a float
+  expect(sharesOf(1e39, 3e39, kProbability, kDouble), 0.25f, 0.75f);  // exceeds a float
+  expect(sharesOf(great, great, kProbability, kDouble), 0.5f, 0.5f);  // their sum exceeds a double
+  expect(sharesOf(3e38, 3e38, kProbability, kFloat), 0.5f, 0.5f);     // their sum exceeds a float
   expect(sharesOf(1e-320, 3e-320, kProbability, kDouble), 1.0f / 4.0f, 3.0f / 4.0f);
   expect(sharesOf(0.5, -1e300, kProbability, kDouble), 1.0f, 0.0f);
   expect(sharesOf(-0.0, 2.0, kProbability, kDouble), 0.0f, 1.0f);
   expect(sharesOf(-inf, 2.0, kProbability, kDouble), 0.0f, 1.0f);
   expect(sharesOf(1e308, -1e308, kLogit, kDouble), 1.0f, 0.0f);
-  expect(sharesOf(3e7, 3e7 + std::log(3.0), kLogit, kDouble), 0.25f, 0.75f);  // a float has whole steps there
-  expect(sharesOf(-inf, -1e308, kLogit, kDouble), 0.0f, 1.0f);                // impossible, and certain
-  // Nothing can be made of these: to leave the score out would give the point to the other class.
+  expect(sharesOf(3e7, 3e7 + std::log(3.0), kLogit, kDouble), 0.25f,
+         0.75f);                                                // floats of this size are integers
+  expect(sharesOf(-inf, -1e308, kLogit, kDouble), 0.0f, 1.0f);  // one impossible, the other certain
+  // Makes the point unusable: leaving out the score would give the point to the other class.
   for (const ScoreType type : {kProbability, kLogit}) {
     for (const double bad : {inf, static_cast<double>(NAN)}) {
       expect(sharesOf(bad, 2.0, type, kDouble), 0.0f, 0.0f);
@@ -321,12 +322,13 @@ TEST(NoReturns, InfinityPointsTheWay) {
   input.clear_no_returns = true;
   const CloudContent content = readCloud(cloud, input, classes(), LabelValues::kRaw);
   EXPECT_EQ(content.no_returns, (std::vector<Eigen::Vector3f>{{1, 0, 0}, {-1, 1, 0}}));
-  EXPECT_EQ(content.points.size(), 1u);  // NaN says nothing in a cloud of one row; the mapper counts it
+  EXPECT_EQ(content.points.size(),
+            1u);  // without rows, the direction of NaN is unknown; the mapper counts it
   EXPECT_EQ(content.labels.labels.size(), 1u);
 }
 
 TEST(NoReturns, HolesOfOrganisedCloudsPointWhereTheirRowAndColumnDo) {
-  // 3 rows at elevations -0.2, 0, 0.2 and 4 columns, a quarter turn apart; any range.
+  // 3 rows at elevations -0.2, 0, 0.2 and 4 columns, 90 degrees apart; arbitrary ranges.
   std::vector<Eigen::Vector3f> points, truth;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
@@ -341,7 +343,7 @@ TEST(NoReturns, HolesOfOrganisedCloudsPointWhereTheirRowAndColumnDo) {
   const auto directions = directionsOfHoles(points, 4);
   ASSERT_EQ(directions.size(), truth.size());
   for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_TRUE(directions[i].isApprox(truth[i], 1e-5f));
-  // Nothing is known of a column without returns.
+  // The azimuth of a column without returns is unknown.
   EXPECT_TRUE(directionsOfHoles(std::vector<Eigen::Vector3f>(4, Eigen::Vector3f::Constant(NAN)), 2).empty());
   EXPECT_TRUE(directionsOfHoles({}, 0).empty());
 }
@@ -354,4 +356,4 @@ TEST(Pose, SurvivesTheTripThroughAMessage) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

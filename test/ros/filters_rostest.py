@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The nodelets and programs of pcl_ros as docs show them: what is pasted from there works."""
+"""The nodelets and programs of pcl_ros as the documents show them: the snippets work as they are."""
 import os
 import re
 import shlex
@@ -51,7 +51,7 @@ class Filters(unittest.TestCase):
         self.assertEqual((status.points_received, status.points_used), (2, 2))
 
     def test_voxel_grid_averages_labels(self):
-        """As docs say; if this ever changes, so must they."""
+        """Tests a statement of the documents; if it fails, they must be changed."""
         grid = subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'standalone', 'pcl/VoxelGrid', '__name:=grid',
                                  '_leaf_size:=0.5', '_filter_field_name:='])
         output = Listener('/grid/output', PointCloud2)

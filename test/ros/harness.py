@@ -1,4 +1,4 @@
-"""What the rostests share: clouds, poses, and waiting for messages with a timeout."""
+"""Common parts of the rostests: clouds, poses, and waiting for messages with a timeout."""
 import random
 import struct
 import subprocess
@@ -16,14 +16,14 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
-TIMEOUT = 30.0  # wall time to wait for anything [s]
+TIMEOUT = 30.0  # maximum wall time to wait for an event [s]
 CAR, ROAD = 10, 40  # raw labels of config/classes/semantic_kitti.yaml
 FORMATS = {PointField.INT8: 'b', PointField.UINT8: 'B', PointField.INT16: 'h', PointField.UINT16: 'H',
            PointField.INT32: 'i', PointField.UINT32: 'I', PointField.FLOAT32: 'f', PointField.FLOAT64: 'd'}
 
 
 def wait_until(condition, what, timeout=TIMEOUT):
-    """Returns the condition's value as soon as it is true; fails after the timeout."""
+    """Returns the value of the condition as soon as it is true; fails after the timeout."""
     end = time.monotonic() + timeout
     while time.monotonic() < end:
         value = condition()
@@ -53,7 +53,7 @@ class Listener:
         self.subscriber = rospy.Subscriber(topic, kind, self.add, queue_size=1000)
 
     def close(self):
-        """Ends the connection, so that the next listener makes a new one."""
+        """Closes the connection, so that the next listener opens a new one."""
         self.subscriber.unregister()
 
     def add(self, message):
@@ -70,7 +70,7 @@ class Listener:
 
 def make_cloud(points, labels, stamp, frame='sensor', label_type=PointField.UINT32, label_name='label', padding=0,
                big_endian=False):
-    """A cloud with fields label (any type), then x, y, z, after `padding` bytes."""
+    """A cloud whose points have `padding` bytes, then the fields label (of any type), x, y and z."""
     cloud = PointCloud2()
     cloud.header.stamp = stamp
     cloud.header.frame_id = frame
@@ -90,7 +90,7 @@ def make_cloud(points, labels, stamp, frame='sensor', label_type=PointField.UINT
 
 
 class Robot:
-    """Publishes clouds of a sensor and its pose."""
+    """Publishes the clouds and poses of a sensor."""
 
     def __init__(self, cloud_topic='cloud_in', frame='sensor'):
         self.clouds = rospy.Publisher(cloud_topic, PointCloud2, queue_size=100)
@@ -127,7 +127,7 @@ class Robot:
 
 
 class Mapping:
-    """A running launch file with the mapper `mapping`, and a robot beside it."""
+    """A running launch file with the mapper `mapping`, and a robot."""
     points = [(0.2 * i - 10.0, 8.0, 0.1 * (i % 20) - 1.0) for i in range(100)]
 
     def __init__(self, *arguments, launch=('bki_mapping', 'mapping.launch')):
@@ -146,7 +146,7 @@ class Mapping:
         return self
 
     def scan(self, points=None, labels=None, **options):
-        """Publishes a scan; returns the status after it."""
+        """Publishes a scan; returns the status after its integration."""
         points = points or self.points
         stamp = self.robot.scan(points, labels or [CAR] * len(points), **options)
         return self.status.wait_for(lambda m: m.header.stamp == stamp, 'dealing with the cloud')
@@ -165,7 +165,7 @@ class Mapping:
 
 
 def random_scan(seed, points=60, reach=30.0):
-    """Points in a cube around the sensor, and a label for each."""
+    """Random points in a cube around the sensor, with labels."""
     rand = random.Random(seed)
     cloud = [tuple(rand.uniform(-reach, reach) for _ in range(3)) for _ in range(points)]
     return cloud, [rand.choice((CAR, ROAD)) for _ in cloud]
@@ -176,7 +176,7 @@ def voxels_of(blocks):
 
 
 class MapperTest(unittest.TestCase):
-    """Drives the mapper `mapping` with one robot, from an empty map in each test."""
+    """Base of tests with the mapper `mapping` and one robot; each test starts with an empty map."""
     cloud_topic = 'cloud_in'
 
     @classmethod
@@ -195,7 +195,7 @@ class MapperTest(unittest.TestCase):
         return rospy.ServiceProxy(f'mapping/{service}', kind)()
 
     def reconfigure(self, **settings):
-        """Changes settings while mapping, and back at the end of the test."""
+        """Changes settings while mapping, and restores them at the end of the test."""
         client = Client('/mapping/reconfigure', timeout=TIMEOUT)
         self.addCleanup(client.close)
         before = client.get_configuration(TIMEOUT)
@@ -211,13 +211,13 @@ class MapperTest(unittest.TestCase):
         return status.header.stamp
 
     def drive(self, seeds):
-        """Scans at random, 20 m after one another; returns the stamp of the last."""
+        """Publishes random scans, 20 m apart; returns the stamp of the last one."""
         for seed in seeds:
             stamp = self.integrate(*random_scan(seed), position=(20.0 * seed, 0.0, 0.0))
         return stamp
 
     def map_of_server(self, stamp):
-        """Blocks of the map as of a scan: states, labels, probabilities."""
+        """The blocks of the map after a scan: states, labels, probabilities."""
         listener = Listener('occupancy', OccupancyMap)
         try:
             return voxels_of(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map').blocks)

@@ -1,10 +1,11 @@
-// A hostile publisher: clouds, transforms, calls and settings of every kind in hostile/, at random, to the
-// nodelet in this process. Nothing crashes or hangs, memory is bounded, every cloud is accounted for under a
-// reason that its kind allows, every refusal has a sentence, and afterwards the mapper maps as a fresh one.
+// A hostile publisher: sends random clouds, transforms, calls and settings of every kind in hostile/ to the
+// nodelet in this process. Nothing crashes or hangs, memory is bounded, every cloud is counted under a reason
+// that its kind allows, every refusal has a message, and afterwards the mapper maps like a new one.
 //
-// BKI_MAPPING_HOSTILE_SEED: of the random numbers (default 1). BKI_MAPPING_HOSTILE_MESSAGES: how many at
-// least (default 2000); BKI_MAPPING_HOSTILE_SECONDS: how long instead. BKI_MAPPING_HOSTILE_SETTINGS: one set
-// of settings alone. BKI_MAPPING_HOSTILE_JOURNAL: a file that takes each message's kind before it is sent.
+// BKI_MAPPING_HOSTILE_SEED: seed (default 1). BKI_MAPPING_HOSTILE_MESSAGES: minimum number of messages
+// (default 2000), or BKI_MAPPING_HOSTILE_SECONDS: duration. BKI_MAPPING_HOSTILE_SETTINGS: use only this set
+// of settings. BKI_MAPPING_HOSTILE_JOURNAL: file to which the kind of each message is written before it is
+// sent.
 #include <bki_mapping/ElevationMap.h>
 #include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/OccupancyMap.h>
@@ -42,7 +43,7 @@
 #include "ros/scan_ledger.h"
 #include "temporary_folder.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using namespace bki_mapping::hostile;
@@ -54,11 +55,11 @@ constexpr bool kSanitized = true;
 #else
 constexpr bool kSanitized = false;
 #endif
-/// Most resident memory at any time [MB]; sanitizers keep freed memory, and shadows of all.
-constexpr double kMostMemory = kSanitized ? 1000.0 : 400.0;
-/// No answer may take longer [s].
+/// Maximum resident memory [MB]; sanitizers keep freed memory, and need shadow memory.
+constexpr double kMaxMemory = kSanitized ? 1000.0 : 400.0;
+/// Maximum time for an answer [s].
 constexpr double kLongestAnswer = 20.0;
-/// What is said of a refusal names its cause and a remedy, and no sender chooses how much is said [bytes].
+/// Maximum length of the message of a refusal, which a sender must not control [bytes].
 constexpr std::size_t kShortestText = 20, kLongestText = 3000;
 
 const std::string kName = "/hostile_mapping";
@@ -165,17 +166,17 @@ const std::vector<Settings>& allSettings() {
   return all;
 }
 
-/// What the kinds of a run met with.
-struct Tally {
-  std::map<std::string, std::map<std::string, std::size_t>> answers;  ///< by kind and answer
+/// The results of a run.
+struct Results {
+  std::map<std::string, std::map<std::string, std::size_t>> answers;  ///< count by kind and answer
   std::map<std::string, std::size_t> tried;
-  std::map<std::string, double> seconds;         ///< that they took
-  std::map<std::string, std::string> sentences;  ///< one of each kind and answer
+  std::map<std::string, double> seconds;         ///< time taken by each kind
+  std::map<std::string, std::string> sentences;  ///< example for each kind and answer
   std::size_t messages = 0;
   double most_memory = 0.0;
 };
 
-/// Ends the process if nothing happens for long: a hang cannot be left by an exception.
+/// Ends the process when it hangs, because an exception cannot end a hang.
 class Watchdog {
  public:
   Watchdog() : thread_([this] { watch(); }) {}
@@ -212,7 +213,7 @@ class Watchdog {
   std::thread thread_;
 };
 
-/// The log of this process: how many clouds were refused with a sentence, and how long texts are.
+/// Reads the log of this process: counts refusals of clouds, and checks the length of messages.
 class LogReader {
  public:
   explicit LogReader(ros::NodeHandle& node) {
@@ -234,7 +235,7 @@ class LogReader {
 
  private:
   void read(const rosgraph_msgs::Log& log) {
-    if (log.file.find("src/ros/") == std::string::npos) return;  // a library's
+    if (log.file.find("src/ros/") == std::string::npos) return;  // logged by a library
     const std::lock_guard<std::mutex> lock(mutex_);
     bytes_ += log.msg.size();
     if (log.msg.size() > longest_.size()) longest_ = log.msg;
@@ -249,7 +250,7 @@ class LogReader {
   ros::Subscriber subscriber_;
 };
 
-/// Loads and unloads the mapper, and keeps the books on its status.
+/// Loads and unloads the mapper, and checks the sums of its status.
 class Mapper {
  public:
   explicit Mapper(ros::NodeHandle& node) : node_(node), loader_(true) {
@@ -280,7 +281,7 @@ class Mapper {
     loaded_ = false;
   }
 
-  /// Waits until a status has `received` clouds of which none waits. @return whether one came.
+  /// Waits for a status with `received` clouds, none of them waiting. @return whether it arrived in time.
   bool settle(std::uint64_t received, MappingStatus& status) {
     const bool came = waitFor([&] { return last_.received == received && last_.waiting == 0; });
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -290,7 +291,7 @@ class Mapper {
 
   std::size_t faults() const { return faults_; }
   std::size_t statuses() const { return statuses_; }
-  /// Reasons for which this mapper has dropped clouds.
+  /// The reasons for which this mapper has dropped clouds.
   std::size_t reasons() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return reasons_.size();
@@ -351,7 +352,7 @@ class Mapper {
   ros::Subscriber status_;
 };
 
-/// Somebody who listens to everything, and goes away, at random.
+/// Subscribers of all topics that come and go at random.
 class Listeners {
  public:
   explicit Listeners(ros::NodeHandle& node) : node_(node) {}
@@ -388,12 +389,12 @@ class Listeners {
 /// One mapper under one set of settings, from loading it to comparing it with a fresh one.
 class Attack {
  public:
-  Attack(ros::NodeHandle& node, Mapper& mapper, LogReader& log, Watchdog& watchdog, Tally& tally,
+  Attack(ros::NodeHandle& node, Mapper& mapper, LogReader& log, Watchdog& watchdog, Results& results,
          const Settings& settings, std::uint64_t seed)
       : mapper_(mapper),
         log_(log),
         watchdog_(watchdog),
-        tally_(tally),
+        results_(results),
         settings_(settings),
         seed_(seed),
         dice_(seed),
@@ -413,7 +414,7 @@ class Attack {
   }
   ~Attack() { close(journal_); }
 
-  /// Sends every kind `rounds` times, and then asks the mapper to map as ever.
+  /// Sends every kind `rounds` times, and then checks that the mapper works as before.
   void run(std::size_t rounds) {
     load();
     for (std::size_t round = 0; round < rounds; ++round) {
@@ -427,7 +428,7 @@ class Attack {
     mapper_.unload();
   }
 
-  /// Sends 200 new frames in each of so many messages, and waits until they are taken. @return memory [MB].
+  /// Sends the given number of messages with 200 new frames each, and waits for them. @return memory [MB].
   double floodFrames(int messages) {
     if (sent_ == 0) load();
     begin("flood");
@@ -452,18 +453,18 @@ class Attack {
 
   void begin(const std::string& kind) {
     const Clock::time_point now = Clock::now();
-    tally_.seconds[kind_] += std::chrono::duration<double>(now - begun_).count();
+    results_.seconds[kind_] += std::chrono::duration<double>(now - begun_).count();
     begun_ = now;
     kind_ = kind;
     ++number_;
-    ++tally_.messages;
-    ++tally_.tried[kind];
+    ++results_.messages;
+    ++results_.tried[kind];
     const std::string line = where() + "\n";
     if (write(journal_, line.data(), line.size()) < 0) ADD_FAILURE() << "the journal cannot be written";
     watchdog_.feed(where());
     const double memory = residentMemory();
-    tally_.most_memory = std::max(tally_.most_memory, memory);
-    EXPECT_LT(memory, kMostMemory) << where();
+    results_.most_memory = std::max(results_.most_memory, memory);
+    EXPECT_LT(memory, kMaxMemory) << where();
   }
 
   void load() {
@@ -515,7 +516,7 @@ class Attack {
     clouds_[dice_.below(inputs_)].publish(boost::shared_ptr<PointCloud2>(new PointCloud2(cloud)));
   }
 
-  /// Waits for the mapper's answer to the last cloud, and says what became of it.
+  /// Waits for the mapper's answer to the last cloud, and returns it.
   void wait(std::string& answer) {
     MappingStatus now;
     ASSERT_TRUE(mapper_.settle(sent_, now)) << "no answer: " << where() << "\n" << now;
@@ -523,10 +524,10 @@ class Attack {
     for (const DropKind& kind : dropKinds()) {
       if (now.*kind.count == before_.*kind.count) continue;
       answer = kind.name;
-      tally_.sentences[kind_ + ": " + answer] = now.last_drop;
+      results_.sentences[kind_ + ": " + answer] = now.last_drop;
     }
     before_ = now;
-    ++tally_.answers[kind_][answer];
+    ++results_.answers[kind_][answer];
   }
   std::string answer() {
     std::string answer = "none";
@@ -535,7 +536,7 @@ class Attack {
   }
   void expectAnswer(Answers allowed) {
     const std::string given = answer();
-    allowed.insert(allowed.end(), {"memory limit", "too large"});  // by the settings
+    allowed.insert(allowed.end(), {"memory limit", "too large"});  // allowed by the settings
     EXPECT_TRUE(std::find(allowed.begin(), allowed.end(), given) != allowed.end())
         << where() << ": was answered with '" << given << "'";
   }
@@ -556,11 +557,11 @@ class Attack {
     begin(kind.name);
     const ros::Time stamp = nextStamp();
     publishHonestTransforms(stamp);
-    const std::string frame = "frame_" + std::to_string(tally_.messages);
+    const std::string frame = "frame_" + std::to_string(results_.messages);
     publish(kind.make(frame, stamp, dice_));
     publish(honestCloud(frame, stamp, dice_));
     Answers allowed = kind.answers;
-    if (points_have_times_) {  // for which this kind sends no transforms
+    if (points_have_times_) {  // this kind sends no transforms for these times
       allowed.insert(allowed.end(), {"transform late", "too old"});
     }
     expectAnswer(allowed);
@@ -573,7 +574,7 @@ class Attack {
     struct stat before {};
     const bool there = stat(save.request.path.c_str(), &before) == 0;
     ASSERT_TRUE(mapper_.call("save_map", save)) << where();
-    ++tally_.answers[kind.name][save.response.success ? "written" : "refused"];
+    ++results_.answers[kind.name][save.response.success ? "written" : "refused"];
     EXPECT_EQ(save.response.success, kind.written) << where() << ": " << save.response.message;
     EXPECT_GT(save.response.message.size(), 10u) << where();
     struct stat after {};
@@ -587,7 +588,7 @@ class Attack {
     dynamic_reconfigure::Reconfigure change;
     kind.change(change.request.config, dice_);
     ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", change)) << where();
-    // What was taken over maps, at least a small cloud.
+    // Applied settings must be able to map at least a small cloud.
     const ros::Time stamp = nextStamp();
     publishHonestTransforms(stamp);
     PointCloud2 cloud = honestCloud("honest_sensor", stamp, dice_);
@@ -639,10 +640,10 @@ class Attack {
     const ros::Time stamp = nextStamp();
     publish(honestCloud("honest_sensor", stamp, dice_));
     publishHonestTransforms(stamp);
-    expectAnswer({"mapped", "transform late"});  // late where the machine is slow
+    expectAnswer({"mapped", "transform late"});  // late on a slow machine
   }
   void timeBack() {
-    const auto drive = [this] {  // clouds that agree on the time
+    const auto drive = [this] {  // several clouds that agree on the time
       for (int n = 0; n < 3; ++n) {
         publish(changedCloud(cloudKinds().front()));
         answer();
@@ -680,7 +681,7 @@ class Attack {
     load();
   }
 
-  /// One call for each kind of everything, in a random order.
+  /// One call for each kind of message, in random order.
   std::vector<std::function<void()>> shuffledKinds() {
     std::vector<std::function<void()>> all;
     const auto append = [&](const auto& kinds) {
@@ -697,16 +698,16 @@ class Attack {
 
   // --- what must hold afterwards ---
 
-  /// What the status says the log says, too, once for many alike.
+  /// Checks that the log reports what the status reports, similar messages only once.
   void checkSentences() {
     const std::size_t least = mapper_.reasons() > 0 ? 1 : 0;
-    const auto end = Clock::now() + std::chrono::seconds(10);  // the log has a thread of its own
+    const auto end = Clock::now() + std::chrono::seconds(10);  // the log is written by another thread
     while (log_.refusals() - refusals_before_ < least && Clock::now() < end) ros::WallDuration(0.01).sleep();
     EXPECT_GE(log_.refusals() - refusals_before_, least) << where();
     EXPECT_LE(log_.longest().size(), kLongestText) << where() << ": " << log_.longest().substr(0, 300);
   }
 
-  /// A short drive. @return the map.
+  /// Maps a short drive. @return the map.
   std::string drive(bool big_endian) {
     callEmpty("reset");
     Dice dice(seed_);
@@ -745,7 +746,7 @@ class Attack {
     begin("drive");
     listeners_.leave();
     restoreSettings();
-    for (int n = 0; n < 3; ++n) {  // time may have to be found again
+    for (int n = 0; n < 3; ++n) {  // the mapper may first have to recognise a time jump
       turn_ = static_cast<std::size_t>(9000 + n);
       publish(changedCloud(cloudKinds().front()));
       answer();
@@ -762,7 +763,7 @@ class Attack {
   Mapper& mapper_;
   LogReader& log_;
   Watchdog& watchdog_;
-  Tally& tally_;
+  Results& results_;
   const Settings& settings_;
   const std::uint64_t seed_;
   Dice dice_;
@@ -776,12 +777,12 @@ class Attack {
   std::string kind_ = "load";
   Clock::time_point begun_ = Clock::now();
   std::size_t number_ = 0, turn_ = 0, refusals_before_ = 0;
-  std::uint64_t sent_ = 0;  ///< clouds since the mapper was loaded
+  std::uint64_t sent_ = 0;  ///< clouds sent since the mapper was loaded
   MappingStatus before_;
   dynamic_reconfigure::Config original_;
 };
 
-/// name, what is sent and answers of every kind, as rows of docs/robustness.md.
+/// name, message and answers of every kind, as rows of docs/robustness.md.
 std::vector<std::pair<std::string, std::string>> allRows() {
   std::vector<std::pair<std::string, std::string>> rows;
   const auto add = [&](const std::string& name, const std::string& sent, const std::string& answers) {
@@ -801,15 +802,15 @@ std::vector<std::pair<std::string, std::string>> allRows() {
   return rows;
 }
 
-void print(Tally& tally) {
-  for (const auto& [kind, tried] : tally.tried) {
+void print(Results& results) {
+  for (const auto& [kind, tried] : results.tried) {
     std::string answers;
-    const auto found = tally.answers.find(kind);
-    if (found != tally.answers.end()) {
+    const auto found = results.answers.find(kind);
+    if (found != results.answers.end()) {
       for (const auto& [answer, count] : found->second)
         answers += " " + std::to_string(count) + " " + answer + ";";
     }
-    const double each = 1e3 * tally.seconds[kind] / static_cast<double>(tried);
+    const double each = 1e3 * results.seconds[kind] / static_cast<double>(tried);
     std::printf("[hostile] %-26s %5zu, %5.0f ms each:%s\n", kind.c_str(), tried, each, answers.c_str());
   }
 }
@@ -831,7 +832,7 @@ TEST(Hostile, NothingCrashesHangsOrIsLost) {
       seconds > 0.0 ? 2 : (messages + chosen.size() * kinds - 1) / (chosen.size() * kinds);
 
   ros::NodeHandle node;
-  Tally tally;
+  Results results;
   Watchdog watchdog;
   LogReader log(node);
   Mapper mapper(node);
@@ -840,25 +841,25 @@ TEST(Hostile, NothingCrashesHangsOrIsLost) {
   for (std::uint64_t turn = 0; turn == 0 || elapsed() < seconds; ++turn) {
     for (const Settings& settings : chosen) {
       const double before = elapsed();
-      Attack(node, mapper, log, watchdog, tally, settings, seed + turn).run(rounds);
+      Attack(node, mapper, log, watchdog, results, settings, seed + turn).run(rounds);
       std::printf("[hostile] settings %s, seed %lu: %zu messages so far, %.1f s, %.0f MB\n",
-                  settings.name.c_str(), seed + turn, tally.messages, elapsed() - before, residentMemory());
+                  settings.name.c_str(), seed + turn, results.messages, elapsed() - before, residentMemory());
       std::fflush(stdout);
       if (HasFatalFailure() || (seconds > 0.0 && elapsed() > seconds)) break;
     }
     if (HasFailure()) break;
   }
-  print(tally);
+  print(results);
   std::printf(
       "[hostile] %zu kinds, %zu messages in %.0f s, %zu status messages, %zu kB of log, at most %.0f MB\n",
-      tally.tried.size(), tally.messages, elapsed(), mapper.statuses(), log.bytes() / 1000,
-      tally.most_memory);
+      results.tried.size(), results.messages, elapsed(), mapper.statuses(), log.bytes() / 1000,
+      results.most_memory);
   if (HasFailure()) return;
-  for (const auto& [kind, row] : allRows()) EXPECT_GT(tally.tried[kind], 0u) << kind << " was not tried";
+  for (const auto& [kind, row] : allRows()) EXPECT_GT(results.tried[kind], 0u) << kind << " was not tried";
   for (const CloudKind& kind : cloudKinds()) {
     std::size_t answered = 0;
-    for (const auto& [answer, count] : tally.answers[kind.name]) answered += count;
-    EXPECT_EQ(answered, tally.tried[kind.name]) << kind.name;
+    for (const auto& [answer, count] : results.answers[kind.name]) answered += count;
+    EXPECT_EQ(answered, results.tried[kind.name]) << kind.name;
   }
   EXPECT_EQ(mapper.faults(), 0u);
 }
@@ -866,12 +867,12 @@ TEST(Hostile, NothingCrashesHangsOrIsLost) {
 TEST(Hostile, NewFramesCostWhatTf2KeepsOfThem) {
   constexpr int kMessages = 200;
   ros::NodeHandle node;
-  Tally tally;
+  Results results;
   Watchdog watchdog;
   LogReader log(node);
   Mapper mapper(node);
-  Attack attack(node, mapper, log, watchdog, tally, allSettings().front(), 1);
-  const double before = attack.floodFrames(kMessages / 4);  // what is made once
+  Attack attack(node, mapper, log, watchdog, results, allSettings().front(), 1);
+  const double before = attack.floodFrames(kMessages / 4);  // allocations made only once
   const double after = attack.floodFrames(kMessages);
   mapper.unload();
   const double each = 1e6 * (after - before) / (200.0 * kMessages);
@@ -892,7 +893,7 @@ TEST(Hostile, KindsAreThoseOfTheDocumentation) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

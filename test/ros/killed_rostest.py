@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the next start finds after SIGKILL, and what a mapper says that may not write."""
+"""Files after SIGKILL and the next start, and the answer of a mapper without write permission."""
 import os
 import shutil
 import signal
@@ -19,11 +19,11 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import CAR, TIMEOUT, Listener, Robot, program  # noqa: E402
 
 POINTS = [(0.3 * i - 30.0, 8.0 + 0.01 * i, 0.1 * (i % 20) - 1.0) for i in range(2000)]
-BYTES_A_VERTEX = 3 * 4 + 3 + 2 + 1 + 4 * 4  # of .ply files
+BYTES_A_VERTEX = 3 * 4 + 3 + 2 + 1 + 4 * 4  # size of a vertex in .ply files
 
 
 def complete(path):
-    """Whether a .ply file holds as many vertices as it says."""
+    """Whether the number of vertices in a .ply file agrees with its header."""
     with open(path, 'rb') as file:
         content = file.read()
     header, _, vertices = content.partition(b'end_header\n')
@@ -32,7 +32,7 @@ def complete(path):
 
 
 class Mapper:
-    """A nodelet manager with the mapper in it, and a robot beside it."""
+    """A nodelet manager with the mapper, and a robot."""
 
     def __init__(self, test, name, command_before=()):
         self.name = name
@@ -114,7 +114,7 @@ class Killed(unittest.TestCase):
     def test_a_folder_that_may_not_be_written(self):
         os.chmod(self.folder, 0o555)
         self.addCleanup(os.chmod, self.folder, 0o755)
-        # Root may write everywhere, unless it gives that up.
+        # Root could write everywhere, so the program gives up that capability.
         limits = ['setpriv', '--bounding-set', '-dac_override,-dac_read_search'] if os.geteuid() == 0 else []
         mapper = Mapper(self, 'limited_mapping', limits)
         mapper.map()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""mapping.launch as users start it: with every preset, as node and nodelet, with simulated time that goes back."""
+"""mapping.launch as users start it: with every preset, as node and as nodelet, with simulated time that jumps back."""
 import glob
 import os
 import sys
@@ -43,7 +43,7 @@ class Launch(unittest.TestCase):
             wait_until(lambda: clock.get_num_connections() > 0, 'the mapper listening to /clock')
             for seconds in (101, 102):
                 clock.publish(Clock(rospy.Time(seconds)))
-                before = mapping.scan()  # on a busy machine a transform may come too late for its cloud
+                before = mapping.scan()  # on a busy machine a transform may arrive too late for its cloud
                 self.assertEqual(before.time_jumps, 0)
             mapping.robot.seconds = 50
             clock.publish(Clock(rospy.Time(51)))

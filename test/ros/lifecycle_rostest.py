@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Loading and unloading under traffic, and refusal of wrong parameters, in a manager that must stay alive."""
+"""Loading and unloading under traffic, and refusal of wrong parameters; the manager must survive both."""
 import os
 import signal
 import subprocess
@@ -20,7 +20,7 @@ from harness import Listener, Robot, program, wait_until  # noqa: E402
 
 
 def load(name, **parameters):
-    """Starts `nodelet load`, which unloads again when it is interrupted."""
+    """Starts `nodelet load`, which unloads the nodelet when it is interrupted."""
     for parameter, value in parameters.items():
         rospy.set_param(f'/{name}/{parameter}', value)
     return subprocess.Popen([program('nodelet', 'nodelet'), 'load', 'bki_mapping/MappingNodelet', 'manager',
@@ -64,7 +64,7 @@ class Lifecycle(unittest.TestCase):
         refused = load('misspelt', resolutoin=0.1, threads=-3)
         output = refused.communicate(timeout=30)[0]
         self.assertNotEqual(refused.returncode, 0, output)
-        status = Listener('/after/status', MappingStatus)  # the manager is alive and takes the next one
+        status = Listener('/after/status', MappingStatus)  # the manager is alive and loads the next nodelet
         good = load('after')
         status.wait_for(lambda m: True, 'a status after the refusal')
         stop(good)
@@ -87,8 +87,8 @@ class Lifecycle(unittest.TestCase):
             self.assertIn('/ended: Mapped 1 of 1 clouds; dropped none; used 1 of 1 points', output)
             status.close()
 
-    def test_a_manager_that_is_told_to_shut_down_lets_its_mapper_say_its_counts(self):
-        # SIGTERM itself ends the nodelet binary at once: it handles SIGINT alone.
+    def test_the_counts_are_logged_when_the_manager_shuts_down(self):
+        # SIGTERM would end the nodelet binary at once, because it handles only SIGINT.
         for number in (signal.SIGINT, None):
             manager = subprocess.Popen([program('nodelet', 'nodelet'), 'manager', '__name:=own_manager'],
                                        stdout=subprocess.PIPE, text=True)
@@ -100,7 +100,7 @@ class Lifecycle(unittest.TestCase):
                 if number:
                     manager.send_signal(number)
                 else:
-                    rosnode.kill_nodes(['/own_manager'])  # as the command does
+                    rosnode.kill_nodes(['/own_manager'])  # like the command rosnode kill
                 output = manager.communicate(timeout=30)[0]
             finally:
                 for process in (nodelet, manager):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The mapper on a robot where things go wrong: every cloud is accounted for."""
+"""The mapper on a robot with faults: every cloud is accounted for."""
 import os
 import sys
 
@@ -30,12 +30,12 @@ class Live(MapperTest):
             robot.connect()
 
     def stamp_for(self, other):
-        """The next stamp of the robot, for a cloud of another input at that time."""
+        """The next stamp of the robot, for a cloud of another input."""
         other.seconds = self.robot.seconds = self.robot.seconds + 1
         return rospy.Time(other.seconds)
 
     def fill_queue(self, clouds):
-        """Sends more clouds than the queue holds, without poses, then their poses; returns the stamps."""
+        """Publishes more clouds than the queue holds, and then their poses; returns the stamps."""
         before = self.deal_with(self.robot.scan([(2.0, 0.0, 0.0)], [CAR]))
         stamps = [self.robot.next_stamp() for _ in range(clouds)]
         for stamp in stamps:
@@ -44,7 +44,7 @@ class Live(MapperTest):
                                     'a full queue')
         self.assertEqual(full.waiting, QUEUE)
         self.assertTrue(adds_up(full), full)
-        for stamp in reversed(stamps):  # out of order, and late: what waits is found all the same
+        for stamp in reversed(stamps):  # out of order and late; every waiting cloud must still be found
             self.robot.publish_pose(stamp)
         status = self.status.wait_for(lambda m: m.waiting == 0 and m.received == before.received + clouds, 'the rest')
         self.assertEqual(status.integrated, before.integrated + QUEUE)
@@ -91,7 +91,7 @@ class Live(MapperTest):
         self.integrate([(2.0, 0.0, 0.0)], [CAR])
 
     def reports(self):
-        """Listens to /diagnostics; returns a function that waits for a report of a level with words, while scanning."""
+        """Listens to /diagnostics; returns a function that scans until a report has the given level and words."""
         reports = Listener('/diagnostics', DiagnosticArray)
         self.addCleanup(reports.close)
 
@@ -101,7 +101,7 @@ class Live(MapperTest):
             return wait_until(lambda: scan() or reports.find(fits), f'a report of level {level} with "{words}"')
         return report
 
-    def test_points_that_are_of_no_use_are_told(self):
+    def test_useless_points_are_reported(self):
         report = self.reports()
         nan = float('nan')
         for points, labels, level, words in (
@@ -116,7 +116,7 @@ class Live(MapperTest):
         self.reconfigure(sensor_model_min_range=5.0)
         report(DiagnosticStatus.ERROR, 'nearer than sensor_model/min_range 5 m',
                lambda: self.integrate([(2.0, 0.0, 0.0)], [CAR]) and None)
-        half = [(nan, nan, nan), (6.0, 0.0, 0.0)]  # nothing to be warned of
+        half = [(nan, nan, nan), (6.0, 0.0, 0.0)]  # no reason for a warning
         report(DiagnosticStatus.OK, 'mapping', lambda: self.integrate(half, [0, CAR]) and None)
 
     def test_diagnostics_tell_how_it_goes(self):
@@ -185,7 +185,7 @@ class Live(MapperTest):
         self.assertLessEqual(status.map_bytes, before.map_bytes, 'planes that nobody uses are given back')
 
     def test_inputs_have_settings_of_their_own(self):
-        # Merged clouds come in the map frame, with colours; beams start at the sensor.
+        # Merged clouds are in the map frame, with colours; beams start at the sensor.
         stamp = self.stamp_for(self.merged)
         self.robot.publish_pose(stamp, position=(5.0, 0.5, 0.5))
         self.merged.clouds.publish(make_cloud([(9.5, 0.5, 0.5)], [CAR_COLOR], stamp, frame='map', label_name='rgb',
@@ -218,14 +218,14 @@ class Live(MapperTest):
         self.assertEqual(sum('are in the map frame' in m.msg for m in self.log.messages), 1)
 
     def jump_back(self):
-        """Lets time jump back by 50 s while a cloud waits; returns the stamp of the last cloud."""
+        """Makes time jump back by 50 s while a cloud is waiting; returns the stamp of the last cloud."""
         self.integrate([(4.5, 0.5, 0.5)], [CAR])
         jumps = self.status.find(lambda m: True).time_jumps
         waiting = self.robot.next_stamp()
         self.robot.clouds.publish(make_cloud([(2.0, 0.0, 0.0)], [CAR], waiting))  # waits for its pose
-        self.robot.seconds -= 49.5  # to stamps that no other test has
+        self.robot.seconds -= 49.5  # to stamps that no other test uses
         self.addCleanup(setattr, self.robot, 'seconds', int(waiting.to_sec()) + 10)
-        first = self.robot.scan([(0.5, 3.5, 0.5)], [ROAD])  # one old cloud alone might be a stray
+        first = self.robot.scan([(0.5, 3.5, 0.5)], [ROAD])  # a single old cloud could be a stray
         self.assertEqual(self.status.find(lambda m: True).time_jumps, jumps)
         again = self.robot.scan([(0.5, 5.5, 0.5)], [ROAD])
         status = self.deal_with(again)

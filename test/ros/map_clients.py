@@ -1,4 +1,4 @@
-"""Clients that rebuild the map from topics alone, as users do."""
+"""Clients that rebuild the map only from topics, as users do."""
 import struct
 
 from bki_mapping.msg import OccupancyUpdate, VoxelCloudUpdate
@@ -7,7 +7,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 
 class MapClient:
-    """Rebuilds the map from occupancy_updates alone."""
+    """Rebuilds the map from occupancy_updates."""
 
     def __init__(self):
         self.blocks, self.sequence, self.gaps, self.wholes, self.stamp = None, None, 0, 0, None
@@ -22,7 +22,7 @@ class MapClient:
                 self.wholes += 1
                 self.blocks = {}
             elif self.blocks is None:
-                continue  # an update on its way before the whole map
+                continue  # an update that was sent before the whole map
             elif message.sequence != self.sequence + 1:
                 self.gaps += 1
             self.sequence, self.stamp = message.sequence, message.header.stamp
@@ -32,7 +32,7 @@ class MapClient:
 
 
 class CloudClient:
-    """The same from voxel_cloud_updates: points by block."""
+    """Rebuilds the map from voxel_cloud_updates: points by block."""
 
     def __init__(self):
         self.points, self.read, self.stamp = None, 0, None
@@ -59,7 +59,7 @@ class CloudClient:
 
 
 class MarkerClient:
-    """What rviz would show."""
+    """The markers that rviz would show."""
 
     def __init__(self):
         self.shown, self.read, self.kept = {}, 0, 0

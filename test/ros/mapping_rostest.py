@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The mapping server from outside: clouds and tf in; markers, clouds, grids, messages and files out. The same test
 runs against the node and the nodelet, with 1 m voxels, the counting kernel and uniform beam lines, so that expected
-values can be told by hand."""
+values can be computed by hand."""
 import os
 import struct
 import sys
@@ -54,7 +54,7 @@ class MappingTest(unittest.TestCase):
         return status
 
     def listen(self, topic, kind):
-        """A listener that ends with the test."""
+        """A listener that is closed at the end of the test."""
         listener = Listener(topic, kind)
         self.addCleanup(listener.close)
         return listener
@@ -63,7 +63,7 @@ class MappingTest(unittest.TestCase):
         return self.listen(topic, kind).wait_for(lambda m: m.header.stamp == stamp, f'a map on {topic}')
 
     def saved_vertices(self, include='occupied'):
-        """Voxels of a saved PLY: {(x, y, z): (label, state)}."""
+        """The voxels of a PLY file: {(x, y, z): (label, state)}."""
         path = os.path.join(self.folder.name, 'map.ply')
         answer = self.save_map(path, include)
         self.assertTrue(answer.success, answer.message)
@@ -107,7 +107,7 @@ class MappingTest(unittest.TestCase):
                     centre = (8 * block.x + v % 8 + 0.5, 8 * block.y + v // 8 % 8 + 0.5, 8 * block.z + v // 64 + 0.5)
                     seen[centre] = (labels[v], states[v])
         self.assertEqual(seen, vertices)
-        # Evidence 2 for the car; 1 for free, of the beam that has the voxel's centre before its end; prior 21 * 0.001.
+        # Evidence: 2 for the car, 1 for free of the beam that ends beyond the voxel's centre; prior 21 * 0.001.
         block = next(b for b in message.blocks if (b.x, b.y, b.z) == (0, 0, 0))
         self.assertAlmostEqual(block.probability[4], (2 + 0.001) / (3 + 21 * 0.001), places=5)
 
@@ -126,7 +126,7 @@ class MappingTest(unittest.TestCase):
         self.assertEqual(points, vertices)
 
     def test_projected_map_is_cut_at_its_heights(self):
-        # occupancy_min_z is -1: the hit at z = -1.5 is below, its cell is unknown.
+        # occupancy_min_z is -1: the hit at z = -1.5 is below it, so that its cell is unknown.
         stamp = self.integrate(HITS + [(0.5, -3.5, -1.5)], [CAR, CAR, CAR, ROAD]).header.stamp
         grid = self.latest('projected_map', OccupancyGrid, stamp)
         self.assertEqual((grid.header.frame_id, grid.info.resolution), ('map', 1.0))
@@ -195,7 +195,7 @@ class MappingTest(unittest.TestCase):
         stamp = self.robot.next_stamp()
         self.robot.clouds.publish(make_cloud(HITS, [CAR, CAR, ROAD], stamp))
         before = self.status.find(lambda m: True)
-        rospy.rostime.wallsleep(0.2)  # tf_timeout is 1 s: the transform comes late, but in time
+        rospy.rostime.wallsleep(0.2)  # tf_timeout is 1 s: the transform arrives late, but in time
         self.assertEqual(self.status.find(lambda m: True), before, 'nothing is decided yet')
         self.robot.publish_pose(stamp)
         self.assertTrue(self.deal_with(stamp).integrated_last)
@@ -217,7 +217,7 @@ class MappingTest(unittest.TestCase):
 
     def test_nothing_is_published_to_nobody_and_all_to_who_comes_late(self):
         self.integrate(HITS, [CAR, CAR, ROAD])
-        for _ in range(2):  # the second is as late as the first
+        for _ in range(2):  # the second cloud is as late as the first
             late = Listener('occupied_cells_vis_array', MarkerArray)
             late.wait_for(lambda m: cubes(m, 'car'), 'the map for a late listener')
             late.close()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Topics cost what changed: clients that listen to updates alone hold the same map as the mapper."""
+"""The cost of topics depends on the changes, and clients that follow updates have the same map as the mapper."""
 import os
 import sys
 import time
@@ -37,14 +37,14 @@ class Publishing(MapperTest):
         sent = early.listener.messages[-1]
         self.assertGreater(len(truth), 100)
         self.assertLess(len(sent.blocks), len(truth), 'an update has what changed, not all')
-        early.listener.close()  # listeners of one process share a connection: a late client must be alone
+        early.listener.close()  # listeners in one process share a connection, a late client must be the only one
         late = MapClient()
         self.addCleanup(late.listener.close)
         stamp = self.drive(range(4, 6))
         self.expect_same(late, stamp)
         self.assertEqual((late.wholes, late.gaps), (1, 0))
 
-        # A message is lost: the client sees a gap, asks for the whole map, and is right again.
+        # After a lost message the client detects the gap, requests the whole map, and is correct again.
         late.read += 1
         stamp = self.drive(range(6, 8))
         wait_until(lambda: late.update() or late.gaps > 0 or late.stamp == stamp, 'further updates')
@@ -69,9 +69,9 @@ class Publishing(MapperTest):
                           for (x, y, z), (states, labels, _) in truth.items() for v in range(512) if states[v] == 2)
         self.assertGreater(len(expected), 100)
         wait_until(lambda: markers.update() or markers.cubes() == expected, 'the markers showing the map')
-        chunks = {key[1] for key in markers.shown}
+        regions = {key[1] for key in markers.shown}
         last = markers.listener.messages[-1]
-        self.assertLess(len({m.id for m in last.markers}), len(chunks), 'only chunks that changed are sent')
+        self.assertLess(len({m.id for m in last.markers}), len(regions), 'only regions that changed are sent')
         self.call('reset')
         wait_until(lambda: markers.update() or not markers.shown, 'the markers being deleted')
 
@@ -84,7 +84,7 @@ class Publishing(MapperTest):
             self.addCleanup(listener.close)
         grid.wait_for(lambda m: m.data, 'a whole grid')
         elevation.wait_for(lambda m: m.whole, 'a whole elevation map')
-        # A second drive over the same place: the grid need not grow.
+        # A second drive at the same place: the grid does not grow.
         for seed in range(1, 3):
             stamp = self.integrate(*random_scan(seed))
         updates.wait_for(lambda m: m.header.stamp == stamp, 'the update of the last scan')
@@ -103,7 +103,7 @@ class Publishing(MapperTest):
                          (width, grid.messages[0].info.origin.position.x))
         self.assertEqual(list(whole.data), cells)
         self.assertEqual({-1, 0, 100}, set(cells))
-        # The road is ground: it does not block, and it has a height.
+        # The road is ground: it is no obstacle, and has a height.
         self.call('reset')
         stamp = self.integrate([(3.5, 0.5, -1.5), (3.5, 2.5, -1.5), (3.5, 2.5, 1.5)], [ROAD, ROAD, CAR])
         part = elevation.wait_for(lambda m: m.header.stamp == stamp, 'the elevation')
@@ -125,12 +125,12 @@ class Publishing(MapperTest):
         shows((3.5, 0.5, 0.5), (3.5, 0.5, 5.5))
         self.reconfigure(view_max_z=2.0)
         shows((3.5, 0.5, 0.5))
-        self.integrate([(3.5, 0.2, 0.2)], [CAR], position=(110.0, 0.5, 0.5))  # the view moves on, chunk by chunk
+        self.integrate([(3.5, 0.2, 0.2)], [CAR], position=(110.0, 0.5, 0.5))  # the view moves on
         shows((100.5, 0.5, 0.5), (113.5, 0.5, 0.5))
 
     def test_on_a_long_drive_topics_stay_within_the_window(self):
         self.reconfigure(window=40.0)
-        reach = 0.5 * (40.0 + 8.0)  # as far as centres of kept blocks and poses are from the sensor
+        reach = 0.5 * (40.0 + 8.0)  # maximum distance of the centres of kept blocks, and of poses, from the sensor
         markers, path, grid = MarkerClient(), Listener('trajectory', Path), Listener('projected_map', OccupancyGrid)
         for listener in (markers.listener, path, grid):
             self.addCleanup(listener.close)
@@ -144,7 +144,7 @@ class Publishing(MapperTest):
         self.assertGreater(len(expected), 20)
         wait_until(lambda: markers.update() or sorted(p for _, p in markers.cubes()) == expected, 'the same markers')
         numbers = {m.id for array in markers.listener.messages for m in array.markers}
-        self.assertLess(max(numbers), 32, 'numbers of chunks that are gone are used again')
+        self.assertLess(max(numbers), 32, 'numbers of regions that are gone are used again')
         last = path.wait_for(lambda m: m.header.stamp == stamp, 'the last trajectory')
         self.assertEqual([p.pose.position.x for p in last.poses], [position[0] - 20.0, position[0]])
         whole = grid.find(lambda m: True)
@@ -152,7 +152,7 @@ class Publishing(MapperTest):
 
     def test_a_window_below_a_block_keeps_the_block_of_the_sensor(self):
         self.reconfigure(window=0.1)
-        for x in (0.0, 3.9, 8.0, 1004.0):  # also at the face between two blocks
+        for x in (0.0, 3.9, 8.0, 1004.0):  # includes the face between two blocks
             stamp = self.integrate([(2.5, 0.5, 0.5), (20.5, 0.5, 0.5)], [CAR] * 2, position=(x, 0.5, 0.5))
             block = (int(x // 8), 0, 0)
             self.assertIn(block, self.map_of_server(stamp))
@@ -193,14 +193,14 @@ class Publishing(MapperTest):
         while time.monotonic() < end:
             stamp = self.drive(range(scans, scans + 1))
             scans += 1
-        self.expect_same(client, stamp)  # the last scan is shown, though it came between two times
+        self.expect_same(client, stamp)  # the last scan is shown although it arrived between two publications
         pauses = [after - before for before, after in zip(times, times[1:])]
         self.assertGreater(scans, 3 * len(times))
         self.assertGreaterEqual(len(times), 4)
         self.assertGreater(min(pauses), 0.4)
 
     def test_a_pose_that_is_far_off(self):
-        """The map spans more columns than there is memory: the maps from above pause, and nothing else does."""
+        """If the map spans more columns than fit into memory, the 2D maps pause, and only these."""
         grid, ground = Listener('projected_map', OccupancyGrid), Listener('elevation_map', ElevationMap)
         self.addCleanup(grid.close)
         self.addCleanup(ground.close)

@@ -21,7 +21,7 @@ class RealBag(unittest.TestCase):
         rospy.init_node('real_bag_rostest')
 
     def luminar(self, bag, *launch, transform=True):
-        """The status after a real bag without labels and tf has been played."""
+        """Plays a real bag without labels and tf; returns the last status."""
         status = Listener('/mapping/status', MappingStatus)
         if transform:
             pose = TransformStamped()

@@ -1,4 +1,4 @@
-// Every cloud is accounted for: the queue, the ledger, the judgement on them, and time jumps.
+// Every cloud is accounted for: queue, ledger, diagnostics and time jumps.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -6,16 +6,16 @@
 #include <stdexcept>
 
 #include "ros/load_advice.h"
-#include "ros/map_publishing.h"
 #include "ros/mapping_diagnostics.h"
 #include "ros/point_account.h"
 #include "ros/point_field.h"
+#include "ros/publisher_set.h"
 #include "ros/scan_ledger.h"
 #include "ros/scan_queue.h"
 #include "ros/sentence_throttle.h"
 #include "ros/time_watch.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using Clock = ScanLedger::Clock;
@@ -51,7 +51,7 @@ TEST(ScanQueue, GivesUpTheOldestOrTheNewest) {
   EXPECT_EQ(queue.push(numbered(3), 2, QueuePolicy::kDropNewest)->input, 3u);
   EXPECT_EQ(queue.size(), 2u);
   EXPECT_FALSE(queue.takeIf([](const WaitingCloud&) { return false; }));
-  // One that must wait does not hold up those behind it.
+  // A cloud that must wait does not block later ones.
   EXPECT_EQ(queue.takeIf([](const WaitingCloud& w) { return w.input == 2; })->input, 2u);
   EXPECT_EQ(queue.takeIf([](const WaitingCloud&) { return true; })->input, 1u);
   EXPECT_EQ(queue.size(), 0u);
@@ -101,7 +101,7 @@ TEST(ScanLedger, CountsEveryKindOfPoint) {
   counts.points = 3;
   std::size_t n = 3;
   for (const PointKind& kind : pointKinds()) counts.points += counts.*kind.in_scan = n++;
-  // All of them: a kind that the table lacks would be missing from the sum.
+  // Covers all reasons: one that is not in the table would be missing from the sum.
   EXPECT_EQ(counts.points, counts.used + counts.not_finite + counts.at_sensor + counts.too_near +
                                counts.beyond_max + counts.outside_map + counts.unknown_label +
                                counts.unlabelled + counts.no_returns);
@@ -150,19 +150,19 @@ TEST(SentenceThrottle, IsBounded) {
       }
     }
   }
-  EXPECT_LE(allowed, 100 / 5 * SentenceThrottle::kMost);
-  EXPECT_GE(allowed, 100 / 5 * SentenceThrottle::kMost / 2);
+  EXPECT_LE(allowed, 100 / 5 * SentenceThrottle::kMax);
+  EXPECT_GE(allowed, 100 / 5 * SentenceThrottle::kMax / 2);
 }
 
 TEST(Diagnostics, JudgeWhatHappened) {
   const MapperConfig config;
   MappingStatus before, now;
-  EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);  // no cloud yet
+  EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);  // no cloud received yet
   now.received = 10;
   now.integrated = 10;
   EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::OK);
   before = now;
-  EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);  // none comes any more
+  EXPECT_EQ(judge(before, now, config).level, DiagnosticStatus::WARN);  // no more clouds received
   now.received = 20;
   now.integrated = 15;
   now.dropped_queue_full = 5;
@@ -180,7 +180,7 @@ TEST(Diagnostics, JudgeWhatHappened) {
   EXPECT_NE(judge(before, now, config).message.find("~resume"), std::string::npos);
 }
 
-/// The verdict on 40 clouds of 1000 points with some of each kind; the others are used.
+/// The health for 40 clouds of 1000 points: the given numbers are left out by reason, the others are used.
 Health verdict(const std::vector<std::pair<std::size_t PointCounts::*, std::size_t>>& kinds,
                const std::map<std::uint32_t, std::size_t>& labels = {}, const InputConfig& input = {}) {
   PointCounts counts;
@@ -227,7 +227,7 @@ TEST(Points, ThatAreOfNoUseAreNamedWithTheRemedy) {
   expect(verdict({{&C::beyond_max, 1000}}), kWarn, {"are beyond", "in metres"});
   expect(verdict({{&C::outside_map, 1000}}), kError, {"too far from the map's origin"});
   expect(verdict({{&C::unlabelled, 1000}}), kWarn, {"unlabelled_points"});
-  // What is wrong is behind what is usual.
+  // A fault is reported even if a usual reason has more points.
   expect(verdict({{&C::not_finite, 600}, {&C::unknown_label, 400}}, {{7777, 400}}), kError,
          {"40 % have labels"});
 }
@@ -239,14 +239,14 @@ TEST(Points, OfHealthySensorsAreNotWarnedOf) {
     EXPECT_EQ(health.message, "");
   };
   expectHealthy(verdict({}));
-  expectHealthy(verdict({{&C::not_finite, 600}}));                       // an organised cloud out of doors
+  expectHealthy(verdict({{&C::not_finite, 600}}));                       // an organised cloud outdoors
   expectHealthy(verdict({{&C::not_finite, 990}}));                       // a drone that sees a mast
-  expectHealthy(verdict({{&C::no_returns, 1000}}));                      // nothing but sky, which is cleared
-  expectHealthy(verdict({{&C::no_returns, 997}, {&C::not_finite, 3}}));  // and columns without any return
+  expectHealthy(verdict({{&C::no_returns, 1000}}));                      // only sky, which is cleared
+  expectHealthy(verdict({{&C::no_returns, 997}, {&C::not_finite, 3}}));  // plus columns without any return
   expectHealthy(verdict({{&C::no_returns, 999}, {&C::unknown_label, 1}}));
   expectHealthy(verdict({{&C::at_sensor, 950}}));
-  expectHealthy(verdict({{&C::beyond_max, 990}}));  // a short max_range out of doors
-  expectHealthy(verdict({{&C::unlabelled, 950}}));  // who maps nothing but cars
+  expectHealthy(verdict({{&C::beyond_max, 990}}));  // a short max_range outdoors
+  expectHealthy(verdict({{&C::unlabelled, 950}}));  // a user who maps only cars
   expectHealthy(verdict({{&C::too_near, 500}, {&C::unknown_label, 300}}));
   expectHealthy(judgePoints({}, "/points", {}, {}, ""));
 }
@@ -273,7 +273,7 @@ TEST(Diagnostics, TellOfPointsBesideTheRest) {
   EXPECT_NE(judge(before, now, {}).message.find("the map is empty, though 13 points"), std::string::npos);
 }
 
-TEST(MapPublishing, ATopicTakesATenthOfTheTimeAtMost) {
+TEST(PublisherSet, ATopicTakesATenthOfTheTimeAtMost) {
   using Seconds = std::chrono::duration<double>;
   EXPECT_DOUBLE_EQ(publishPeriod(2.0, Seconds(0.01)).count(), 0.5);
   EXPECT_DOUBLE_EQ(publishPeriod(2.0, Seconds(0.05)).count(), 0.5);
@@ -304,7 +304,7 @@ std::string document(const std::string& name) {
   return text.str();
 }
 
-/// The cells of the table's row that begins with `first`, in the text behind `heading`.
+/// The cells of the table's row that begins with `first`, in the text after `heading`.
 std::vector<std::string> rowOf(const std::string& text, const std::string& heading,
                                const std::string& first) {
   const std::size_t row = text.find("\n| " + first + " |", text.find(heading));
@@ -319,7 +319,7 @@ std::vector<std::string> rowOf(const std::string& text, const std::string& headi
   return cells;
 }
 
-/// The median of a mode on SemanticKITTI 04 with two threads [ms].
+/// The median time of a mode on SemanticKITTI 04 with two threads [ms].
 double documentedMedian(const std::string& mode) {
   const auto cells = rowOf(document("performance.md"), "## SemanticKITTI 04", mode + " | 0.3 | 2");
   if (cells.size() < 4) throw std::runtime_error("docs/performance.md has no row of " + mode);
@@ -348,7 +348,7 @@ TEST(LoadAdvice, EstimatesWhatTheDocumentsSay) {
   struct Row {
     std::string name;
     FreeSpaceConfig free_space;
-    std::size_t column;  // in the table of docs/tuning.md
+    std::size_t column;  // index in the table of docs/tuning.md
   };
   for (const Row& row :
        std::vector<Row>{{"none", freeSpace("none"), 1},
@@ -363,17 +363,17 @@ TEST(LoadAdvice, EstimatesWhatTheDocumentsSay) {
     config.sensor_model.max_range = 60.0;
     const double median = documentedMedian(row.name), now = 100.0 * median;
     const std::string text = loadAdvice(config, now, 10.0);
-    // The time that the text gives behind some words [ms], or -1.
+    // The time that follows the given words in the text [ms], or -1.
     const auto estimate = [&](const std::string& words) {
       const std::size_t at = text.find(words);
       return at == std::string::npos ? -1.0 : std::stod(text.substr(at + words.size()));
     };
-    const auto expectAbout = [&](double share, const std::string& cell) {
+    const auto expectAbout = [&](double fraction, const std::string& cell) {
       const std::size_t to = cell.find(" to ");
       const double low = std::stod(cell),
                    high = to == std::string::npos ? low : std::stod(cell.substr(to + 4));
-      EXPECT_GE(share, low - 0.006) << row.name << ", " << cell;
-      EXPECT_LE(share, high + 0.006) << row.name << ", " << cell;
+      EXPECT_GE(fraction, low - 0.006) << row.name << ", " << cell;
+      EXPECT_LE(fraction, high + 0.006) << row.name << ", " << cell;
     };
     EXPECT_NEAR(estimate("one sample a beam about "), median > linear ? 100.0 * linear : -1.0, 1.0) << text;
     const bool observed = row.name.find("observed") != std::string::npos;
@@ -391,10 +391,10 @@ TEST(TimeWatch, NoticesTimeGoingBack) {
   EXPECT_FALSE(watch.clockWentBack(ros::Time(9.95)));
 
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(100.0)));
-  EXPECT_FALSE(watch.stampsWentBack(1, ros::Time(50.0)));  // another sensor's clock
+  EXPECT_FALSE(watch.stampsWentBack(1, ros::Time(50.0)));  // clock of another sensor
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(99.5)));  // out of order
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time()));
-  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(20.0)));  // a stray
+  EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(20.0)));  // a single outlier
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(100.1)));
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(98.0)));
   EXPECT_TRUE(watch.stampsWentBack(0, ros::Time(98.1)));
@@ -404,8 +404,8 @@ TEST(TimeWatch, NoticesTimeGoingBack) {
   EXPECT_FALSE(watch.stampsWentBack(0, ros::Time(1.0)));
 }
 
-/// The places in a row of stamps of one input [s] at which time is said to jump back; it then starts anew, as
-/// in the server.
+/// The indices, in a sequence of stamps of one input [s], at which a time jump is detected. The watch then
+/// restarts, as in the server.
 std::vector<std::size_t> jumpsIn(const std::vector<double>& stamps) {
   TimeWatch watch;
   std::vector<std::size_t> jumps;
@@ -418,22 +418,22 @@ std::vector<std::size_t> jumpsIn(const std::vector<double>& stamps) {
 }
 
 TEST(TimeWatch, AJumpTakesTwoCloudsThatAgree) {
-  using Places = std::vector<std::size_t>;
-  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 100.3, 100.4}), Places{}) << "one outlier far ahead";
-  EXPECT_EQ(jumpsIn({100, 100.1, 105, 100.2, 100.3, 100.4}), Places{}) << "one a little ahead";
-  EXPECT_EQ(jumpsIn({150, 100, 100.1, 100.2}), Places{}) << "the very first is one";
-  EXPECT_EQ(jumpsIn({100, 100.1, 150, 130, 100.2, 100.3}), Places{}) << "two ahead that do not agree";
-  EXPECT_EQ(jumpsIn({100, 100.1, 130, 150, 100.2, 100.3}), Places{}) << "the same, the nearer one first";
-  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 150.1, 100.3, 100.4}), Places{}) << "two ahead, one at a time";
-  EXPECT_EQ(jumpsIn({100, 100.1, 50, 100.2, 100.3}), Places{}) << "one outlier behind";
-  EXPECT_EQ(jumpsIn({100, 100.1, 50, 20, 100.2, 100.3}), Places{}) << "two behind that do not agree";
-  EXPECT_EQ(jumpsIn({100, 100.1, 99.5, 99.6, 100.2}), Places{}) << "out of order by less than a second";
-  EXPECT_EQ(jumpsIn({100, 100.1, 160, 160.1, 160.2}), Places{}) << "a pause";
-  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2}), Places{3}) << "a bag that starts again";
-  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2, 100, 100.1, 20, 20.1}), (Places{3, 8})) << "twice";
-  EXPECT_EQ(jumpsIn({100, 102, 104, 20, 22, 24}), Places{4}) << "the same with a slow sensor";
-  EXPECT_EQ(jumpsIn({100, 0, 100.1, 0, 20, 0, 20.1}), Places{6}) << "stamps of 0 in between say nothing";
-  EXPECT_EQ(jumpsIn({100, 100.1, 0, 150, 0, 100.2, 0, 100.3}), Places{}) << "nor do they confirm an outlier";
+  using Indices = std::vector<std::size_t>;
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 100.3, 100.4}), Indices{}) << "one outlier far ahead";
+  EXPECT_EQ(jumpsIn({100, 100.1, 105, 100.2, 100.3, 100.4}), Indices{}) << "one a little ahead";
+  EXPECT_EQ(jumpsIn({150, 100, 100.1, 100.2}), Indices{}) << "the very first is one";
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 130, 100.2, 100.3}), Indices{}) << "two ahead that do not agree";
+  EXPECT_EQ(jumpsIn({100, 100.1, 130, 150, 100.2, 100.3}), Indices{}) << "the same, the nearer one first";
+  EXPECT_EQ(jumpsIn({100, 100.1, 150, 100.2, 150.1, 100.3, 100.4}), Indices{}) << "two ahead, one at a time";
+  EXPECT_EQ(jumpsIn({100, 100.1, 50, 100.2, 100.3}), Indices{}) << "one outlier behind";
+  EXPECT_EQ(jumpsIn({100, 100.1, 50, 20, 100.2, 100.3}), Indices{}) << "two behind that do not agree";
+  EXPECT_EQ(jumpsIn({100, 100.1, 99.5, 99.6, 100.2}), Indices{}) << "out of order by less than a second";
+  EXPECT_EQ(jumpsIn({100, 100.1, 160, 160.1, 160.2}), Indices{}) << "a pause";
+  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2}), Indices{3}) << "a bag that starts again";
+  EXPECT_EQ(jumpsIn({100, 100.1, 20, 20.1, 20.2, 100, 100.1, 20, 20.1}), (Indices{3, 8})) << "twice";
+  EXPECT_EQ(jumpsIn({100, 102, 104, 20, 22, 24}), Indices{4}) << "the same with a slow sensor";
+  EXPECT_EQ(jumpsIn({100, 0, 100.1, 0, 20, 0, 20.1}), Indices{6}) << "stamps of 0 in between say nothing";
+  EXPECT_EQ(jumpsIn({100, 100.1, 0, 150, 0, 100.2, 0, 100.3}), Indices{}) << "nor do they confirm an outlier";
 }
 
 TEST(TimeWatch, EachInputHasItsOwnTime) {
@@ -450,4 +450,4 @@ TEST(TimeWatch, EachInputHasItsOwnTime) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-// Scans from clouds and tf: where beams start, when points were measured, labels in every encoding.
+// Scans from clouds and tf: origin of the beams, times of points, labels in every encoding.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 #include "ros/pose_conversion.h"
 #include "ros/scan_reader.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using sensor_msgs::PointField;
@@ -75,7 +75,7 @@ TEST_F(Reader, MissingPosesAreToldApart) {
   EXPECT_TRUE(std::holds_alternative<PlacedScan>(read(scan)));
   scan.header.stamp = ros::Time(80.0);
   EXPECT_EQ(reason(scan), DropReason::kTooOld);
-  scan.header.stamp = ros::Time(4294967295u, 0u);  // as far away as a stamp can be
+  scan.header.stamp = ros::Time(4294967295u, 0u);  // the latest possible stamp
   EXPECT_EQ(reason(scan), DropReason::kTransformLate);
   scan.header.frame_id = "";
   EXPECT_EQ(reason(scan), DropReason::kUnknownFrame);
@@ -98,7 +98,7 @@ TEST_F(Reader, TimesAtTheEndOfTimeDoNoHarm) {
   const sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
   pose("sensor", 100.0, {5, 0, 0});
   pose("sensor", 4294967295.0, {9, 0, 0});  // in 2106: tf2 cannot add 10 s to it
-  poses_.restart(ros::Time(4294967290.0));  // puts in again what it has kept
+  poses_.restart(ros::Time(4294967290.0));  // adds the kept transforms again
   pose("sensor", 100.0, {5, 0, 0});
   EXPECT_TRUE(ready(scan));
   EXPECT_EQ(placed(scan).scan.origin.x(), 5.0);
@@ -112,7 +112,7 @@ TEST_F(Reader, NobodyChoosesHowMuchIsSaidOfAName) {
     std::string why = std::get<MissingPose>(read(maker.message())).why;
     EXPECT_LT(why.size(), 1000u);
     EXPECT_EQ(std::count_if(why.begin(), why.end(), [](unsigned char c) { return c < 0x20; }), 0) << why;
-    pose(std::string(1000000, 'c'), 100.0, {0, 0, 0}, 0.0, frame);  // nothing connects it
+    pose(std::string(1000000, 'c'), 100.0, {0, 0, 0}, 0.0, frame);  // not connected to the map
     maker.frame = std::string(1000000, 'c');
     why = std::get<MissingPose>(read(maker.message())).why;
     EXPECT_LT(why.size(), 1000u);
@@ -150,7 +150,7 @@ TEST_F(Reader, ATransformThatIsNoPoseIsNamed) {
     expectNamed(words);
     expectNamed("the transform from 'map' to 'sensor' of time 100 is no pose");
   }
-  pose("sensor", 100.0, {1, 2, 3});  // a good one, at last
+  pose("sensor", 100.0, {1, 2, 3});  // finally a valid one
   EXPECT_TRUE(ready(scan));
 }
 
@@ -166,7 +166,7 @@ TEST_F(Reader, ARefusedTransformIsBlamedForWhatItCaused) {
   scan.header.stamp = ros::Time(100.5);
   poses_.add(transform("map", "base", 100.2, 100.2, 1.0));
   EXPECT_EQ(reason(scan), DropReason::kTransformLate) << "a good one came since";
-  // Nonsense of many frames is not kept for ever, but what is wrong now is known.
+  // Refused transforms of many frames are not kept for ever, but the latest ones are known.
   for (int i = 0; i < 100000; ++i) {
     poses_.add(transform("map", "frame_" + std::to_string(i), 100.0, 0.0, 2.0));
   }
@@ -195,7 +195,7 @@ TEST_F(Reader, BothPosesOfAStampOfZeroAreOfOneTime) {
 TEST_F(Reader, WhenTimeJumpsBackTransformsOfTheNewTimeAreKept) {
   for (const double t : {98.0, 99.0, 100.0}) pose("sensor", t, {t, 0, 0});
   for (const double t : {20.0, 20.5})
-    pose("sensor", t, {t, 0, 0});  // before the jump is known; tf2 refuses them
+    pose("sensor", t, {t, 0, 0});  // before the jump is detected; tf2 refuses them
   sensor_msgs::PointCloud2 scan = cloud({{1, 0, 0}}).message();
   scan.header.stamp = ros::Time(20.25);
   EXPECT_FALSE(ready(scan));
@@ -229,7 +229,7 @@ TEST_F(Reader, BeamsStartWhereTheSensorIs) {
 }
 
 TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
-  // 10 m/s ahead: a wall at x = 20 is seen 1 m nearer after 0.1 s.
+  // Moving forwards at 10 m/s: after 0.1 s, a wall at x = 20 is 1 m nearer.
   pose("sensor", 99.0, {-10, 0, 0});
   pose("sensor", 101.0, {10, 0, 0});
   const std::vector<Eigen::Vector3f> points = {{20, 0, 0}, {19.5f, 1, 0}, {19, 2, 0}};
@@ -247,7 +247,7 @@ TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
     EXPECT_TRUE(scan.origin.isZero(1e-9));
     for (const auto& point : scan.points) EXPECT_NEAR(point.x(), 20.0, 0.011);  // half a time slice
   }
-  // The end of the scan must be in tf, too.
+  // tf must have the end of the scan, too.
   CloudMaker maker = cloud(points);
   maker.add("t", PointField::FLOAT64, {0.0, 0.5, 1.5});
   EXPECT_EQ(reason(maker.message()), DropReason::kTransformLate);
@@ -274,7 +274,7 @@ TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {
   EXPECT_GT(stats.hits, 1000u);
 }
 
-/// Values that sensors and networks do not give, but broken ones do.
+/// Values that only faulty sensors and networks produce.
 std::vector<double> extremes() {
   using F = std::numeric_limits<float>;
   using D = std::numeric_limits<double>;
@@ -287,7 +287,7 @@ std::vector<double> extremes() {
   return values;
 }
 
-/// Every share is positive and finite, and those of a point add up to 1, or it has none.
+/// Every probability is positive and finite; those of a point add up to 1, unless it has none.
 void expectShares(const SoftLabels& soft) {
   for (std::size_t i = 0; i < soft.size(); ++i) {
     double sum = 0.0;
@@ -360,8 +360,8 @@ TEST_F(Reader, NoLabelOrScoreBringsNonsenseIntoTheMap) {
       flood(encoding, "a,b,a", "");
     }
     flood(LabelEncoding::kScores, "", "car=a,road=b");
-    flood(LabelEncoding::kTopK, "car,road", "a,b");  // scores at the edge
-    flood(LabelEncoding::kTopK, "a,b", "car,road");  // labels at the edge
+    flood(LabelEncoding::kTopK, "car,road", "a,b");  // extreme scores
+    flood(LabelEncoding::kTopK, "a,b", "car,road");  // extreme labels
     flood(LabelEncoding::kTopK, "car,car", "a,b");   // the same label twice
     if (HasFatalFailure()) return;
   }
@@ -428,4 +428,4 @@ TEST_F(Reader, SureLabelsGiveTheSameMapInEveryEncoding) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-// The server's parameters, and that the documents name every topic, service and field.
+// The parameters of the server; the documents name every topic, service and field.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 #include "ros/scan_ledger.h"
 #include "ros/server_config.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 namespace fs = std::filesystem;
@@ -169,7 +169,8 @@ TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
   EXPECT_EQ(server.view_range, 0.0);
 }
 
-/// Topics and services as the code names them: the first text in advertise, advertiseService and subscribe.
+/// The names of topics and services in the code: the first string in advertise, advertiseService and
+/// subscribe.
 std::set<std::string> namesInCode() {
   std::set<std::string> names;
   const std::regex call(
@@ -209,7 +210,7 @@ TEST(Documents, HaveARowForEachReasonOfTheStatus) {
     ++counts[(*i)[2]];
   }
   EXPECT_EQ(counts["dropped"], dropKinds().size());
-  EXPECT_EQ(counts["points"], pointKinds().size() + 3);  // and received, used, no_returns
+  EXPECT_EQ(counts["points"], pointKinds().size() + 3);  // plus received, used, no_returns
 }
 
 TEST(Documents, EveryMessageFieldIsExplained) {
@@ -229,4 +230,4 @@ TEST(Documents, EveryMessageFieldIsExplained) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

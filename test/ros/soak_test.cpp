@@ -23,7 +23,7 @@
 #include "ros/scan_ledger.h"
 #include "simulation/lidar.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -282,7 +282,7 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
 }
 
 }  // namespace
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Mappers with different settings, two of them in one nodelet manager, do not meet: mapping.launch with namespaces."""
+"""mapping.launch with namespaces: mappers with different settings, two in one manager, do not interfere."""
 import os
 import sys
 import unittest
@@ -26,7 +26,7 @@ class TwoMappers(unittest.TestCase):
         status = {name: Listener(f'{space}/mapping/status', MappingStatus) for name, space in spaces.items()}
         for listener in status.values():
             listener.wait_for(lambda m: True, 'a first status')
-        for topic in (robot.clouds, robot.poses):  # the nodelets' process, and the node
+        for topic in (robot.clouds, robot.poses):  # subscribers: the process of the nodelets, and the node
             wait_until(lambda: topic.get_num_connections() == 2, 'all mappers subscribing')
         stamp = robot.scan([(4.2, 0.1, 0.1), (4.1, 0.9, 0.1)], [10, 40])
         for name, listener in status.items():
@@ -46,7 +46,7 @@ class TwoMappers(unittest.TestCase):
         self.assertGreater(count(maps['fine'], OccupancyMap.FREE), 10)
         self.assertEqual((len(maps['coarse'].classes), len(maps['fine'].classes)), (20, 1))
 
-        # The coarse map shows the class's colour, the fine one its height: z = 0.125 m is 1/160 of 20 m, nearly blue.
+        # The coarse map is coloured by class, the fine one by height: z = 0.125 m is 1/160 of 20 m, almost blue.
         colors = {name: Listener(f'{spaces[name]}/occupied_cells_vis_array', MarkerArray).wait_for(
             lambda m: any(marker.colors for marker in m.markers), f'markers of {name}') for name in ('coarse', 'fine')}
         car = next(marker for marker in colors['coarse'].markers if marker.ns == 'car')

@@ -63,6 +63,10 @@ class SemanticMap {
   /// Erases all blocks, and gives back their memory and that of the index.
   void clear() noexcept;
 
+  /// A region is a cube of this many blocks a side.
+  static constexpr int kRegionEdge = 8;
+  static GridIndex regionOf(const BlockIndex& block);
+
   /// Calls visit(index) for every block whose box comes within `radius` of a point, and for some around
   /// those. Costs as much as there are blocks near the point, however large the map.
   /// @param point map frame [m]. @param radius [m].
@@ -97,10 +101,6 @@ class SemanticMap {
   std::size_t indexBytes() const;
 
  private:
-  /// Blocks are also listed by region, a cube of this many blocks a side.
-  static constexpr int kRegionEdge = 8;
-
-  static GridIndex regionOf(const BlockIndex& block);
   /// A cube of blocks.
   struct Region {
     GridIndex index;

@@ -9,7 +9,7 @@
 #include "map/voxel_color.h"
 #include "ros/map_publisher.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 std_msgs::ColorRGBA rgba(const Color& color, float alpha) {
@@ -21,7 +21,7 @@ std_msgs::ColorRGBA rgba(const Color& color, float alpha) {
   return c;
 }
 
-/// Blue over green to red for values from 0 to 1.
+/// A rainbow from blue through green to red for values from 0 to 1.
 Color rainbow(double value) {
   const double v = std::clamp(value, 0.0, 1.0);
   const auto channel = [&](double peak) {
@@ -30,8 +30,8 @@ Color rainbow(double value) {
   return {channel(3.0), channel(2.0), channel(1.0)};
 }
 
-/// Heights repeat their colours every 20 m.
-double heightShare(double z) {
+/// Position in the colour scale of heights, which repeats every 20 m.
+double heightFraction(double z) {
   return z / 20.0 - std::floor(z / 20.0);
 }
 
@@ -42,22 +42,16 @@ Color colorOf(const VoxelView& view, double z, ColorMode mode, const ClassTable&
     case ColorMode::kVariance:
       return rainbow(4.0 * view.variance);  // p (1 - p) is at most 1/4
     case ColorMode::kHeight:
-      return rainbow(heightShare(z));
+      return rainbow(heightFraction(z));
     default:
       return semanticColor(view, classes);
   }
 }
 
-/// A chunk is a cube of this many blocks a side.
-constexpr int kChunkEdge = 8;
+constexpr int kRegionEdge = SemanticMap::kRegionEdge;
 
-GridIndex chunkOf(const GridIndex& block) {
-  static_assert(kChunkEdge == kBlockEdge, "blocks lie in a chunk as voxels lie in a block");
-  return GridGeometry::blockOf({block});
-}
-
-/// Marker arrays in which each marker is the CUBE_LIST of one class in one chunk: namespace the class's name,
-/// id the chunk's number. Only chunks that changed are sent; a marker that became empty is deleted.
+/// Marker arrays with one CUBE_LIST per class and region of the map: its namespace is the class's name, its
+/// id that of the region. Only changed regions are sent; a marker that became empty is deleted.
 class CellMarkers : public MapPublisher {
  public:
   using MarkerArray = visualization_msgs::MarkerArray;
@@ -72,34 +66,34 @@ class CellMarkers : public MapPublisher {
 
   void rest() override {
     MapPublisher::rest();
-    chunks_.clear();
+    regions_.clear();
     free_ids_.clear();
   }
 
  private:
   using Markers = std::map<ClassId, Marker>;
 
-  /// A chunk of which the map holds a block.
-  struct Chunk {
+  /// A region in which the map holds at least one block.
+  struct Region {
     std::int32_t id;
     bool in_view = false;
-    std::set<ClassId> shown;  ///< the classes of which listeners hold a marker
+    std::set<ClassId> shown;  ///< classes whose markers the subscribers hold
   };
-  using Chunks = std::map<GridIndex, Chunk>;
+  using Regions = std::map<GridIndex, Region>;
 
   void publishNew(const MapSnapshot& snapshot) override {
     if (changed.all()) {
       publisher_.publish(whole(snapshot));
       return;
     }
-    IndexNumbering chunks;
-    for (const GridIndex& block : changed.blocks()) chunks.insert(chunkOf(block));
-    for (const auto& [index, chunk] : chunks_) {  // the sensor's view moves on
-      if (inView(index, snapshot) != chunk.in_view) chunks.insert(index);
+    IndexNumbering regions;
+    for (const GridIndex& block : changed.blocks()) regions.insert(SemanticMap::regionOf({block}));
+    for (const auto& [index, region] : regions_) {  // the view moves with the sensor
+      if (inView(index, snapshot) != region.in_view) regions.insert(index);
     }
     MarkerArray message;
-    for (const GridIndex& index : chunks.members()) appendChunk(chunkAt(index), snapshot, message);
-    forgetEmpty(chunks.members(), snapshot);
+    for (const GridIndex& index : regions.members()) appendRegion(regionAt(index), snapshot, message);
+    forgetEmpty(regions.members(), snapshot);
     if (!message.markers.empty()) publisher_.publish(message);
   }
 
@@ -109,88 +103,88 @@ class CellMarkers : public MapPublisher {
     message.markers.back().header = snapshot.header;
     message.markers.back().action = Marker::DELETEALL;
     message.markers.back().pose.orientation.w = 1.0;
-    for (const auto& entry : snapshot.mapper.map().entries()) chunkAt(chunkOf(entry.index));
+    for (const auto& entry : snapshot.mapper.map().entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
-    for (auto place = chunks_.begin(); place != chunks_.end(); ++place) {
-      place->second.shown.clear();
-      appendChunk(place, snapshot, message);
-      indices.push_back(place->first);
+    for (auto region = regions_.begin(); region != regions_.end(); ++region) {
+      region->second.shown.clear();
+      appendRegion(region, snapshot, message);
+      indices.push_back(region->first);
     }
     forgetEmpty(indices, snapshot);
     return message;
   }
 
-  /// Finds a chunk, or makes it with an id that no marker of listeners has.
-  Chunks::iterator chunkAt(const GridIndex& index) {
-    const auto place = chunks_.find(index);
-    if (place != chunks_.end()) return place;
-    auto id = static_cast<std::int32_t>(chunks_.size());  // as many are in use where none is free
+  /// Finds a region, or creates it with an id that none of the subscribers' markers has.
+  Regions::iterator regionAt(const GridIndex& index) {
+    const auto known = regions_.find(index);
+    if (known != regions_.end()) return known;
+    auto id = static_cast<std::int32_t>(regions_.size());  // without free ids, 0 to size - 1 are in use
     if (!free_ids_.empty()) {
       id = free_ids_.back();
       free_ids_.pop_back();
     }
-    return chunks_.emplace(index, Chunk{id, false, {}}).first;
+    return regions_.emplace(index, Region{id, false, {}}).first;
   }
 
-  /// Forgets chunks without a block. Called last, since their ids are free only for the next message: this
-  /// one deletes their markers.
+  /// Forgets regions without a block and frees their ids. To be called after the message is complete: it
+  /// still deletes the markers with these ids, so that only the next message may use them again.
   void forgetEmpty(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot) {
     for (const GridIndex& index : indices) {
       bool any = false;
-      for (int n = 0; n < kChunkEdge * kChunkEdge * kChunkEdge && !any; ++n) {
+      for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge && !any; ++n) {
         any = snapshot.mapper.map().find({GridGeometry::voxelOf({index}, n)});
       }
       if (any) continue;
-      free_ids_.push_back(chunks_.at(index).id);
-      chunks_.erase(index);
+      free_ids_.push_back(regions_.at(index).id);
+      regions_.erase(index);
     }
   }
 
-  bool inView(const GridIndex& chunk, const MapSnapshot& snapshot) const {
-    const double edge = kChunkEdge * snapshot.mapper.map().geometry().blockSize();
-    return snapshot.inView(Eigen::Vector3d(chunk.x + 0.5, chunk.y + 0.5, chunk.z + 0.5) * edge, edge);
+  bool inView(const GridIndex& region, const MapSnapshot& snapshot) const {
+    const double edge = kRegionEdge * snapshot.mapper.map().geometry().blockSize();
+    return snapshot.inView(Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edge, edge);
   }
 
-  void appendChunk(Chunks::iterator place, const MapSnapshot& snapshot, MarkerArray& message) {
-    Chunk& chunk = place->second;
+  void appendRegion(Regions::iterator entry, const MapSnapshot& snapshot, MarkerArray& message) {
+    Region& region = entry->second;
     Markers markers;
-    chunk.in_view = inView(place->first, snapshot);
-    if (chunk.in_view) fill(place->first, snapshot, markers);
-    const std::set<ClassId> before = std::move(chunk.shown);
-    chunk.shown.clear();
+    region.in_view = inView(entry->first, snapshot);
+    if (region.in_view) fill(entry->first, snapshot, markers);
+    const std::set<ClassId> before = std::move(region.shown);
+    region.shown.clear();
     for (const ClassId gone : before) {
       if (markers.count(gone) > 0) continue;
       message.markers.push_back(emptyMarker(snapshot, gone));
       message.markers.back().action = Marker::DELETE;
-      message.markers.back().id = chunk.id;
+      message.markers.back().id = region.id;
     }
     for (auto& [label, marker] : markers) {
-      marker.id = chunk.id;
-      chunk.shown.insert(label);
+      marker.id = region.id;
+      region.shown.insert(label);
       message.markers.push_back(std::move(marker));
     }
   }
 
-  void fill(const GridIndex& chunk, const MapSnapshot& snapshot, Markers& markers) const {
+  void fill(const GridIndex& region, const MapSnapshot& snapshot, Markers& markers) const {
     const SemanticMap& map = snapshot.mapper.map();
-    for (int n = 0; n < kChunkEdge * kChunkEdge * kChunkEdge; ++n) {
-      const BlockIndex index{GridGeometry::voxelOf({chunk}, n)};
+    for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
+      const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = map.find(index);
       for (int offset = 0; block && offset < kBlockVoxels; ++offset) {
         const VoxelView view = judgeVoxel(map, *block, offset);
         if (view.state != state_) continue;
         const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
         if (!snapshot.heightInView(centre.z())) continue;
-        auto place = markers.find(view.label);
-        if (place == markers.end()) {
-          place = markers.emplace(view.label, emptyMarker(snapshot, view.label)).first;
+        auto marker = markers.find(view.label);
+        if (marker == markers.end()) {
+          marker = markers.emplace(view.label, emptyMarker(snapshot, view.label)).first;
         }
         geometry_msgs::Point point;
         point.x = centre.x();
         point.y = centre.y();
         point.z = centre.z();
-        place->second.points.push_back(point);
-        place->second.colors.push_back(
+        marker->second.points.push_back(point);
+        marker->second.colors.push_back(
             rgba(colorOf(view, centre.z(), snapshot.config.color_mode, snapshot.mapper.classes()), alpha_));
       }
     }
@@ -212,8 +206,8 @@ class CellMarkers : public MapPublisher {
 
   VoxelState state_;
   float alpha_;
-  Chunks chunks_;                       ///< what listeners hold
-  std::vector<std::int32_t> free_ids_;  ///< below the greatest in use, and of no chunk
+  Regions regions_;                     ///< whose markers the subscribers hold
+  std::vector<std::int32_t> free_ids_;  ///< smaller than the largest id in use
 };
 
 }  // namespace
@@ -226,4 +220,4 @@ std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context) {
   return std::make_unique<CellMarkers>(context, "free_cells_vis_array", VoxelState::kFree, 0.1f);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -1,4 +1,4 @@
-/// @file What the publishers of maps seen from above have in common.
+/// @file Common parts of the publishers of 2D maps.
 #pragma once
 
 #include <ros/console.h>
@@ -11,9 +11,9 @@
 #include "ros/map_publisher.h"
 #include "ros/sentence_throttle.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
-/// A rectangle of cells: columns of voxels.
+/// A rectangle of cells; each cell is a column of voxels.
 struct CellRectangle {
   std::int32_t x = 0, y = 0;            ///< first column and row
   std::uint32_t width = 0, height = 0;  ///< [cells]
@@ -24,7 +24,7 @@ struct CellRectangle {
     return left >= 0 && below >= 0 && left < width && below < height;
   }
 
-  /// The smallest rectangle about columns of blocks. `begin` to `end` point to them.
+  /// The bounding rectangle of the columns of blocks placeOf(*i), for i from `begin` to `end`.
   template <typename Iterator, typename PlaceOf>
   static CellRectangle around(Iterator begin, Iterator end, PlaceOf&& placeOf) {
     if (begin == end) return {};
@@ -40,7 +40,7 @@ struct CellRectangle {
   }
 };
 
-/// Keeps up a ColumnMap while somebody listens.
+/// Maintains a ColumnMap while there are subscribers.
 class ColumnPublisher : public MapPublisher {
  public:
   void rest() override {
@@ -53,7 +53,8 @@ class ColumnPublisher : public MapPublisher {
     return {config.occupancy_min_z, config.occupancy_max_z, config.occupancy_height};
   }
 
-  /// Looks at what changed. @return the columns of blocks looked at; `all` is set if it was all of them.
+  /// Updates the columns. @return the updated columns of blocks. @param all set to whether these are all of
+  /// them.
   std::set<ColumnMap::Place> look(const MapSnapshot& snapshot, bool& all) {
     const SemanticMap& map = snapshot.mapper.map();
     all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
@@ -65,7 +66,7 @@ class ColumnPublisher : public MapPublisher {
     return columns_.update(map, snapshot.mapper.classes(), blocks);
   }
 
-  /// Calls write(place in the rectangle's arrays, view) for every known column in a rectangle of whole
+  /// Calls write(index in the rectangle's arrays, view) for every known column in a rectangle of whole
   /// blocks.
   template <typename Write>
   void forEachCell(const CellRectangle& r, Write&& write) const {
@@ -82,17 +83,17 @@ class ColumnPublisher : public MapPublisher {
     }
   }
 
-  /// Whether a message about the rectangle is of a size that can be made and sent. A pose that is far off by
-  /// mistake spans a rectangle of more cells than there is memory.
+  /// Whether a message for the rectangle is of reasonable size. A single wrong pose far away can span a
+  /// rectangle that exceeds the memory.
   static bool fits(const CellRectangle& r, std::size_t bytes_a_cell) {
-    constexpr std::size_t kMostBytes = std::size_t{1} << 28;
-    return std::size_t{r.width} * r.height <= kMostBytes / bytes_a_cell;
+    constexpr std::size_t kMaxBytes = std::size_t{1} << 28;
+    return std::size_t{r.width} * r.height <= kMaxBytes / bytes_a_cell;
   }
   void warnOfSize(const CellRectangle& r) {
     const std::string why =
         topic() + " is not published: the map spans " + std::to_string(r.width) + " x " +
         std::to_string(r.height) +
-        " columns of voxels, which no message holds; set window, call ~reset, or look for a "
+        " columns of voxels, too many for a message; set window, call ~reset, or look for a "
         "pose that is far off";
     if (throttle_.allow(why, SentenceThrottle::Clock::now())) ROS_WARN("%s", why.c_str());
   }
@@ -102,7 +103,7 @@ class ColumnPublisher : public MapPublisher {
                                  [](const auto& entry) { return entry.first; });
   }
   static CellRectangle around(const std::set<ColumnMap::Place>& places) {
-    return CellRectangle::around(places.begin(), places.end(), [](const auto& place) { return place; });
+    return CellRectangle::around(places.begin(), places.end(), [](const auto& column) { return column; });
   }
 
  private:
@@ -111,4 +112,4 @@ class ColumnPublisher : public MapPublisher {
   SentenceThrottle throttle_;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -4,10 +4,10 @@
 
 #include "columns.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// The ground, and what is above it: first whole, then rectangles that changed.
+/// Publishes the ground and what is above it: the whole map first, then changed rectangles.
 class Elevation : public ColumnPublisher {
  public:
   explicit Elevation(const PublisherContext& context) {
@@ -27,7 +27,7 @@ class Elevation : public ColumnPublisher {
   void publishNew(const MapSnapshot& snapshot) override {
     bool all = false;
     const std::set<ColumnMap::Place> places = look(snapshot, all);
-    // What was forgotten here and what is new elsewhere may lie far apart.
+    // Columns that were erased and new ones elsewhere may span a rectangle that does not fit.
     all = all || missed_ || !fits(around(places), kBytesACell);
     const CellRectangle rectangle = all ? everything() : around(places);
     missed_ = !fits(rectangle, kBytesACell);
@@ -52,11 +52,11 @@ class Elevation : public ColumnPublisher {
     message.ground_class.assign(cells, unknown.ground_class);
     message.clearance.assign(cells, unknown.clearance);
     message.occluded_height.assign(cells, unknown.occluded);
-    forEachCell(rectangle, [&](std::size_t place, const ColumnView& view) {
-      message.ground_height[place] = view.ground;
-      message.ground_class[place] = view.ground_class;
-      message.clearance[place] = view.clearance;
-      message.occluded_height[place] = view.occluded;
+    forEachCell(rectangle, [&](std::size_t i, const ColumnView& view) {
+      message.ground_height[i] = view.ground;
+      message.ground_class[i] = view.ground_class;
+      message.clearance[i] = view.clearance;
+      message.occluded_height[i] = view.occluded;
     });
     return message;
   }
@@ -71,4 +71,4 @@ std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context) 
   return std::make_unique<Elevation>(context);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

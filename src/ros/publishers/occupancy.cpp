@@ -4,7 +4,7 @@
 #include "bki_mapping/map/map_query.h"
 #include "updates.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
 OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const Block& block) {
@@ -22,7 +22,7 @@ OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const 
   return message;
 }
 
-/// The parts of a whole map, be it an OccupancyMap or an OccupancyUpdate.
+/// Fills in a whole map: an OccupancyMap or an OccupancyUpdate.
 template <typename Message>
 void fillMap(const MapSnapshot& snapshot, Message& message) {
   const SemanticMap& map = snapshot.mapper.map();
@@ -75,7 +75,7 @@ class OccupancyUpdates : public UpdatePublisher<OccupancyUpdate> {
       if (const Block* block = map.find({index})) {
         message.blocks.push_back(toMessage(map, {index}, *block));
       } else {
-        message.removed.push_back(ros_shell::toMessage(index));
+        message.removed.push_back(ros_interface::toMessage(index));
       }
     }
   }
@@ -91,4 +91,4 @@ std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& conte
   return std::make_unique<OccupancyUpdates>(context);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -3,13 +3,13 @@
 
 #include "columns.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Cells around the known ones in the grid, so that it need not grow with every scan.
+/// Margin around the known cells, so that the grid does not grow with every scan [cells].
 constexpr int kMargin = 16 * kBlockEdge;
 
-/// The map seen from above as a costmap_2d sends it: the grid when it grows, and rectangles that changed.
+/// The 2D map, sent like costmap_2d does: the whole grid when it grows, otherwise the changed rectangle.
 class ProjectedMap : public ColumnPublisher {
  public:
   explicit ProjectedMap(const PublisherContext& context) {
@@ -43,7 +43,7 @@ class ProjectedMap : public ColumnPublisher {
     }
   }
 
-  /// Makes the grid large enough for all that is known.
+  /// Makes the grid large enough for all known cells.
   void layOut(const MapSnapshot& snapshot) {
     grid_ = everything();
     const bool grows = !snapshot.config.full_projected_map && grid_.width > 0;
@@ -57,8 +57,8 @@ class ProjectedMap : public ColumnPublisher {
   std::vector<std::int8_t> cells(const CellRectangle& rectangle) const {
     std::vector<std::int8_t> data(std::size_t{rectangle.width} * rectangle.height,
                                   static_cast<std::int8_t>(ColumnView::Occupancy::kUnknown));
-    forEachCell(rectangle, [&](std::size_t place, const ColumnView& view) {
-      data[place] = static_cast<std::int8_t>(view.occupancy);
+    forEachCell(rectangle, [&](std::size_t i, const ColumnView& view) {
+      data[i] = static_cast<std::int8_t>(view.occupancy);
     });
     return data;
   }
@@ -90,7 +90,7 @@ class ProjectedMap : public ColumnPublisher {
   }
 
   ros::Publisher updates_;
-  CellRectangle grid_;  ///< of the messages on projected_map
+  CellRectangle grid_;  ///< extent of the last message on projected_map
 };
 
 }  // namespace
@@ -99,4 +99,4 @@ std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context) 
   return std::make_unique<ProjectedMap>(context);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

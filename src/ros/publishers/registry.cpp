@@ -1,6 +1,6 @@
 #include "ros/map_publisher.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context) {
   std::vector<std::unique_ptr<MapPublisher>> publishers;
@@ -16,4 +16,4 @@ std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext
   return publishers;
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -2,10 +2,10 @@
 
 #include "ros/map_publisher.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// Where the sensor was at integrated scans.
+/// The poses of the sensor at integrated scans.
 class Trajectory : public MapPublisher {
  public:
   explicit Trajectory(const PublisherContext& context) {
@@ -27,4 +27,4 @@ std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context) {
   return std::make_unique<Trajectory>(context);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

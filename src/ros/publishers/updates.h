@@ -1,4 +1,4 @@
-/// @file What topics with updates have in common.
+/// @file Common parts of the topics with updates.
 #pragma once
 
 #include <bki_mapping/BlockCoordinates.h>
@@ -8,7 +8,7 @@
 
 #include "ros/map_publisher.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 inline BlockCoordinates toMessage(const GridIndex& block) {
   BlockCoordinates message;
@@ -18,8 +18,8 @@ inline BlockCoordinates toMessage(const GridIndex& block) {
   return message;
 }
 
-/// Publishes the blocks that changed, and the whole map to each new subscriber and on request; with a
-/// sequence number, so that a client sees what it missed.
+/// Publishes changed blocks, and the whole map to each new subscriber and on request. A sequence number lets
+/// clients detect a missed update.
 /// @tparam Message has header, sequence, whole and resolution.
 template <typename Message>
 class UpdatePublisher : public MapPublisher {
@@ -33,7 +33,7 @@ class UpdatePublisher : public MapPublisher {
 
  private:
   virtual void fillWhole(const MapSnapshot& snapshot, Message& message) const = 0;
-  /// Fills in what happened to the blocks in `changed`.
+  /// Fills in the blocks in `changed`.
   virtual void fillChanges(const MapSnapshot& snapshot, Message& message) const = 0;
 
   void publishNew(const MapSnapshot& snapshot) override {
@@ -54,4 +54,4 @@ class UpdatePublisher : public MapPublisher {
   std::uint64_t sequence_ = 0;
 };
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

@@ -8,10 +8,10 @@
 #include "io/voxel_pcl.h"
 #include "updates.h"
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 namespace {
 
-/// The known voxels of blocks, as points with the fields of the PCD file.
+/// Collects the known voxels of blocks, as points with the fields of PCD files.
 class CloudBuilder {
  public:
   explicit CloudBuilder(const MapSnapshot& snapshot) : snapshot_(snapshot) {}
@@ -88,4 +88,4 @@ std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& cont
   return std::make_unique<VoxelCloudUpdates>(context);
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface

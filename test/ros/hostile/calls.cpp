@@ -93,7 +93,7 @@ void setAllowed(Config& config, Dice& dice) {
   if (sometimes()) set(config, "occupancy_max_z", dice.between(-5.0, 5.0));
 }
 
-/// Makes a node that is no file. Devices need rights that tests may not have; a pipe does not.
+/// Creates something other than a regular file: a pipe, because devices need rights that tests may lack.
 std::string nodeIn(const std::string& folder) {
   std::string path = folder + "/full.ply";
   constexpr mode_t kRights = 0600;

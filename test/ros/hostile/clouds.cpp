@@ -13,7 +13,7 @@ using sensor_msgs::PointField;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr std::uint32_t kMost = 0xffffffffu;
+constexpr std::uint32_t kMax = 0xffffffffu;
 
 std::size_t sizeOf(std::uint8_t datatype) {
   constexpr std::size_t kSizes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -52,8 +52,8 @@ void store(T value, std::uint8_t* bytes) {
   std::memcpy(bytes, &value, sizeof(T));
 }
 
-/// Writes a component of a point, in the byte order of this machine; nothing where the cloud has no such
-/// place. Numbers that an integer field cannot hold become its zero.
+/// Writes a component of a point in the byte order of this machine, unless it is outside of the data. Values
+/// that an integer field cannot represent become 0.
 void put(PointCloud2& cloud, const std::string& name, std::size_t point, std::uint32_t component,
          double value) {
   const PointField* field = find(cloud, name);
@@ -80,7 +80,7 @@ void put(PointCloud2& cloud, const std::string& name, std::size_t point, std::ui
   }
 }
 
-/// Sets all three coordinates of some of the points, or of all of them.
+/// Sets all three coordinates of some or all points.
 void scatter(PointCloud2& cloud, Dice& dice, const std::function<double()>& value) {
   const std::size_t one_in = 1 + dice.below(3);
   for (std::size_t p = 0; p < pointsOf(cloud); ++p) {
@@ -96,7 +96,7 @@ void setAll(PointCloud2& cloud, const std::string& name, std::uint32_t component
   }
 }
 
-/// Adds a field after the others of each point, and drops those of the same name.
+/// Adds a field at the end of each point, and removes other fields of the same name.
 void replaceField(PointCloud2& cloud, const std::string& name, std::uint8_t datatype,
                   const std::function<double()>& value) {
   const std::size_t points = pointsOf(cloud), before = cloud.point_step;
@@ -160,20 +160,16 @@ std::vector<CloudKind> sizeKinds() {
       {"size/width",
        "a width beyond the data",
        {"bad cloud"},
-       [](PointCloud2& c, Dice& dice) {
-         c.width += 1 + static_cast<std::uint32_t>(dice.below(kMost - 500));
-       }},
+       [](PointCloud2& c, Dice& dice) { c.width += 1 + static_cast<std::uint32_t>(dice.below(kMax - 500)); }},
       {"size/height",
        "a height beyond the data",
        {"bad cloud"},
-       [](PointCloud2& c, Dice& dice) {
-         c.height += 1 + static_cast<std::uint32_t>(dice.below(kMost - 50));
-       }},
+       [](PointCloud2& c, Dice& dice) { c.height += 1 + static_cast<std::uint32_t>(dice.below(kMax - 50)); }},
       {"size/overflow",
        "width, height and steps whose products overflow 32 and 64 bits",
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) {
-         const std::vector<std::uint32_t> large = {1u << 16, 1u << 31, (1u << 31) + 1, kMost, kMost - 1};
+         const std::vector<std::uint32_t> large = {1u << 16, 1u << 31, (1u << 31) + 1, kMax, kMax - 1};
          c.width = dice.oneOf(large);
          c.height = dice.oneOf(large);
          c.point_step = dice.oneOf(large);
@@ -184,7 +180,7 @@ std::vector<CloudKind> sizeKinds() {
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          c.point_step = c.row_step = 0;
-         if (dice.oneIn(2)) c.width = c.height = kMost;
+         if (dice.oneIn(2)) c.width = c.height = kMax;
        }},
       {"size/point_step_short",
        "a point_step shorter than the fields",
@@ -194,7 +190,7 @@ std::vector<CloudKind> sizeKinds() {
        "a point_step beyond the data",
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) {
-         c.point_step += 1 + static_cast<std::uint32_t>(dice.below(kMost - 500));
+         c.point_step += 1 + static_cast<std::uint32_t>(dice.below(kMax - 500));
        }},
       {"size/row_step",
        "a row_step of 0, or at random",
@@ -257,7 +253,7 @@ std::vector<CloudKind> fieldKinds() {
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          c.fields[dice.below(3)].offset =
-             dice.oneOf<std::uint32_t>({c.point_step - 3, c.point_step, kMost - 3, kMost, 1u << 31});
+             dice.oneOf<std::uint32_t>({c.point_step - 3, c.point_step, kMax - 3, kMax, 1u << 31});
        }},
       {"field/overlap",
        "all fields at one offset",
@@ -271,7 +267,7 @@ std::vector<CloudKind> fieldKinds() {
        {"mapped", "bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          for (PointField& field : c.fields)
-           field.count = dice.oneOf<std::uint32_t>({0, 1, 2, kMost, 1u << 31});
+           field.count = dice.oneOf<std::uint32_t>({0, 1, 2, kMax, 1u << 31});
        }},
       {"field/name_empty",
        "fields without names",
@@ -421,7 +417,7 @@ std::vector<CloudKind> labelKinds() {
        "a number of its own for each point",
        {"mapped"},
        [](PointCloud2& c, Dice& dice) {
-         replaceField(c, "label", PointField::UINT32, [&] { return static_cast<double>(dice.below(kMost)); });
+         replaceField(c, "label", PointField::UINT32, [&] { return static_cast<double>(dice.below(kMax)); });
        }},
       {"label/negative",
        "negative numbers",
@@ -451,7 +447,7 @@ std::vector<CloudKind> labelKinds() {
        "colours of no class",
        {"mapped"},
        [](PointCloud2& c, Dice& dice) {
-         replaceField(c, "rgb", PointField::UINT32, [&] { return static_cast<double>(dice.below(kMost)); });
+         replaceField(c, "rgb", PointField::UINT32, [&] { return static_cast<double>(dice.below(kMax)); });
        }},
       {"label/scores",
        "scores that are NaN, infinite, negative, 0 or 1e39",
@@ -536,7 +532,7 @@ std::vector<CloudKind> headerKinds() {
        {"transform late"},
        [](PointCloud2& c, Dice& dice) {
          c.header.stamp.sec = dice.oneOf<std::uint32_t>(
-             {c.header.stamp.sec + 1, c.header.stamp.sec + 50, kMost - 1, kMost, 1u << 31, (1u << 31) - 1});
+             {c.header.stamp.sec + 1, c.header.stamp.sec + 50, kMax - 1, kMax, 1u << 31, (1u << 31) - 1});
        }},
       {"header/stamp_past",
        "stamps of 20 s and more ago",
@@ -549,8 +545,8 @@ std::vector<CloudKind> headerKinds() {
        "more than 1e9 ns",
        {"mapped", "transform late", "too old", "no transform"},
        [](PointCloud2& c, Dice& dice) {
-         c.header.stamp.nsec = dice.oneOf<std::uint32_t>({1000000000, 2000000000, kMost, kMost - 1});
-         if (dice.oneIn(2)) c.header.stamp.sec = dice.oneOf<std::uint32_t>({0, kMost, kMost - 2});
+         c.header.stamp.nsec = dice.oneOf<std::uint32_t>({1000000000, 2000000000, kMax, kMax - 1});
+         if (dice.oneIn(2)) c.header.stamp.sec = dice.oneOf<std::uint32_t>({0, kMax, kMax - 2});
        }},
       {"header/frame_empty", "no frame", {"unknown frame"}, framed("")},
       {"header/frame_unknown", "a frame that tf has never heard of", {"unknown frame"}, framed("nowhere")},

@@ -1,4 +1,5 @@
-/// @file What the hostile publisher sends: a table of kinds, each with the answers that a mapper may give.
+/// @file The messages of the hostile publisher: a table of kinds, each with the permitted answers of the
+/// mapper.
 #pragma once
 
 #include <dynamic_reconfigure/Config.h>
@@ -13,7 +14,7 @@
 
 namespace bki_mapping::hostile {
 
-/// Random numbers that are the same on every machine.
+/// Random numbers that are equal on every machine.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : random_(seed) {}
@@ -33,69 +34,69 @@ class Dice {
   std::mt19937_64 random_;
 };
 
-/// What may become of a cloud: "mapped", or a reason's name in dropKinds().
+/// The permitted outcomes of a cloud: "mapped", or the name of a reason in dropKinds().
 using Answers = std::vector<std::string>;
 
-/// A cloud that is wrong, odd or merely unusual.
+/// A cloud that is faulty or unusual.
 struct CloudKind {
   std::string name;
-  std::string sent;  ///< in words
+  std::string sent;  ///< description
   Answers answers;
-  /// Makes it from an honest cloud.
+  /// Changes a valid cloud.
   std::function<void(sensor_msgs::PointCloud2&, Dice&)> change;
 };
 const std::vector<CloudKind>& cloudKinds();
 
-/// Transforms, of which some frame is to carry an honest cloud afterwards.
+/// Transforms, followed by a valid cloud in one of their frames.
 struct TransformKind {
   struct Message {
     bool is_static;
     std::vector<geometry_msgs::TransformStamped> transforms;
   };
   std::string name;
-  std::string sent;  ///< in words
-  Answers answers;   ///< to an honest cloud in `frame` at `stamp`
-  /// @param frame that nobody has heard of before. @param stamp of the cloud.
+  std::string sent;  ///< description
+  Answers answers;   ///< to a valid cloud in `frame` at `stamp`
+  /// @param frame a new frame, unknown to tf. @param stamp of the cloud.
   std::function<std::vector<Message>(const std::string& frame, const ros::Time& stamp, Dice&)> make;
 };
 const std::vector<TransformKind>& transformKinds();
 
-/// A path for ~save_map, odd or out of reach.
+/// A path for ~save_map, unusual or not writable.
 struct PathKind {
   std::string name;
-  std::string sent;  ///< in words
-  bool written;      ///< whether a map is written there
-  /// @param folder that may be written to.
+  std::string sent;  ///< description
+  bool written;      ///< whether the map can be written there
+  /// @param folder a writable folder.
   std::function<std::string(const std::string& folder)> make;
 };
 const std::vector<PathKind>& pathKinds();
 
-/// Changes to the settings of a mapper, some of them not allowed.
+/// Changes of settings, some of them not allowed.
 struct SettingsKind {
   std::string name;
-  std::string sent;  ///< in words
+  std::string sent;  ///< description
   std::function<void(dynamic_reconfigure::Config&, Dice&)> change;
 };
 const std::vector<SettingsKind>& settingsKinds();
 
-/// An honest cloud of class table `toy` with the fields that every set of settings reads: x, y, z, label,
-/// rgb, scores (one a class), labels and label_scores (the likeliest three), ns and seconds (times).
+/// A valid cloud of class table `toy` with the fields that every set of settings reads: x, y, z, label,
+/// rgb, scores (one per class), labels and label_scores (the most probable three), ns and seconds (times).
 sensor_msgs::PointCloud2 honestCloud(const std::string& frame, const ros::Time& stamp, Dice& dice);
 
 /// A transform from `frame` to `parent`.
 geometry_msgs::TransformStamped honestTransform(const std::string& parent, const std::string& frame,
                                                 const ros::Time& stamp, double x = 0.0);
 
-/// Turns the bytes of each number of the cloud around, and says so in is_bigendian.
+/// Swaps the byte order of all values of the cloud, and sets is_bigendian.
 void swapBytes(sensor_msgs::PointCloud2& cloud);
 
-/// Gives packed colours an alpha.
+/// Adds alpha to packed colours.
 void setAlpha(sensor_msgs::PointCloud2& cloud, Dice& dice);
 
-/// Everything else that is done to a mapper; hostile_test does it.
+/// Any other attack, implemented by hostile_test.
 struct DeedKind {
   std::string name;
-  std::string sent;  ///< in words
+  std::string sent;  ///< description
 };
 const std::vector<DeedKind>& deedKinds();
 

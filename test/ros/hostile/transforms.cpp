@@ -17,7 +17,7 @@ ros::Time shifted(const ros::Time& stamp, double seconds) {
   return stamp + ros::Duration(seconds);
 }
 
-/// Kinds with one transform from the frame to the map, changed.
+/// Kinds with a single changed transform between the frame and the map.
 TransformKind one(const std::string& name, const std::string& sent, const Answers& answers,
                   const std::function<void(TransformStamped&, Dice&)>& change) {
   return {name, sent, answers, [change](const std::string& frame, const ros::Time& stamp, Dice& dice) {

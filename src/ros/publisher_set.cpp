@@ -1,27 +1,27 @@
-#include "ros/map_publishing.h"
+#include "ros/publisher_set.h"
 
 #include <algorithm>
 
-namespace bki_mapping::ros_shell {
+namespace bki_mapping::ros_interface {
 
 std::chrono::duration<double> publishPeriod(double rate, std::chrono::duration<double> took) {
-  constexpr double kShare = 0.1;  // of the time, at most
-  return std::max(std::chrono::duration<double>(1.0 / rate), took / kShare);
+  constexpr double kMaxFraction = 0.1;  // of the time
+  return std::max(std::chrono::duration<double>(1.0 / rate), took / kMaxFraction);
 }
 
-void MapPublishing::changed(const std::vector<GridIndex>& blocks) {
+void PublisherSet::changed(const std::vector<GridIndex>& blocks) {
   for (const auto& publisher : publishers_) {
     if (publisher->wanted()) publisher->changed.add(blocks);
   }
 }
 
-void MapPublishing::startOver() {
+void PublisherSet::startOver() {
   for (const auto& publisher : publishers_) {
     if (publisher->wanted()) publisher->startOver();
   }
 }
 
-void MapPublishing::publishDue(const MapSnapshot& snapshot) {
+void PublisherSet::publishDue(const MapSnapshot& snapshot) {
   for (std::size_t p = 0; p < publishers_.size(); ++p) {
     MapPublisher& publisher = *publishers_[p];
     if (!publisher.wanted()) {
@@ -36,4 +36,4 @@ void MapPublishing::publishDue(const MapSnapshot& snapshot) {
   }
 }
 
-}  // namespace bki_mapping::ros_shell
+}  // namespace bki_mapping::ros_interface
