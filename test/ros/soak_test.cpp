@@ -1,7 +1,10 @@
-// A drive in real time with random faults, through the nodelet in this process: nothing crashes, every cloud
-// is accounted for, memory stays flat. BKI_MAPPING_SOAK_SECONDS sets how long (default 15),
-// BKI_MAPPING_SOAK_SEED the faults (default 1). Under a sanitizer it is the test of threads and of life
-// cycles.
+// Drives in real time with random faults, through the nodelet in this process: nothing crashes, and every
+// cloud is accounted for. BKI_MAPPING_SOAK_SECONDS sets the duration (default 15), BKI_MAPPING_SOAK_SEED the
+// faults (default 1). Under a sanitizer it tests threads and life cycles.
+//
+// Memory is tested twice. One mapper maps the same drive again and again without faults, which shows leaks of
+// a fraction of a scan per scan within seconds. The drive with faults, bursts and reloads needs 300 s to show
+// one.
 #include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/OccupancyUpdate.h>
 #include <gtest/gtest.h>
@@ -28,7 +31,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Sanitizers slow everything down some twenty times; the drive is shorter and thinner then.
+/// Sanitizers slow everything down about twentyfold, so that the drive is shorter and has fewer points.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kSanitized = true;
 #else
@@ -54,7 +57,7 @@ std::uint64_t droppedIn(const MappingStatus& status) {
   return sum;
 }
 
-/// Loads and unloads the mapper, and keeps the books on its status.
+/// Loads and unloads the mapper, and checks the sums of its status.
 class Mapper {
  public:
   explicit Mapper(ros::NodeHandle& node) : loader_(true) {
@@ -95,7 +98,7 @@ class Mapper {
   ros::Subscriber status_;
 };
 
-/// Somebody who listens, and goes away, at random.
+/// Subscribers that come and go at random.
 class Listeners {
  public:
   explicit Listeners(ros::NodeHandle& node) : node_(node) {}
@@ -126,7 +129,7 @@ class Listeners {
   std::atomic<std::size_t> received_{0};
 };
 
-/// The robot: clouds and poses, some of them wrong.
+/// Publishes clouds and poses, some of them with faults.
 class Robot {
  public:
   explicit Robot(ros::NodeHandle& node, std::uint64_t seed)
@@ -135,9 +138,9 @@ class Robot {
         poses_(node.advertise<tf2_msgs::TFMessage>("/tf", 100)),
         drive_({kTurns, 8.0, seed, lidar()}) {}
 
-  /// One turn of the lidar. @return how many clouds were sent.
+  /// Publishes one revolution of the lidar. @return the number of clouds sent.
   std::size_t turn(std::size_t number) {
-    const SequenceFrame& frame = frameOf(number % kTurns);  // from the end back to the beginning
+    const SequenceFrame& frame = frameOf(number % kTurns);  // jumps from the end back to the start
     const ros::Time stamp = ros::Time::now();
     std::size_t sent = 0;
     for (std::size_t burst = chance(30) ? 15 : 1; burst > 0; --burst, ++sent) {
@@ -152,20 +155,21 @@ class Robot {
       if (chance(40)) cloud.header.stamp = ros::Time();
       clouds_.publish(cloud);
     }
-    if (!chance(8)) publishPose(stamp, frame.T_map_sensor);
+    if (!chance(8)) publishPose(stamp, frame.T_map_sensor, true);
     return sent;
   }
-  /// A cloud that a healthy mapper takes. @return its stamp.
-  ros::Time goodTurn() {
-    const SequenceFrame& frame = frameOf(0);
+  /// Publishes a cloud without faults. @return its stamp.
+  ros::Time goodTurn(std::size_t number = 0) {
+    const SequenceFrame& frame = frameOf(number % kTurns);
     sensor_msgs::PointCloud2 cloud =
         makeCloud(frame.points, std::vector<float>(frame.points.size(), 0.0f), frame.labels);
     cloud.header.frame_id = "soak_sensor";
     cloud.header.stamp = ros::Time::now();
-    publishPose(cloud.header.stamp, frame.T_map_sensor);
+    publishPose(cloud.header.stamp, frame.T_map_sensor, false);
     clouds_.publish(cloud);
     return cloud.header.stamp;
   }
+  std::size_t bytesOfScan() { return frameOf(0).points.size() * 20; }  ///< of a cloud message
   bool chance(unsigned one_in) { return random_() % one_in == 0; }
   std::mt19937& random() { return random_; }
   bool connected() const { return clouds_.getNumSubscribers() > 0 && poses_.getNumSubscribers() > 0; }
@@ -186,14 +190,14 @@ class Robot {
     return known != frames_.end() ? known->second : frames_.emplace(i, drive_.frame(i)).first->second;
   }
 
-  void publishPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor) {
+  void publishPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor, bool faults) {
     geometry_msgs::TransformStamped t;
     t.header.frame_id = "map";
     t.header.stamp = stamp;
     t.child_frame_id = "soak_sensor";
     t.transform = toTransform(T_map_sensor);
-    if (chance(50)) t.transform.translation.x = std::nan("");
-    if (chance(50)) t.transform.rotation.w = 5.0;
+    if (faults && chance(50)) t.transform.translation.x = std::nan("");
+    if (faults && chance(50)) t.transform.rotation.w = 5.0;
     tf2_msgs::TFMessage message;
     message.transforms.push_back(t);
     poses_.publish(message);
@@ -214,13 +218,53 @@ bool waitFor(const std::function<bool()>& condition, double seconds) {
   return false;
 }
 
-TEST(Soak, FaultsAtRandomDoNoHarm) {
-  const double seconds = environment("BKI_MAPPING_SOAK_SECONDS", 15.0);
-  ros::NodeHandle node;
+void setParameters(ros::NodeHandle& node) {
   for (const auto& [name, value] : std::map<std::string, double>{
            {"window", 60.0}, {"tf_timeout", 0.3}, {"publish_rate", 5.0}, {"diagnostic_period", 0.5}}) {
     node.setParam("/soak_mapping/" + name, value);
   }
+}
+
+TEST(Soak, MemoryStaysFlatWithinOneLife) {
+  constexpr std::size_t kTurns = kSanitized ? 10 : 50, kWarmUp = 2, kRounds = kSanitized ? 3 : 6;
+  ros::NodeHandle node;
+  setParameters(node);
+  node.setParam("/soak_mapping/tf_timeout", 10.0);  // drops no cloud on a busy machine
+  Robot robot(node, 1);
+  std::atomic<std::size_t> updates{0};
+  const ros::Subscriber listener = node.subscribe<OccupancyUpdate>(
+      "occupancy_updates", 2, [&](const OccupancyUpdate::ConstPtr&) { ++updates; });
+  Mapper mapper(node);
+  mapper.load();
+  ASSERT_TRUE(waitFor([&] { return robot.connected(); }, 60.0));
+  std::vector<double> memory;  // after each round [MB]
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    for (std::size_t turn = 0; turn < kTurns; ++turn) {
+      const ros::Time stamp = robot.goodTurn(turn);
+      ASSERT_TRUE(waitFor(
+          [&] {
+            const MappingStatus last = mapper.last();
+            return last.integrated_last && last.header.stamp == stamp;
+          },
+          60.0));
+    }
+    memory.push_back(residentMemory());
+  }
+  mapper.unload();
+  std::printf("[soak] memory after each round of %zu scans [MB]:", kTurns);
+  for (const double value : memory) std::printf(" %.1f", value);
+  std::printf("\n");
+  EXPECT_GT(updates, 0u);
+  if (kSanitized) return;  // sanitizers keep freed memory
+  const double scan = 1e-6 * static_cast<double>(robot.bytesOfScan());
+  const double scans = static_cast<double>(kTurns * (kRounds - kWarmUp));
+  EXPECT_LT(memory.back() - memory[kWarmUp - 1], 0.1 * scans * scan) << "leaks a tenth of a scan per scan";
+}
+
+TEST(Soak, FaultsAtRandomDoNoHarm) {
+  const double seconds = environment("BKI_MAPPING_SOAK_SECONDS", 15.0);
+  ros::NodeHandle node;
+  setParameters(node);
   Robot robot(node, static_cast<std::uint64_t>(environment("BKI_MAPPING_SOAK_SEED", 1.0)));
   Listeners listeners(node);
   Mapper mapper(node);
@@ -231,7 +275,7 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   std::uint64_t integrated = 0, dropped = 0, received = 0;
   std::size_t loads = 1, sent = 0;
-  double middle = 0.0, late = 0.0;  // greatest memory in the middle and the last third
+  double middle = 0.0, late = 0.0;  // peak memory in the middle and the last third [MB]
   const auto closeBooks = [&] {
     const MappingStatus last = mapper.last();
     integrated += last.integrated;
@@ -253,7 +297,7 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
     }
     std::this_thread::sleep_until(start + std::chrono::milliseconds(100) * (turn + 1));
   }
-  // After all that it maps as ever.
+  // Afterwards it maps as before.
   ASSERT_TRUE(waitFor([&] { return robot.connected(); }, 60.0));
   ros::Time good;
   EXPECT_TRUE(waitFor(
@@ -276,7 +320,7 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
   EXPECT_GT(dropped, 5u);
   EXPECT_GT(mapper.messages(), integrated);
   EXPECT_GT(loads, 1u);
-  if (seconds >= 300.0) {
+  if (seconds >= 300.0) {  // before, this test's own frames and bursts of clouds hide a leak
     EXPECT_LT(late, 1.05 * middle + 5.0) << "memory grows";
   }
 }
