@@ -106,8 +106,8 @@ inline void writeLines(const LineBatch& batch, std::size_t first, std::size_t co
       {whole(batch.step_side), whole(batch.step_height), ints(batch.e_side), ints(batch.e_height)}, fours[0]);
   StoreInterleaved4(
       {ints(batch.g_height), ints(batch.rho_side), ints(batch.rho_height), ints(batch.rho_slice)}, fours[1]);
-  StoreInterleaved4({ints(batch.half_side), ints(batch.half_height), whole(batch.slicing), IntVec{}},
-                    fours[2]);
+  // Not IntVec{}: GCC 9 does not take that here.
+  StoreInterleaved4({ints(batch.half_side), ints(batch.half_height), whole(batch.slicing), Set(0)}, fours[2]);
   static_assert(offsetof(LineSetup, step_side) == 16 && offsetof(LineSetup, g_height) == 32 &&
                 offsetof(LineSetup, half_side) == 48 && offsetof(LineSetup, slicing) == 56);
   for (std::size_t n = 0; n < count; ++n) {
