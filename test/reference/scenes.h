@@ -38,7 +38,7 @@ Scene makeScene(const std::string& name, const Eigen::Vector3d& origin, int coun
   std::mt19937 random(seed);
   for (int i = 0; i < count; ++i) {
     scene.scan.points.push_back(draw(random).template cast<float>());
-    scene.scan.labels.push_back(10u * (random() % 4u));
+    scene.scan.labels.push_back(10u * static_cast<unsigned>(random() % 4u));
   }
   return scene;
 }
