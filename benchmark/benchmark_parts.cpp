@@ -21,8 +21,8 @@ using namespace bki_mapping;
 
 /// A scan of 64 beams, the same after preprocessing, and a map of it.
 struct Fixture {
-  Fixture() : pool(1), observer(config), mapper(config, classes) {
-    seen = observer.observe(scan, *classes, pool);
+  Fixture() : pool(1), preprocessor(config), mapper(config, classes) {
+    seen = preprocessor.process(scan, *classes, pool);
     mapper.integrate(scan);
   }
 
@@ -32,7 +32,7 @@ struct Fixture {
       std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
   Scan scan = simulation::Drive({5, 8.0, 1, {}}).frame(4).scan();
   ThreadPool pool;
-  ScanPreprocessor observer;
+  ScanPreprocessor preprocessor;
   PreprocessedScan seen;
   SemanticMapper mapper;
 };
@@ -44,21 +44,21 @@ Fixture& fixture() {
 
 void observing(benchmark::State& state) {
   Fixture& f = fixture();
-  for (auto _ : state) benchmark::DoNotOptimize(&f.observer.observe(f.scan, *f.classes, f.pool));
+  for (auto _ : state) benchmark::DoNotOptimize(&f.preprocessor.process(f.scan, *f.classes, f.pool));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.scan.points.size()));
 }
 
 void binning(benchmark::State& state) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel);
-  for (auto _ : state) evidence.setPoints(f.scan.origin, f.observer.hits(), f.pool);
+  for (auto _ : state) evidence.setPoints(f.scan.origin, f.preprocessor.hits(), f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
 }
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel, false, instruction_set);
-  evidence.setPoints(f.scan.origin, f.observer.hits(), f.pool);
+  evidence.setPoints(f.scan.origin, f.preprocessor.hits(), f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
   for (auto _ : state) updater.update(map, {&evidence}, f.pool);

@@ -1,4 +1,4 @@
-/// @file The sphere of directions about the sensor, cut into cells: rows of elevation, columns of azimuth.
+/// @file Direction bins: rows of elevation and columns of azimuth on the sphere of directions.
 #pragma once
 
 #include <cmath>
@@ -6,17 +6,17 @@
 
 namespace bki_mapping {
 
-/// Rows are of equal height in the sine of the elevation, from -1 to 1.
+/// Rows have equal height in the sine of the elevation, from -1 to 1.
 constexpr int kBeamRows = 128;
-/// Columns are of about equal width in azimuth, from -pi to pi: equal in its pseudo-angle, from 0 to 4.
+/// Columns have equal width in the pseudo-angle, from 0 to 4, and so about equal width in azimuth, -pi to pi.
 constexpr int kBeamColumns = 1024;
 
-/// Grows with the azimuth atan2(y, x), from 0 at -pi to 4 at pi, by 1 a quadrant: the azimuth without its arc
-/// tangent. (0, 0) gets 2.
+/// A cheap substitute for the azimuth atan2(y, x): grows with it from 0 at -pi to 4 at pi, by 1 for each
+/// quadrant. 2 for (0, 0).
 [[gnu::always_inline]] inline float pseudoAngle(float x, float y) {
   const float sum = std::abs(x) + std::abs(y);
-  const float share = y / (sum > 0.0f ? sum : 1.0f);
-  return x >= 0.0f ? 2.0f + share : (y >= 0.0f ? 4.0f - share : -share);
+  const float fraction = y / (sum > 0.0f ? sum : 1.0f);
+  return x >= 0.0f ? 2.0f + fraction : (y >= 0.0f ? 4.0f - fraction : -fraction);
 }
 
 [[gnu::always_inline]] inline int beamColumn(float pseudo_angle) {
@@ -24,16 +24,16 @@ constexpr int kBeamColumns = 1024;
   return column < kBeamColumns ? column : kBeamColumns - 1;
 }
 
-/// @param sine of the elevation, -1 to 1; rounding may have gone beyond.
+/// @param sine of the elevation, -1 to 1; may exceed that by rounding.
 [[gnu::always_inline]] inline int beamRow(float sine) {
   const float row = (sine * 0.5f + 0.5f) * kBeamRows;
   return row < 0.0f ? 0 : (row < kBeamRows - 1 ? static_cast<int>(row) : kBeamRows - 1);
 }
 
-/// Loops may read so many beams past the last.
+/// Loops over beams may read up to this many elements past the end.
 constexpr std::uint32_t kBeamPadding = 16;
 
-/// Beams first to before last.
+/// The beams `first` to `last` - 1.
 struct BeamRange {
   std::uint32_t first, last;
 };

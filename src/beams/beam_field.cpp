@@ -11,7 +11,7 @@ namespace bki_mapping {
 BeamField::BeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index)
     : geometry_(geometry), kernel_(kernel, geometry.resolution()), index_type_(index) {
   // A line that crosses a voxel passes its centre within half the voxel's diagonal.
-  reach_ = kernel_.type == KernelType::kCounting ? 0.8660255f : kernel_.reach;
+  reach_ = kernel_.type == KernelType::kCounting ? kVoxelHalfDiagonal : kernel_.reach;
 }
 
 void BeamField::setBeams(const Beams& beams, ThreadPool& pool) {
@@ -29,7 +29,7 @@ void BeamField::setBeams(const Beams& beams, ThreadPool& pool) {
   inverse_length_.resize(count);
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-      // Not read back from where it goes: that would wait for memory.
+      // A local copy: reading beams_.ends[b] back would wait for the store.
       const Eigen::Vector3f beam = beams.ends[order_[b]];
       inverse_length_[b] = static_cast<float>(1.0 / beam.cast<double>().norm());
       beams_.ends[b] = beam;
@@ -62,7 +62,7 @@ BeamBox BeamField::boxOf(const BlockGroup& group) const {
 }
 
 void BeamField::findRangesNear(const BlockGroup& group, NearBeams& near) const {
-  // A ball about the blocks that matter.
+  // A ball about the bounding box of the group's blocks.
   Eigen::Array3d low = Eigen::Array3d::Constant(kGroupEdge), high = Eigen::Array3d::Zero();
   for (std::uint64_t left = group.blocks; left != 0; left &= left - 1) {
     const int n = __builtin_ctzll(left);
@@ -118,7 +118,7 @@ LocalBeam BeamField::localBeam(std::size_t b, const BlockIndex& index) const {
 
 void BeamField::findBeamsNear(const BlockIndex& index, double follow, NearBeams& near) const {
   findRangesNear(index, near);
-  // A first look in single precision, with room for its rounding.
+  // A conservative test in single precision, with a margin for its rounding.
   const Eigen::Vector3f c = (geometry_.blockCentre(index) - beams_.origin).cast<float>();
   const auto radius = static_cast<float>((kLatticeRadius + reach_) * geometry_.resolution());
   const float distance2 = c.squaredNorm(), limit2 = radius * radius + 1e-5f * distance2;
@@ -135,7 +135,7 @@ void BeamField::findBeamsNear(const BlockIndex& index, double follow, NearBeams&
 }
 
 bool BeamField::crosses(const BlockIndex& index, int offset, const Eigen::Vector3f& end) const {
-  // Slab test of the half-line in double precision, relative to the sensor.
+  // Slab test of the half-line from the sensor, in double precision.
   const Eigen::Vector3d centre = geometry_.voxelCentre(GridGeometry::voxelOf(index, offset)) - beams_.origin;
   const double half = 0.5 * geometry_.resolution();
   double enter = 0.0, leave = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-/// @file The beams of a scan, indexed, and the voxels near them.
+/// @file The beams of a scan with their index, and the voxels near them.
 #pragma once
 
 #include <memory>
@@ -21,9 +21,9 @@ struct NearBeams {
   std::vector<std::uint32_t> beams;
 };
 
-/// What line evidence and occlusion share: the beams, their index, and how near a voxel must be. With the
-/// sparse kernel a beam reaches the voxels whose centre is within its length; with the counting kernel those
-/// that it crosses. Keeps its memory from scan to scan.
+/// The part that line evidence and occlusion have in common: the beams, their index, and which voxels they
+/// reach. With the sparse kernel a beam reaches the voxels whose centre is within the support radius; with
+/// the counting kernel it reaches those that it crosses. Keeps its memory from scan to scan.
 class BeamField {
  public:
   BeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index);
@@ -38,34 +38,34 @@ class BeamField {
   const Beams& beams() const { return beams_; }
   BeamBox boxOf(const BlockGroup& group) const;
 
-  /// Radius about a beam outside which no voxel centre is reached [m].
+  /// The greatest distance from a beam at which it reaches a voxel centre [m].
   double reachMetres() const { return reach_ * geometry_.resolution(); }
   double longest() const { return longest_; }  ///< length of the longest beam [m]
 
-  /// Takes the memory that finding beams can need.
+  /// Allocates the memory that the searches below can need.
   void reserve(NearBeams& near) const;
 
-  /// Sets near.ranges to ranges of beams, among them all whose half-lines reach the block: sorted, and no
-  /// beam twice.
+  /// Sets near.ranges to sorted, disjoint ranges that include all beams whose half-lines reach the block.
   void findRangesNear(const BlockIndex& index, NearBeams& near) const;
 
-  /// The same of a group.
+  /// The same for the blocks of a group.
   void findRangesNear(const BlockGroup& group, NearBeams& near) const;
 
-  /// Calls visit(offset, rho, length) for every voxel of the block that the line of a beam reaches, with rho
-  /// the projection of the voxel's centre on the beam / beam length [m]. Beams that end more than `follow`
-  /// before the block are left out. @param follow how far from the sensor beams matter, if that is farther
-  /// than their end [m].
+  /// Calls visit(offset, rho, length) for every beam and every voxel of the block that its line reaches,
+  /// where rho is the projection of the voxel's centre on the beam, and length the beam's length [m].
+  /// @param follow distance from the sensor up to which lines are followed past the ends of beams [m].
   template <typename Visit>
   void forEachVoxelNear(const BlockIndex& index, double follow, NearBeams& near, Visit&& visit) const;
 
  private:
-  /// @param centre of a ball, relative to the sensor [m]. @param radius [m].
+  /// Finds the beams whose half-lines may pass through a ball. @param centre relative to the sensor [m].
+  /// @param radius [m].
   void findRangesNear(const Eigen::Vector3d& centre, double radius, NearBeams& near) const;
-  /// Finds the beams that may reach the block: near.beams.
+  /// Sets near.beams to the beams that may reach the block.
   void findBeamsNear(const BlockIndex& index, double follow, NearBeams& near) const;
+  /// A beam in the coordinates of a block.
   LocalBeam localBeam(std::size_t beam, const BlockIndex& index) const;
-  /// Whether a beam's line crosses a voxel of a block (the counting kernel's reach).
+  /// Whether a beam's half-line crosses a voxel: the test of the counting kernel.
   bool crosses(const BlockIndex& index, int offset, const Eigen::Vector3f& end) const;
 
   GridGeometry geometry_;
@@ -80,13 +80,13 @@ class BeamField {
   std::vector<std::uint32_t> cells_, order_;
 };
 
-/// The beams of a scan, and their field once somebody asks for it.
+/// The beams of a scan; builds their field on first use.
 class LazyBeamField {
  public:
   LazyBeamField(const GridGeometry& geometry, const KernelConfig& kernel, BeamIndexType index)
       : field_(geometry, kernel, index) {}
 
-  /// Replaces the beams, which must stay where they are until the scan is done.
+  /// Replaces the beams, which must stay valid until the scan is done.
   void setBeams(const Beams& beams) {
     beams_ = &beams;
     ready_ = false;

@@ -1,4 +1,4 @@
-/// @file Which beams pass near a place: retrieval on the sphere of directions about the sensor.
+/// @file Indexes of beams by direction, which find the beams that pass near a point.
 #pragma once
 
 #include <memory>
@@ -11,38 +11,36 @@
 
 namespace bki_mapping {
 
-/// Finds beams by direction. Beams are half-lines from the sensor here; where they end is the caller's
-/// matter.
+/// Finds beams by direction. It treats beams as half-lines from the sensor; callers check their ends.
 class BeamIndex {
  public:
   virtual ~BeamIndex() = default;
 
-  /// Finds the half-lines that may pass through a ball about `centre`: all that do, and few others.
+  /// Finds all half-lines that pass through a ball about `centre`, and few others.
   /// @param centre relative to the sensor [m]. @param radius [m], > 0.
-  /// @param[out] ranges of their numbers, each number once, in no promised order.
+  /// @param[out] ranges of these beams, disjoint and in unspecified order.
   virtual void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const = 0;
 };
 
-/// Beams bucketed by elevation and azimuth; a query names a few contiguous slices. Keeps its memory from scan
-/// to scan.
+/// Beams sorted by direction bin; a query returns a few ranges. Keeps its memory from scan to scan.
 class BeamTable : public BeamIndex {
  public:
-  /// The cell of a direction. @param v of any length.
+  /// The direction bin of a vector. @param v of any length.
   static std::uint32_t cellOf(const Eigen::Vector3f& v) {
     const float length = v.norm(), sine = length > 0.0f ? v.z() / length : 0.0f;
     return static_cast<std::uint32_t>(beamRow(sine) * kBeamColumns + beamColumn(pseudoAngle(v.x(), v.y())));
   }
 
   /// Replaces the beams.
-  /// @param cells of all beams. @param[out] order their numbers, sorted by cell: what a query's numbers
-  /// count.
+  /// @param cells direction bin of each beam. @param[out] order the beams, as offsets in `cells`, sorted by
+  /// bin. Queries return ranges of `order`.
   void build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order);
 
   void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const override;
-  /// A query names at most this many ranges: two in each row, where it crosses the seam.
+  /// Most ranges of a query: two in each row if it crosses the seam.
   static constexpr std::size_t kMostRanges = 2 * kBeamRows;
 
-  /// Of each cell's beams in the order, row by row; one more than cells.
+  /// Offset in `order` of each bin's first beam, row by row; one element more than bins.
   const std::vector<std::uint32_t>& begin() const { return begin_; }
 
  private:
@@ -51,9 +49,8 @@ class BeamTable : public BeamIndex {
   std::vector<std::uint32_t> begin_;
 };
 
-/// The same from an R-tree (Boost.Geometry) over unit direction vectors, which has neither seam nor pole:
-/// what the table is tested against.
-/// @param directions unit vectors, one a beam.
+/// An R-tree (Boost.Geometry) of unit direction vectors, which have neither seam nor pole. It is the paper's
+/// index, and the table is tested against it. @param directions unit vectors, one for each beam.
 std::unique_ptr<BeamIndex> makeBeamRtree(const std::vector<Eigen::Vector3f>& directions);
 
 }  // namespace bki_mapping

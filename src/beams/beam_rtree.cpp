@@ -16,8 +16,7 @@ using Point = bg::model::point<float, 3, bg::cs::cartesian>;
 using Box = bg::model::box<Point>;
 using Value = std::pair<Point, std::uint32_t>;
 
-/// An R-tree of unit direction vectors, which have neither seam nor pole: the paper's retrieval, and the
-/// reference for BeamTable.
+/// See makeBeamRtree().
 class BeamRtree : public BeamIndex {
  public:
   explicit BeamRtree(const std::vector<Eigen::Vector3f>& directions) {
@@ -39,7 +38,7 @@ class BeamRtree : public BeamIndex {
         distance > radius ? Eigen::Vector3f(centre / distance) : Eigen::Vector3f::Zero();
     const Box box(Point(q.x() - half, q.y() - half, q.z() - half),
                   Point(q.x() + half, q.y() + half, q.z() + half));
-    // Not by query iterators: they take memory for themselves.
+    // An output iterator, since query iterators allocate memory.
     tree_.query(bg::index::intersects(box), boost::make_function_output_iterator([&](const Value& found) {
                   ranges.push_back({found.second, found.second + 1});
                 }));

@@ -27,14 +27,14 @@ void BeamTable::query(const Eigen::Vector3f& centre, float radius, std::vector<B
   ranges.clear();
   if (begin_.empty()) return;
   const Eigen::Vector3d c = centre.cast<double>();
-  const double l = radius * (1.0 + 1e-5) + 1e-5 * c.norm();  // room for rounding of directions
+  const double l = radius * (1.0 + 1e-5) + 1e-5 * c.norm();  // margin for the rounding of directions
   const double r = c.norm(), rho = c.head<2>().norm();
   if (r <= l) {
     if (begin_.back() > 0) ranges.push_back({0, begin_.back()});
     return;
   }
-  // A ball of radius l subtends delta = asin(l / r) in elevation, asin(l / rho) in azimuth: the whole circle
-  // where it covers a pole.
+  // Equations (8) and (9) of docs/method.md: the ball subtends asin(l / r) in elevation and asin(l / rho) in
+  // azimuth, or every azimuth where it covers a pole.
   const double cos_delta = std::sqrt(1.0 - l * l / (r * r));
   const double a = c.z() / r * cos_delta, b = rho / r * (l / r);
   const bool pole = rho <= l;
@@ -52,7 +52,7 @@ void BeamTable::query(const Eigen::Vector3f& centre, float radius, std::vector<B
   for (int row = first_row; row <= last_row; ++row) {
     if (first <= last) {
       appendCells(row, first, last, ranges);
-    } else {  // over the seam; less than half the circle
+    } else {  // across the seam
       appendCells(row, first, kBeamColumns - 1, ranges);
       appendCells(row, 0, last, ranges);
     }

@@ -8,7 +8,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Boxes of more blocks are not marked one by one.
+/// Larger boxes would take too much memory for marks [blocks].
 constexpr double kMostMarks = 1 << 27;
 
 /// A straight piece of a beam.
@@ -22,7 +22,7 @@ Segment segmentOf(const Beams& beams, std::size_t b, const BeamPiece& piece) {
   return {beams.origin + end, beams.origin + end * (piece.shadow_range / end.norm())};
 }
 
-/// Block coordinates with 32 binary places: sums and floors of these are cheap and exact.
+/// Block coordinates in fixed point with 32 fractional bits, whose sums and floors are cheap and exact.
 using Fixed = std::int64_t;
 
 Fixed toFixed(double blocks) {
@@ -32,7 +32,8 @@ int floorOf(Fixed blocks) {
   return static_cast<int>(blocks >> 32);
 }
 
-/// Where a segment is on one of its two lesser axes, from slab to slab of its main axis.
+/// The extent of a segment on one of its two side axes, from slab to slab of its main axis. A slab is one
+/// block thick.
 struct SideWalk {
   SideWalk(double at_first, double slope, double margin)
       : step(toFixed(slope)),
@@ -42,14 +43,14 @@ struct SideWalk {
     low += step;
     high += step;
   }
-  Fixed step, low, high;  ///< low to high: all of the segment in the slab, and the margin
+  Fixed step, low, high;  ///< low to high: the extent of the segment in the slab, with the margin
 };
 
-/// Calls visit(x, y, z) for every block with a voxel centre within `reach` of a segment, and for some around
-/// those.
+/// Calls visit(x, y, z) for every block that has a voxel centre within `reach` of a segment, and for some
+/// around those.
 template <typename Visit>
 void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, double reach, Visit&& visit) {
-  // In units of blocks. Voxel centres keep half a voxel from the block's faces.
+  // In units of blocks. Voxel centres are at least half a voxel from the block's faces.
   const double per_metre = 1.0 / geometry.blockSize();
   const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-6;
   const Eigen::Vector3d a = segment.from * per_metre, d = (segment.to - segment.from) * per_metre;
@@ -78,7 +79,7 @@ void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, dou
 void BlockWalk::clearMarks(std::size_t count) {
   if (capacity_ < count) {
     capacity_ = 0;
-    marks_ = nullptr;  // first, so that there are never two
+    marks_ = nullptr;  // frees the old marks before allocating the new ones
     marks_ = std::make_unique<std::atomic<std::uint8_t>[]>(count);
     capacity_ = count;
   }
@@ -86,11 +87,11 @@ void BlockWalk::clearMarks(std::size_t count) {
 }
 
 void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
-  std::size_t place = 0;
+  std::size_t offset = 0;
   for (int z = 0; z < box.size.z(); ++z) {
     for (int y = 0; y < box.size.y(); ++y) {
       for (int x = 0; x < box.size.x(); ++x) {
-        if (marks_[place++].load(std::memory_order_relaxed)) {
+        if (marks_[offset++].load(std::memory_order_relaxed)) {
           blocks.insert({box.low.x() + x, box.low.y() + y, box.low.z() + z});
         }
       }
@@ -110,17 +111,17 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
     low = low.min(-piece.shadow_range);
     high = high.max(piece.shadow_range);
   }
-  const double room = 3.0 * reach + 3.0 * geometry.blockSize();  // slabs are walked to their ends
-  const Eigen::Array3d first = ((low - room + beams.origin.array()) / geometry.blockSize()).floor();
+  const double margin = 3.0 * reach + 3.0 * geometry.blockSize();  // walks end at whole slabs
+  const Eigen::Array3d first = ((low - margin + beams.origin.array()) / geometry.blockSize()).floor();
   const Eigen::Array3d size =
-      ((high + room + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
+      ((high + margin + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
   if (size.prod() > kMostMarks) {
     const std::size_t before = blocks.size();
     for (std::size_t b = 0; b < beams.ends.size(); ++b) {
-      const double share = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
+      const double fraction = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
       forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
         blocks.insert({x, y, z});
-        limitBlocks(blocks.size() - before, most, share);
+        limitBlocks(blocks.size() - before, most, fraction);
       });
     }
     return;
@@ -131,8 +132,8 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
       forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
-        // Several threads may mark a block; reading first keeps its cache line shared.
-        std::atomic<std::uint8_t>& mark = marks_[box.place(x, y, z)];
+        // Several threads may mark a block; reading first avoids taking its cache line from the others.
+        std::atomic<std::uint8_t>& mark = marks_[box.offsetOf(x, y, z)];
         if (!mark.load(std::memory_order_relaxed)) mark.store(1, std::memory_order_relaxed);
       });
     }

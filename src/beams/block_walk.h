@@ -1,4 +1,4 @@
-/// @file Which blocks lie along beams, or around the sensor.
+/// @file Lists the blocks along beams, or around the sensor.
 #pragma once
 
 #include <atomic>
@@ -12,27 +12,28 @@
 
 namespace bki_mapping {
 
-/// The piece of each beam that is walked: from the sensor to its end or, for the shadow of its hit, from
-/// there to `shadow_range` [m from the sensor].
+/// The piece of each beam that is walked: from the sensor to the beam's end or, for the shadow of the hit,
+/// from the end to `shadow_range` [m from the sensor].
 struct BeamPiece {
   bool shadow = false;
   double shadow_range = 0.0;
 };
 
-/// Names the blocks along beams. Keeps its memory from scan to scan.
+/// Lists the blocks along beams. Keeps its memory from scan to scan.
 class BlockWalk {
  public:
-  /// Inserts every block with a voxel centre within `reach` [m] of a beam's piece, and some around those.
-  /// @param most of them, those not counted that are in `blocks` before. @throws TooMuchWork if there are
-  /// more.
+  /// Inserts every block that has a voxel centre within `reach` [m] of a beam's piece, and some around those.
+  /// @param most new blocks. @throws TooMuchWork if there are more.
   void insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
                          double reach, std::size_t most, ThreadPool& pool, IndexNumbering& blocks);
 
  private:
-  /// A box of blocks, each marked or not: a hash table would be slower for the many blocks that beams share.
+  /// A dense box of blocks to be marked. Beams cross the same blocks many times, so this is faster than a
+  /// hash table.
   struct Box {
     Eigen::Array3i low, size;
-    std::size_t place(int x, int y, int z) const {
+    /// Offset of a block's mark.
+    std::size_t offsetOf(int x, int y, int z) const {
       return static_cast<std::size_t>(x - low.x()) +
              static_cast<std::size_t>(size.x()) *
                  (static_cast<std::size_t>(y - low.y()) +
@@ -40,7 +41,9 @@ class BlockWalk {
     }
   };
 
+  /// Makes `count` cleared marks.
   void clearMarks(std::size_t count);
+  /// Inserts the marked blocks in the order of their offsets, whichever thread marked them.
   void insertMarked(const Box& box, IndexNumbering& blocks) const;
 
   std::unique_ptr<std::atomic<std::uint8_t>[]> marks_;

@@ -17,12 +17,12 @@ float weightAt(BeamWeight weight, float rho) {
   }
 }
 
-/// @return whether any sum is above 0. (Written so that compilers use vector instructions.)
+/// Scales sums. @return whether any sum is above 0. The loop has no branch, so that compilers vectorise it.
 bool scaleSums(float scale, float* sums) {
   unsigned some = 0;
   for (int v = 0; v < kBlockVoxels; ++v) {
     const float sum = sums[v] * scale;
-    sums[v] = sum > 0.0f ? sum : 0.0f;  // the kernel's tail may be a little below 0
+    sums[v] = sum > 0.0f ? sum : 0.0f;  // rounding can make the tail of the kernel slightly negative
     some |= sum > 0.0f ? 1u : 0u;
   }
   return some != 0;
@@ -57,7 +57,7 @@ void LineEvidence::reserve(std::size_t workers) {
 }
 
 double LineEvidence::cost(const BlockGroup& group) const {
-  // As many beams as the group is large, seen from the sensor.
+  // The number of beams, in proportion to the solid angle of the group as seen from the sensor.
   return 1.0 / std::max(field_->boxOf(group).centre().squaredNorm(), BeamBox::kHalf * BeamBox::kHalf);
 }
 

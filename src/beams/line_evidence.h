@@ -1,4 +1,4 @@
-/// @file Free space as whole beam lines.
+/// @file Evidence for `free` from whole beams.
 #pragma once
 
 #include <string>
@@ -11,15 +11,16 @@
 
 namespace bki_mapping {
 
-/// Adds sum over beams of w(rho) k(d) to `free`: d is the distance of the voxel's centre to the beam's line,
-/// rho its projection on the beam / beam length, w the weight along the beam, 0 unless 0 < rho < 1.
+/// Adds the sum over beams of w(rho) k(d) to `free`, Equations (6) and (7) of docs/method.md: d is the
+/// distance of the voxel's centre from the beam's line, rho its projection on the beam, and w the weight
+/// along the beam.
 class LineEvidence : public Evidence {
  public:
-  /// @param instruction_set one of instructionSets(); the best there is if empty.
+  /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
   LineEvidence(BeamWeight weight, FreeSpaceExtent extent, const std::string& instruction_set = "")
       : weight_(weight), extent_(extent), kernels_(lineKernelsFor(instruction_set)) {}
 
-  /// Replaces the beams. @param field must stay where it is until the scan is done.
+  /// Replaces the beams. @param field must stay valid until the scan is done.
   void setField(const BeamField& field, ThreadPool& pool);
 
   const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
@@ -27,7 +28,7 @@ class LineEvidence : public Evidence {
   void markClasses(std::size_t, ClassSet& classes) const override { classes.set(kFreeClass); }
   void reserve(std::size_t workers) override;
   double cost(const BlockGroup& group) const override;
-  /// Finds the beams near the group, adds them to its voxels, and hands over block by block.
+  /// Finds the beams near the group, sums them over its voxels, and hands over the sums block by block.
   void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
                   SumSink& sink) override;
 
@@ -37,7 +38,7 @@ class LineEvidence : public Evidence {
     NearBeams near;
     GroupSums group;
   };
-  /// The same for the counting kernel: a beam adds to the voxels that it crosses.
+  /// Sums for the counting kernel: the weights of the beams that cross each voxel. @param sums of a block.
   void countCrossings(const BlockIndex& index, NearBeams& near, float* sums) const;
 
   const BeamField* field_ = nullptr;

@@ -22,15 +22,15 @@ void Occlusion::reserve(std::size_t workers) {
 }
 
 void Occlusion::apply(const GroupBlock& block, std::size_t worker, Block& to) {
-  Block::Occlusion behind, crossed;
+  Block::Occlusion beyond, crossed;
   const auto range = static_cast<float>(range_);
   field_->forEachVoxelNear(block.index, range_, workspaces_[worker].near,
                            [&](int offset, float rho, float length) {
                              const auto voxel = static_cast<std::size_t>(offset);
-                             if (rho >= 1.0f && rho * length <= range) behind.set(voxel);
+                             if (rho >= 1.0f && rho * length <= range) beyond.set(voxel);
                              if (rho > 0.0f && rho < 1.0f) crossed.set(voxel);
                            });
-  to.setOcclusion((to.occlusion() | behind) & ~crossed);
+  to.setOcclusion((to.occlusion() | beyond) & ~crossed);
 }
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file Which voxels a scan saw only behind its hits.
+/// @file Marks the voxels that a scan saw only beyond the ends of its beams.
 #pragma once
 
 #include "beams/beam_field.h"
@@ -7,14 +7,14 @@
 
 namespace bki_mapping {
 
-/// Marks the voxels that lie behind the end of some beam (rho >= 1) and that no beam of this scan crosses
-/// (0 < rho < 1). Voxels that this scan does not reach keep the mark of an earlier one.
+/// Marks the voxels that lie beyond the end of some beam (rho >= 1) and that no beam of this scan crosses
+/// (0 < rho < 1). A crossed voxel loses its mark; a voxel that no beam reaches keeps it.
 class Occlusion : public BlockPass {
  public:
   explicit Occlusion(OcclusionExtent extent) : extent_(extent) {}
 
-  /// Replaces the beams. @param field must stay where it is until the scan is done. @param range how far from
-  /// the sensor shadows are followed [m].
+  /// Replaces the beams. @param field must stay valid until the scan is done. @param range distance from the
+  /// sensor up to which voxels are marked [m].
   void setField(const BeamField& field, double range) {
     field_ = &field;
     range_ = range;

@@ -1,4 +1,4 @@
-/// @file Beams in the coordinates of one block, and the rows of voxels near them.
+/// @file The rows of voxels of a block near a beam. A row is the 8 voxels along x.
 #pragma once
 
 #include <cmath>
@@ -7,31 +7,31 @@
 
 namespace bki_mapping {
 
-/// A beam's line in the coordinates of one block: [voxels], from the centre of the block's first voxel.
+/// A beam's line in the coordinates of one block [voxels], relative to the centre of the block's first voxel.
 struct LocalBeam {
   float ux, uy, uz;     ///< unit direction
-  float nx, ny, nz;     ///< the line's point nearest to the block's centre
+  float nx, ny, nz;     ///< the point n of the line that is nearest to the block's centre
   float g, inverse_g;   ///< uy^2 + uz^2 > 0, and its inverse
-  float rho_at_n;       ///< projection of n on the beam / beam length: 0 at the sensor, 1 at the end
+  float rho_at_n;       ///< projection of n on the beam: 0 at the sensor, 1 at the end
   float rho_per_voxel;  ///< change of rho along u
 };
 
-/// A row of eight voxels along x, and a beam near it. The squared distance of voxel i's centre to the line is
-/// distance2 + g (i - x)^2 [voxels^2]; its rho is rho + i * rho_step.
+/// A row of eight voxels along x, and a beam near it. The squared distance of voxel i's centre from the line
+/// is distance2 + g (i - x)^2 [voxels^2]; its rho is rho + i * rho_step.
 struct NearRow {
   int offset;  ///< of the row's first voxel in the block
   float distance2, x, rho, rho_step;
 };
 
-/// Half the diagonal of the lattice of a block's voxel centres [voxels].
+/// Half the diagonal of the cube that the voxel centres of a block span [voxels].
 constexpr double kLatticeRadius = 0.5 * (kBlockEdge - 1) * 1.7320508075688772;
 
-/// Whole numbers from first to last; none if last is below first.
+/// The rows `first` to `last`, inclusive; empty if last < first.
 struct RowSpan {
   int first, last;
 };
 
-/// The rows of a block, 0 to 7, between two bounds.
+/// The rows of a block, 0 to 7, with low <= row <= high.
 [[gnu::always_inline]] inline RowSpan rowsBetween(float low, float high) {
   const float end = kBlockEdge - 1;
   if (!(low <= end && high >= 0.0f)) return {0, -1};
@@ -39,8 +39,9 @@ struct RowSpan {
           high < end ? static_cast<int>(high) : kBlockEdge - 1};
 }
 
-/// The rows that a beam passes within reach anywhere in the block, on one of the axes y and z: the line's
-/// course over x = 0 to 7, and the tube's half width at fixed x.
+/// The rows, on one of the axes y and z, that a beam may reach anywhere in the block: the interval that the
+/// line covers over x = 0 to 7, widened by the half width of the tube of radius `reach` at fixed x.
+/// @param uw, nw components of u and n on that axis.
 [[gnu::always_inline]] inline RowSpan rowsNear(float ux, float uw, float nx, float nw, float reach) {
   if (std::abs(ux) < 0.25f) return {0, kBlockEdge - 1};
   const float slope = uw / ux;
@@ -51,7 +52,7 @@ struct RowSpan {
 }
 
 /// Calls visit(const NearRow&) for every row of the block with a voxel centre within `reach` [voxels] of the
-/// beam's line. Distances follow from the cross product of u with the offset from n.
+/// beam's line. Distances are those of the cross product of u and the offset from n.
 template <typename Visit>
 [[gnu::always_inline]] inline void forEachNearRow(const LocalBeam& beam, float reach, Visit&& visit) {
   const RowSpan ys = rowsNear(beam.ux, beam.uy, beam.nx, beam.ny, reach);

@@ -13,13 +13,13 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
   if (classes_.empty()) fault("it has no class");
   if (classes_.size() > kMaxClasses) fault("it has more than 254 classes");
 
-  place_of_id_.fill(-1);
+  index_of_id_.fill(-1);
   std::set<std::string> names;
-  for (std::size_t place = 0; place < classes_.size(); ++place) {
-    const SemanticClass& c = classes_[place];
+  for (std::size_t i = 0; i < classes_.size(); ++i) {
+    const SemanticClass& c = classes_[i];
     if (c.id >= kMaxClasses) fault("id " + std::to_string(c.id) + " is above 253");
-    if (place_of_id_[c.id] >= 0) fault("id " + std::to_string(c.id) + " is given twice");
-    place_of_id_[c.id] = static_cast<std::int16_t>(place);
+    if (index_of_id_[c.id] >= 0) fault("id " + std::to_string(c.id) + " is given twice");
+    index_of_id_[c.id] = static_cast<std::int16_t>(i);
     if (!names.insert(c.name).second) fault("name '" + c.name + "' is given twice");
     if (c.unlabelled && unlabelled_) fault("more than one class is flagged unlabelled");
     if (c.unlabelled) unlabelled_ = c.id;
@@ -37,11 +37,11 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
     if (class_of_small_raw_.size() <= raw) class_of_small_raw_.resize(raw + 1, -1);
     class_of_small_raw_[raw] = id;
   }
-  if (!faults.empty()) throw std::invalid_argument("class table '" + name_ + "' is wrong: " + faults);
+  if (!faults.empty()) throw std::invalid_argument("class table '" + name_ + "' is invalid: " + faults);
 }
 
 const SemanticClass* ClassTable::find(ClassId id) const {
-  return place_of_id_[id] < 0 ? nullptr : &classes_[static_cast<std::size_t>(place_of_id_[id])];
+  return index_of_id_[id] < 0 ? nullptr : &classes_[static_cast<std::size_t>(index_of_id_[id])];
 }
 
 std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {

@@ -24,7 +24,7 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-/// A limit as people write it: "1e9", not a one and nine zeros to count.
+/// A limit as people write it: "1e9" rather than "1000000000".
 std::string limitText(double limit) {
   const std::string digits = numberText(limit);
   const std::size_t last = digits.find_last_not_of('0');
@@ -116,8 +116,8 @@ std::string numberText(double value) {
 double parseNumber(const std::string& text) {
   char* end = nullptr;
   const double number = std::strtod(text.c_str(), &end);
-  const bool whole = !text.empty() && *end == '\0';
-  return whole ? number : std::numeric_limits<double>::quiet_NaN();
+  const bool is_number = !text.empty() && *end == '\0';
+  return is_number ? number : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string shortText(const std::string& text, std::size_t most) {

@@ -1,4 +1,4 @@
-/// @file The ranges of a sensor by name.
+/// @file The named parameters of SensorModelConfig.
 #pragma once
 
 #include <vector>

@@ -7,7 +7,7 @@ namespace bki_mapping {
 
 class Stopwatch {
  public:
-  /// Milliseconds since construction or the last call of lap().
+  /// Milliseconds since construction or the last lap().
   double lap() {
     const auto now = std::chrono::steady_clock::now();
     const std::chrono::duration<double, std::milli> elapsed = now - last_;

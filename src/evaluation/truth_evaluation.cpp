@@ -127,7 +127,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
     if (view.state == VoxelState::kFree) return add(&SpaceQuality::free_precision, bin, truth == kFreeClass);
     add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
     add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
-    if (index_of_.find(index) == GridTable::kNone) quality.voxels.add(truth, view.label);
+    if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, view.label);
     quality.movable += classes_.find(view.label)->dynamic;
   });
   quality.ghosts = ghosts(map, time).size();

@@ -4,7 +4,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Whole beams, retrieved on the sphere of directions.
+/// Mode `line`: whole beams, looked up by direction.
 class BeamLines : public FreeSpaceModel {
  public:
   explicit BeamLines(const FreeSpaceConfig& config) : evidence_(config.weight, config.extent) {}

@@ -1,4 +1,4 @@
-/// @file Free space as points sampled along beams.
+/// @file Evidence for `free` at points sampled along beams.
 #pragma once
 
 #include <cmath>
@@ -10,34 +10,35 @@
 
 namespace bki_mapping {
 
-/// Distance from the sensor of a random sample, for u uniform on [0, 1) and a beam of length L [m].
+/// Distance of a random sample from the sensor [m], uniform along the beam. @param u uniform on [0, 1).
 inline double uniformDistance(double u, double length) {
   return u * length;
 }
-/// The density of distances grows as r, so that a plane of beams is covered evenly (Theorem 1 of Zhong and
-/// Peng).
+/// The same with a density proportional to the distance, which covers a plane of beams evenly (Theorem 1 of
+/// Zhong and Peng).
 inline double linearDistance(double u, double length) {
   return std::sqrt(u) * length;
 }
 
-/// Evidence of points on each beam, down-sampled like hits.
+/// Turns samples on each beam into evidence; they are down-sampled like hits.
 class BeamSamples {
  public:
   explicit BeamSamples(const FreeSpaceSetup& setup)
       : downsampler_(setup.downsample_resolution, setup.geometry.blockSize()),
         evidence_(setup.geometry, setup.kernel) {}
 
-  /// A scan may take this many samples; each takes some 50 bytes of working memory.
+  /// Most samples of a scan; each takes about 50 bytes of working memory.
   static constexpr double kMost = 1 << 25;
-  /// So may a beam: a hundred times what a beam of 300 m takes at a gap of 0.1 m.
+  /// Most samples of a beam: about a hundred times those of a beam of 300 m at a gap of 0.1 m.
   static constexpr double kMostOfBeam = 1 << 18;
-  /// @param samples of a scan, and of its longest beam. @throws TooMuchWork if these are too many.
+  /// @throws TooMuchWork if there are too many samples. @param samples of the scan. @param of_longest samples
+  /// of its longest beam.
   static void limit(double samples, double of_longest) {
     if (samples > kMost || of_longest > kMostOfBeam) throw TooMuchWork(TooMuchWork::What::kSamples, samples);
   }
 
-  /// @param forEachDistance called as forEachDistance(beam number, length [m], add) shall call add(distance
-  /// [m]) for each sample, 0 <= distance < length; from several threads at once.
+  /// @param forEachDistance called as forEachDistance(beam, length [m], add) for each beam, from several
+  /// threads at once. It calls add(distance [m]) for each sample, with 0 <= distance < length.
   template <typename ForEachDistance>
   FreeSpaceEvidence sample(const Beams& beams, ThreadPool& pool, ForEachDistance&& forEachDistance) {
     const Chunks chunks(beams.ends.size());

@@ -6,7 +6,7 @@
 namespace bki_mapping {
 namespace {
 
-/// A sample at every multiple of the gap before the end of a beam.
+/// Mode `even`: a sample at every multiple of the gap, up to the end of the beam.
 class EvenSamples : public FreeSpaceModel {
  public:
   explicit EvenSamples(const FreeSpaceSetup& setup) : gap_(setup.config.gap), samples_(setup) {}

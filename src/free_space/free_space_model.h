@@ -1,4 +1,4 @@
-/// @file How a scan tells which space is free.
+/// @file The interface of a free-space mode: from beams to evidence for `free`.
 #pragma once
 
 #include "beams/beam_field.h"
@@ -7,7 +7,7 @@
 
 namespace bki_mapping {
 
-/// What a mode is made from.
+/// The settings from which a mode is constructed.
 struct FreeSpaceSetup {
   FreeSpaceConfig config;
   GridGeometry geometry;
@@ -16,17 +16,17 @@ struct FreeSpaceSetup {
 };
 
 struct FreeSpaceEvidence {
-  Evidence* evidence = nullptr;  ///< of the model, until its next scan; nullptr: none
-  std::size_t count = 0;         ///< samples (after down-sampling) or beams behind it
+  Evidence* evidence = nullptr;  ///< owned by the model and valid until its next scan; nullptr: none
+  std::size_t count = 0;         ///< samples after down-sampling, or beams
 };
 
-/// A free-space mode: a maker of evidence for `free`. Keeps its memory from scan to scan.
+/// A free-space mode: computes evidence for `free`. Keeps its memory from scan to scan.
 class FreeSpaceModel {
  public:
   virtual ~FreeSpaceModel() = default;
-  /// Whether observe() looks at beams.
+  /// Whether observe() uses the beams.
   virtual bool needsBeams() const { return true; }
-  /// @param beams of one scan. @param stamp of the scan [ns], a key of random samples.
+  /// @param beams of one scan. @param stamp of the scan [ns], a key of the random samples.
   virtual FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, ThreadPool& pool) = 0;
 };
 

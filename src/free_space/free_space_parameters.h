@@ -1,4 +1,4 @@
-/// @file The parameters of free space by name.
+/// @file The named parameters of FreeSpaceConfig.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-/// @file One maker a mode; registry.cpp gives them names.
+/// @file One factory function for each mode; registry.cpp gives the modes their names.
 #pragma once
 
 #include <memory>

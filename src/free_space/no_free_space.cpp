@@ -3,7 +3,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Maps hits alone: nothing is ever free.
+/// Mode `none`: only hits are mapped.
 class NoFreeSpace : public FreeSpaceModel {
   bool needsBeams() const override { return false; }
   FreeSpaceEvidence observe(LazyBeamField&, std::uint64_t, ThreadPool&) override { return {}; }

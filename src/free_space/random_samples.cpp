@@ -5,7 +5,8 @@
 namespace bki_mapping {
 namespace {
 
-/// A fixed number of random samples a beam; `Distance` maps (u, length) to the distance from the sensor.
+/// Modes `uniform` and `linear`: a fixed number of random samples for each beam. `Distance` maps (u, length)
+/// to the distance from the sensor.
 template <double (*Distance)(double, double)>
 class RandomSamples : public FreeSpaceModel {
  public:

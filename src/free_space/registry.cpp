@@ -13,10 +13,10 @@ using Maker = std::unique_ptr<FreeSpaceModel> (*)(const FreeSpaceSetup&);
 
 const std::map<std::string, Maker>& registry() {
   static const std::map<std::string, Maker> makers = {
-      {"none", makeNoFreeSpace},        // hits alone
+      {"none", makeNoFreeSpace},        // only hits
       {"even", makeEvenSamples},        // a sample every gap
-      {"uniform", makeUniformSamples},  // random samples, evenly along the beam
-      {"linear", makeLinearSamples},    // random samples, evenly over the plane
+      {"uniform", makeUniformSamples},  // random samples, uniform along the beam
+      {"linear", makeLinearSamples},    // random samples, uniform over the plane
       {"line", makeBeamLines},          // whole beams
   };
   return makers;

@@ -12,7 +12,7 @@ namespace bki_mapping {
 /// Names of all modes, sorted.
 std::vector<std::string> freeSpaceModes();
 
-/// @throws std::invalid_argument if setup.config.mode is no known mode; the text lists those.
+/// Constructs the mode setup.config.mode. @throws std::invalid_argument if it is unknown.
 std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const FreeSpaceSetup& setup);
 
 }  // namespace bki_mapping

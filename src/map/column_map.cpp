@@ -7,12 +7,12 @@ namespace {
 
 /// One voxel of a column.
 struct Cell {
-  std::int32_t z;  ///< index of the voxel
+  std::int32_t z;  ///< of the voxel's index
   VoxelState state;
   ClassId label;
 };
 
-/// The known voxels of one column, from below.
+/// The known voxels of one column, from bottom to top.
 using Cells = std::vector<Cell>;
 
 ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const ColumnRules& rules,
@@ -59,29 +59,29 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
 
 std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
                                              const std::vector<GridIndex>& changed) {
-  std::set<Place> places;
+  std::set<Place> stacks;
   for (const GridIndex& index : changed) {
-    const Place place(index.x, index.y);
-    places.insert(place);
+    const Place stack(index.x, index.y);
+    stacks.insert(stack);
     if (map.find({index})) {
-      blocks_[place].insert(index.z);
+      blocks_[stack].insert(index.z);
     } else {
-      blocks_[place].erase(index.z);
+      blocks_[stack].erase(index.z);
     }
   }
   Cells cells;
-  for (const Place& place : places) {
-    const auto blocks = blocks_.find(place);
+  for (const Place& stack : stacks) {
+    const auto blocks = blocks_.find(stack);
     if (blocks->second.empty()) {
       blocks_.erase(blocks);
-      columns_.erase(place);
+      columns_.erase(stack);
       continue;
     }
-    Columns& columns = columns_[place];
+    Columns& columns = columns_[stack];
     for (int c = 0; c < kBlockEdge * kBlockEdge; ++c) {
       cells.clear();
       for (const std::int32_t z : blocks->second) {
-        const Block& block = *map.find({{place.first, place.second, z}});
+        const Block& block = *map.find({{stack.first, stack.second, z}});
         for (int k = 0; k < kBlockEdge; ++k) {
           const VoxelView view = judgeVoxel(map, block, c + kBlockEdge * kBlockEdge * k);
           if (view.state != VoxelState::kUnknown) {
@@ -92,7 +92,7 @@ std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const Class
       columns[static_cast<std::size_t>(c)] = viewColumn(cells, classes, rules_, map.geometry().resolution());
     }
   }
-  return places;
+  return stacks;
 }
 
 }  // namespace bki_mapping

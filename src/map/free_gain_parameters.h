@@ -1,4 +1,4 @@
-/// @file The parameters of how the state of a voxel is decided, by name.
+/// @file The named parameters of FreeGainConfig.
 #pragma once
 
 #include <vector>

@@ -7,9 +7,10 @@
 namespace bki_mapping {
 namespace {
 
-/// Makes room for so many elements in all; at least doubles what there is, so that it is seldom called for.
+/// Reserves capacity for `size` elements. Capacity at least doubles, so that repeated calls take amortised
+/// constant time, which vector::reserve does not promise.
 template <typename T>
-void makeRoom(std::size_t size, std::vector<T>& elements) {
+void growCapacity(std::size_t size, std::vector<T>& elements) {
   if (elements.capacity() < size) elements.reserve(std::max(size, 2 * elements.capacity()));
 }
 
@@ -21,46 +22,46 @@ GridIndex SemanticMap::regionOf(const BlockIndex& block) {
 }
 
 std::vector<std::uint32_t>& SemanticMap::regionAt(const BlockIndex& block) {
-  const std::uint32_t known = region_number_.find(regionOf(block));
-  if (known != GridTable::kNone) return regions_[known].places;
-  // What takes memory comes first; then nothing can fail.
-  makeRoom(regions_.size() + 1, regions_);
-  makeRoom(regions_.size() + spare_places_.size() + 1, spare_places_);
-  region_number_.insert(regionOf(block), static_cast<std::uint32_t>(regions_.size()));
+  const std::uint32_t known = region_position_.find(regionOf(block));
+  if (known != kNoPosition) return regions_[known].entries;
+  // Allocate first, so that nothing after it can fail.
+  growCapacity(regions_.size() + 1, regions_);
+  growCapacity(regions_.size() + spare_lists_.size() + 1, spare_lists_);
+  region_position_.insert(regionOf(block), static_cast<std::uint32_t>(regions_.size()));
   regions_.push_back({regionOf(block), {}});
-  if (!spare_places_.empty()) {
-    regions_.back().places = std::move(spare_places_.back());
-    spare_places_.pop_back();
+  if (!spare_lists_.empty()) {
+    regions_.back().entries = std::move(spare_lists_.back());
+    spare_lists_.pop_back();
   }
-  return regions_.back().places;
+  return regions_.back().entries;
 }
 
 void SemanticMap::dropIfEmpty(const BlockIndex& block) noexcept {
-  const std::uint32_t number = region_number_.find(regionOf(block));
-  if (!regions_[number].places.empty()) return;
-  spare_places_.push_back(std::move(regions_[number].places));
-  region_number_.erase(regions_[number].index);
-  if (number + 1 != regions_.size()) {
-    regions_[number] = std::move(regions_.back());
-    region_number_.set(regions_[number].index, number);
+  const std::uint32_t position = region_position_.find(regionOf(block));
+  if (!regions_[position].entries.empty()) return;
+  spare_lists_.push_back(std::move(regions_[position].entries));
+  region_position_.erase(regions_[position].index);
+  if (position + 1 != regions_.size()) {
+    regions_[position] = std::move(regions_.back());
+    region_position_.set(regions_[position].index, position);
   }
   regions_.pop_back();
 }
 
 const Block* SemanticMap::find(const BlockIndex& index) const {
-  const std::uint32_t place = place_.find(index);
-  return place == GridTable::kNone ? nullptr : entries_[place].block.get();
+  const std::uint32_t position = position_.find(index);
+  return position == kNoPosition ? nullptr : entries_[position].block.get();
 }
 
 void SemanticMap::append(const BlockIndex& index) {
-  // What takes memory comes first; then nothing can fail.
-  makeRoom(entries_.size() + 1, entries_);
-  makeRoom(entries_.size() + spare_.size() + 1, spare_);
+  // Allocate first, so that nothing after it can fail.
+  growCapacity(entries_.size() + 1, entries_);
+  growCapacity(entries_.size() + spare_.size() + 1, spare_);
   std::vector<std::uint32_t>& region = regionAt(index);
   try {
-    makeRoom(region.size() + 1, region);
+    growCapacity(region.size() + 1, region);
     std::unique_ptr<Block> block = spare_.empty() ? std::make_unique<Block>() : nullptr;
-    place_.insert(index, static_cast<std::uint32_t>(entries_.size()));
+    position_.insert(index, static_cast<std::uint32_t>(entries_.size()));
     if (!block) {
       block = std::move(spare_.back());
       spare_bytes_ -= block->bytes();
@@ -75,31 +76,31 @@ void SemanticMap::append(const BlockIndex& index) {
 }
 
 std::size_t SemanticMap::positionOf(const BlockIndex& index) {
-  const std::uint32_t place = place_.find(index);
-  if (place != GridTable::kNone) return place;
+  const std::uint32_t position = position_.find(index);
+  if (position != kNoPosition) return position;
   append(index);
   return entries_.size() - 1;
 }
 
 void SemanticMap::erase(const BlockIndex& index) noexcept {
-  const std::uint32_t hole = place_.find(index);
-  if (hole == GridTable::kNone) return;
-  const auto removeFrom = [this](std::vector<std::uint32_t>& region, std::uint32_t place) {
-    region[place] = region.back();
-    entries_[region[place]].place_in_region = place;
+  const std::uint32_t hole = position_.find(index);
+  if (hole == kNoPosition) return;
+  const auto removeFrom = [this](std::vector<std::uint32_t>& region, std::uint32_t position) {
+    region[position] = region.back();
+    entries_[region[position]].position_in_region = position;
     region.pop_back();
   };
-  removeFrom(regionAt(index), entries_[hole].place_in_region);
+  removeFrom(regionAt(index), entries_[hole].position_in_region);
   dropIfEmpty(index);
-  place_.erase(index);
+  position_.erase(index);
   if (entries_[hole].block->empty()) {
     spare_bytes_ += entries_[hole].block->bytes();
     spare_.push_back(std::move(entries_[hole].block));
   }
   if (hole + 1 != entries_.size()) {
     Entry& last = entries_.back();
-    place_.set(last.index, hole);
-    regionAt(last.index)[last.place_in_region] = hole;
+    position_.set(last.index, hole);
+    regionAt(last.index)[last.position_in_region] = hole;
     entries_[hole] = std::move(last);
   }
   entries_.pop_back();
@@ -107,11 +108,11 @@ void SemanticMap::erase(const BlockIndex& index) noexcept {
 
 void SemanticMap::clear() noexcept {
   entries_ = decltype(entries_)();
-  place_ = GridTable();
+  position_ = GridTable();
   regions_ = decltype(regions_)();
-  region_number_ = GridTable();
+  region_position_ = GridTable();
   spare_ = decltype(spare_)();
-  spare_places_ = decltype(spare_places_)();
+  spare_lists_ = decltype(spare_lists_)();
   spare_bytes_ = 0;
 }
 
@@ -130,11 +131,11 @@ void SemanticMap::add(const SemanticMap& other) {
 }
 
 std::size_t SemanticMap::indexBytes() const {
-  std::size_t sum = entries_.capacity() * sizeof(Entry) + place_.bytes() + region_number_.bytes() +
+  std::size_t sum = entries_.capacity() * sizeof(Entry) + position_.bytes() + region_position_.bytes() +
                     regions_.capacity() * sizeof(regions_[0]) + spare_.capacity() * sizeof(spare_[0]) +
-                    spare_places_.capacity() * sizeof(spare_places_[0]) + spare_bytes_;
-  for (const Region& region : regions_) sum += region.places.capacity() * sizeof(region.places[0]);
-  for (const auto& places : spare_places_) sum += places.capacity() * sizeof(places[0]);
+                    spare_lists_.capacity() * sizeof(spare_lists_[0]) + spare_bytes_;
+  for (const Region& region : regions_) sum += region.entries.capacity() * sizeof(region.entries[0]);
+  for (const auto& list : spare_lists_) sum += list.capacity() * sizeof(list[0]);
   return sum;
 }
 

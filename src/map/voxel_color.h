@@ -1,4 +1,4 @@
-/// @file Colours of voxels by what they are.
+/// @file Colours of voxels by state and class.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ using Color = std::array<std::uint8_t, 3>;  ///< red, green, blue
 constexpr Color kFreeColor = {200, 225, 240};
 constexpr Color kOccludedColor = {60, 60, 70};
 
-/// The class's colour for occupied voxels, one fixed colour each for free and occluded ones.
+/// The colour of the class for an occupied voxel; kFreeColor or kOccludedColor for others.
 inline Color semanticColor(const VoxelView& view, const ClassTable& classes) {
   if (view.state == VoxelState::kFree) return kFreeColor;
   const SemanticClass* known = classes.find(view.label);

@@ -13,18 +13,18 @@
 namespace bki_mapping {
 namespace {
 
-/// Points nearer than this are no hits: drivers put missing returns at the sensor [m].
+/// Points closer than this are not hits: some drivers report missing returns at the sensor [m].
 constexpr float kSensorRadius = 1e-3f;
 
-/// Finds the classes of labels.
+/// Looks up the classes of labels; remembers the last one, since neighbouring points often share a label.
 class ClassFinder {
  public:
   ClassFinder(const ClassTable& classes, LabelValues values, const MapperConfig& config)
       : classes_(classes), values_(values), config_(config) {}
 
-  /// The class of a label, or none if hits with it are to be left out (and counted).
+  /// The class of a label; no value if hits with this label are skipped, which it counts.
   std::optional<ClassId> classOf(std::uint32_t label, PointCounts& counts) {
-    if (knows_last_ && label == last_label_) return last_class_;  // most points have their neighbour's label
+    if (knows_last_ && label == last_label_) return last_class_;
     std::optional<ClassId> id = classes_.classOf(label, values_);
     knows_last_ = false;
     const bool listed = id.has_value();
@@ -52,26 +52,27 @@ class ClassFinder {
   const ClassTable& classes_;
   LabelValues values_;
   const MapperConfig& config_;
-  // The last label, where nothing was to be counted:
+  // The last label, if it is in the class table and its hits are used:
   bool knows_last_ = false;
   std::uint32_t last_label_ = 0;
   ClassId last_class_ = 0;
 };
 
-/// Which ranges hits can have.
+/// The ranges that hits can have.
 class RangeLimits {
  public:
+  /// @param none_at_max whether points at max_range mean that their beam had no return.
   RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
       : sensor_(sensor), reach_(sensor.reach()), none_at_max_(sensor.knowsRange() && none_at_max) {}
 
-  /// False for NaN and infinity.
-  bool contain(float range) const {
+  /// Whether a point at this range can be a hit; false for NaN and infinity.
+  bool contains(float range) const {
     return range >= kSensorRadius && range >= sensor_.min_range && range <= reach_ && !isAtMax(range);
   }
   bool isAtMax(float range) const {
     return none_at_max_ && std::abs(range - sensor_.max_range) <= kAtMaxRange * sensor_.max_range;
   }
-  /// Counts a point that no hit can be. @return whether its beam met nothing up to max_range.
+  /// Counts a point that cannot be a hit under its reason. @return whether its beam is free up to max_range.
   bool countOutside(const Eigen::Vector3f& point, float range, PointCounts& counts) const {
     if (!point.allFinite()) {
       ++counts.not_finite;
@@ -95,9 +96,9 @@ class RangeLimits {
   bool none_at_max_;
 };
 
-/// Whether the shares of the classes in a point are probabilities: evidence must stay finite.
+/// Whether the shares of a point are probabilities; other values could make evidence infinite.
 bool areShares(const ClassShare* begin, const ClassShare* end) {
-  constexpr float kMost = 1.001f;  // with room for rounding
+  constexpr float kMost = 1.001f;  // allows for rounding
   return std::all_of(begin, end, [=](const ClassShare& s) { return s.share > 0.0f && s.share <= kMost; });
 }
 
@@ -124,7 +125,7 @@ void ScanPreprocessor::sortPoints(const Scan& scan, const ClassTable& classes, s
   for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3f& point = scan.points[i];
     const float range = point.norm();
-    if (!limits.contain(range)) {
+    if (!limits.contains(range)) {
       if (limits.countOutside(point, range, counts) &&
           (config_.clear_beyond_max_range || limits.isAtMax(range))) {
         addCut(scan.origin, point * (static_cast<float>(sensor.max_range) / range), into.cut);
@@ -151,30 +152,32 @@ void ScanPreprocessor::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     const float length = direction.norm();
-    ++seen_.counts.points;
+    ++processed_.counts.points;
     if (!direction.allFinite() || !(length > 0.0f) || !sensor.knowsRange()) {
-      ++seen_.counts.not_finite;
+      ++processed_.counts.not_finite;
       continue;
     }
-    ++seen_.counts.no_returns;
+    ++processed_.counts.no_returns;
     addCut(scan.origin, direction * (static_cast<float>(sensor.max_range) / length), cut);
   }
 }
 
-const PreprocessedScan& ScanPreprocessor::observe(const Scan& scan, const ClassTable& classes,
+const PreprocessedScan& ScanPreprocessor::process(const Scan& scan, const ClassTable& classes,
                                                   ThreadPool& pool, bool beams) {
   if (scan.labels.size() != scan.points.size()) {
     throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
-                                std::to_string(scan.labels.size()) + " labels; give one label a point");
+                                std::to_string(scan.labels.size()) + " labels; give each point one label");
   }
   if (!scan.soft.empty() && scan.soft.size() != scan.points.size()) {
-    throw std::invalid_argument("the scan has soft labels, but not one set a point");
+    throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) +
+                                " points but soft labels for " + std::to_string(scan.soft.size()) +
+                                "; give each point its soft labels");
   }
   const Chunks chunks(scan.points.size());
   if (used_.size() < chunks.count()) used_.resize(chunks.count());
   for (auto& used : used_) used.clear();
   const bool ordered = beams || !scan.soft.empty();
-  const std::size_t no_returns = chunks.count();  // a chunk of its own
+  const std::size_t no_returns = chunks.count();  // position of their own chunk, after those of the points
   hits_.start(scan.origin, chunks.count(), pool, ordered);
   cut_.start(scan.origin, chunks.count() + 1, pool, true);
   counts_.assign(chunks.count(), {});
@@ -184,29 +187,30 @@ const PreprocessedScan& ScanPreprocessor::observe(const Scan& scan, const ClassT
     hits_.close(c, worker);
     cut_.close(c, worker);
   });
-  seen_.counts = {};
-  for (const PointCounts& counts : counts_) seen_.counts += counts;
+  processed_.counts = {};
+  for (const PointCounts& counts : counts_) processed_.counts += counts;
   addNoReturns(scan, cut_.open(no_returns, 0));
   cut_.close(no_returns, 0);
   hits_.finish(pool);
-  seen_.hits.points.clear();
-  seen_.hits.labels.clear();
-  if (ordered) hits_.inOrder(pool, seen_.hits);
-  seen_.soft.clear();
-  if (!scan.soft.empty()) mergeSoftLabels(scan, used_, config_.downsample_resolution, seen_.hits, seen_.soft);
-  seen_.beams.origin = scan.origin;
-  seen_.beams.ends.clear();
+  processed_.hits.points.clear();
+  processed_.hits.labels.clear();
+  if (ordered) hits_.inOrder(pool, processed_.hits);
+  processed_.soft.clear();
+  if (!scan.soft.empty())
+    mergeSoftLabels(scan, used_, config_.downsample_resolution, processed_.hits, processed_.soft);
+  processed_.beams.origin = scan.origin;
+  processed_.beams.ends.clear();
   if (beams) {
     cut_.finish(pool);
     cut_.inOrder(pool, cut_points_);
-    appendBeams(seen_.hits.points, pool);
+    appendBeams(processed_.hits.points, pool);
     appendBeams(cut_points_.points, pool);
   }
-  return seen_;
+  return processed_;
 }
 
 void ScanPreprocessor::appendBeams(const std::vector<Eigen::Vector3f>& ends, ThreadPool& pool) {
-  std::vector<Eigen::Vector3f>& beams = seen_.beams.ends;
+  std::vector<Eigen::Vector3f>& beams = processed_.beams.ends;
   const std::size_t before = beams.size();
   beams.resize(before + ends.size());
   const Chunks chunks(ends.size());

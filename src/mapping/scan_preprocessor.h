@@ -1,4 +1,4 @@
-/// @file From a raw scan to hits and beams.
+/// @file Filtering and down-sampling: from a raw scan to hits and beams.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace bki_mapping {
 /// A scan after filtering and down-sampling.
 struct PreprocessedScan {
   LabelledPoints hits;
-  SoftLabels soft;  ///< of the hits; empty where each is of one class alone
-  Beams beams;      ///< to each hit, then to the points where beams beyond max_range are cut
+  SoftLabels soft;  ///< of the hits; empty if each hit has a single class
+  Beams beams;      ///< one to each hit, then those cut at max_range
   PointCounts counts;
 };
 
-/// Turns scans into observations. Keeps its memory from scan to scan.
+/// Filters and down-samples scans. Keeps its memory from scan to scan.
 class ScanPreprocessor {
  public:
   explicit ScanPreprocessor(const MapperConfig& config)
@@ -31,41 +31,42 @@ class ScanPreprocessor {
         hits_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
         cut_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()) {}
 
-  /// @param beams whether they are wanted, and hits in their order; without soft labels and beams `hits` of
-  /// what is returned is empty, too.
-  /// @return what was seen; stays until the next call.
-  /// @throws std::invalid_argument if the scan's labels are not as many as its points.
-  const PreprocessedScan& observe(const Scan& scan, const ClassTable& classes, ThreadPool& pool,
+  /// Filters and down-samples a scan. @param beams whether to make beams, too. Without beams and soft labels,
+  /// which both need the hits in the order of the scan, `hits` stays empty; read hits() instead.
+  /// @return the result, valid until the next call.
+  /// @throws std::invalid_argument if the scan has not one label for each point.
+  const PreprocessedScan& process(const Scan& scan, const ClassTable& classes, ThreadPool& pool,
                                   bool beams = true);
-  /// The hits of the last scan, in groups of neighbours.
+  /// The hits of the last scan, in groups of points that are close together.
   const Downsampler& hits() const { return hits_; }
 
  private:
-  /// Where one thread puts the points of a chunk.
+  /// The outputs of one chunk of points.
   struct Sorted {
     Downsampler::Input& hits;
     Downsampler::Input& cut;
     std::vector<UsedPoint>& used;
     PointCounts& counts;
   };
-  /// Sorts points first to before last into hits, cut beams and counts.
+  /// Sorts the points `first` to `last` - 1 into hits, cut beams and counts.
   void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
                   const Sorted& into) const;
 
-  /// Adds a beam that is cut at the sensor's range, unless it ends where the map has no voxels.
+  /// Adds a beam that is cut at the sensor's range, unless its end has no valid index.
   void addCut(const Eigen::Vector3d& origin, const Eigen::Vector3f& end, Downsampler::Input& cut) const;
 
-  /// Beams that met nothing, into the chunk of cut ones behind those of the points.
+  /// Adds the scan's beams without a return to the cut beams.
   void addNoReturns(const Scan& scan, Downsampler::Input& cut);
+  /// Appends one beam for each end that is not at the sensor.
   void appendBeams(const std::vector<Eigen::Vector3f>& ends, ThreadPool& pool);
 
   MapperConfig config_;
-  GridGeometry cells_;                        ///< the finer one of those that points are put into
+  GridGeometry cells_;                        ///< the finer of the voxels and the down-sampling cells
   std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels
   std::vector<PointCounts> counts_;           ///< of each chunk
   Downsampler hits_, cut_;
   LabelledPoints cut_points_;
-  PreprocessedScan seen_;
+  PreprocessedScan processed_;
 };
 
 }  // namespace bki_mapping

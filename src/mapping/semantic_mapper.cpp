@@ -23,7 +23,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Checks every setting.
+/// @return the settings. @throws std::invalid_argument if any is not allowed.
 MapperConfig checked(const MapperConfig& config, const ClassTable& classes) {
   checkParameters(config);
   if (config.unknown_labels == UnknownLabels::kUnlabelled && !classes.unlabelled()) {
@@ -33,14 +33,14 @@ MapperConfig checked(const MapperConfig& config, const ClassTable& classes) {
   return config;
 }
 
-/// Gives freed memory back to the system; the C library would keep most of it.
+/// Returns freed memory to the system; the C library would keep most of it.
 void returnMemory() {
 #if defined(__GLIBC__)
   malloc_trim(0);
 #endif
 }
 
-/// A rounded number for people, like "41 million".
+/// A rounded number for messages, like "41 million".
 std::string about(double number) {
   for (const auto& [unit, name] : {std::pair(1e9, " billion"), std::pair(1e6, " million")}) {
     if (number >= unit) return numberText(std::round(10.0 * number / unit) / 10.0) + name;
@@ -61,14 +61,14 @@ UpdateRules rulesOf(const MapperConfig& config) {
   return rules;
 }
 
-/// What the update of a scan may take. @param map_bytes that the map takes already.
+/// The limits of the update of a scan. @param map_bytes present memory of the map.
 UpdateLimits limitsFor(const Scan& scan, const MapperConfig& config, const GridGeometry& geometry,
                        std::size_t map_bytes) {
   UpdateLimits limits;
   if (config.scan_limit.blocks > 0) {
     limits.blocks = static_cast<std::size_t>(config.scan_limit.blocks);
   } else {
-    // A cube about the sensor, and a block beside it for the kernel and for rounding.
+    // A cube about the sensor that holds all hits and their kernels, plus a block on each side for rounding.
     const double reach =
         scan.sensor_model.value_or(config.sensor_model).reach() + config.kernel.lengthFor(config.resolution);
     const double edge = std::ceil(2.0 * reach / geometry.blockSize()) + 2.0;
@@ -82,8 +82,8 @@ UpdateLimits limitsFor(const Scan& scan, const MapperConfig& config, const GridG
   return limits;
 }
 
-/// What a scan larger than its limits would take, and what to set. @param map_bytes that the map takes
-/// already.
+/// The refusal of a scan that exceeds its limits: what it would need, and what to set.
+/// @param map_bytes present memory of the map.
 ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::size_t map_bytes) {
   const std::string resolution = numberText(config.resolution) + " m";
   switch (work.of()) {
@@ -92,7 +92,7 @@ ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::
       return {ScanRefused::Reason::kTooLarge,
               "the scan would touch about " + about(work.estimate()) + " blocks of 8 x 8 x 8 voxels of " +
                   resolution + ", " + megabytes(kBlockBytes * work.estimate()) +
-                  ", more than scan_limit/blocks allows; take a coarser resolution, set "
+                  ", more than scan_limit/blocks allows; use a coarser resolution, set "
                   "sensor_model/max_range to what the sensor sees, or raise scan_limit/blocks"};
     }
     case TooMuchWork::What::kSamples:
@@ -106,14 +106,14 @@ ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::
       return {ScanRefused::Reason::kMemory, "the map holds " + megabytes(static_cast<double>(map_bytes)) +
                                                 ", and the scan would make it larger than memory_limit, " +
                                                 megabytes(1e6 * config.memory_limit) +
-                                                "; raise memory_limit, or take a coarser resolution"};
+                                                "; raise memory_limit, or use a coarser resolution"};
   }
 }
 
 }  // namespace
 
 struct SemanticMapper::Pipeline {
-  ScanPreprocessor observer;
+  ScanPreprocessor preprocessor;
   PointEvidence hits;
   SoftPointEvidence soft_hits;
   LazyBeamField beams;
@@ -122,7 +122,7 @@ struct SemanticMapper::Pipeline {
   MapUpdater updater;
 
   Pipeline(const MapperConfig& config, const GridGeometry& geometry)
-      : observer(config),
+      : preprocessor(config),
         hits(geometry, config.kernel, config.free_space.hits_before_misses),
         soft_hits(geometry, config.kernel, config.free_space.hits_before_misses),
         beams(geometry, config.kernel, config.free_space.beam_index),
@@ -166,7 +166,7 @@ void SemanticMapper::reset() {
 
 void SemanticMapper::recover() noexcept {
   pipeline_ = nullptr;
-  if (map_.size() == 0) map_.clear();  // what a refused scan has left of the index
+  if (map_.size() == 0) map_.clear();  // frees what a refused scan has allocated for the index
   block_bytes_ = 0;
   for (const SemanticMap::Entry& entry : map_.entries()) block_bytes_ += entry.block->bytes();
   returnMemory();
@@ -178,14 +178,16 @@ const std::vector<GridIndex>& SemanticMapper::touchedBlocks() const {
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
   if (!map_.geometry().contains(scan.origin)) {
-    throw std::invalid_argument("the sensor's origin is not finite, or too far from the map's origin");
+    throw std::invalid_argument(
+        "the sensor's origin is not finite or too far from the map's origin; check the sensor's pose");
   }
   const auto memoryRanOut = [&] {
     recover();
-    return ScanRefused(ScanRefused::Reason::kMemory,
-                       "the computer's memory does not hold a scan of " + std::to_string(scan.points.size()) +
-                           " points; set memory_limit to less than the computer has, or take a coarser "
-                           "resolution");
+    return ScanRefused(
+        ScanRefused::Reason::kMemory,
+        "a scan of " + std::to_string(scan.points.size()) +
+            " points does not fit into the computer's memory; set memory_limit to less than the "
+            "computer has, or use a coarser resolution");
   };
   try {
     return add(scan);
@@ -194,31 +196,31 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
     throw refusalOf(work, config_, mapBytes());
   } catch (const std::bad_alloc&) {
     throw memoryRanOut();
-  } catch (const std::length_error&) {  // more than a vector can ever hold
+  } catch (const std::length_error&) {  // more than a vector can hold
     throw memoryRanOut();
   }
 }
 
-/// A scan's hits and free space become evidence, and the evidence is added to the map.
+/// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map.
 ScanStats SemanticMapper::add(const Scan& scan) {
   if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry());
   Pipeline& p = *pipeline_;
   ScanStats stats;
   Stopwatch watch;
   const bool occludes = config_.occlusion != OcclusionExtent::kNone;
-  const PreprocessedScan& seen =
-      p.observer.observe(scan, *classes_, *pool_, p.free_space->needsBeams() || occludes);
-  stats.counts = seen.counts;
-  stats.hits = p.observer.hits().size();
+  const PreprocessedScan& processed =
+      p.preprocessor.process(scan, *classes_, *pool_, p.free_space->needsBeams() || occludes);
+  stats.counts = processed.counts;
+  stats.hits = p.preprocessor.hits().size();
   stats.observe_ms = watch.lap();
 
-  const bool soft = !seen.soft.empty();
+  const bool soft = !processed.soft.empty();
   if (soft) {
-    p.soft_hits.setPoints(scan.origin, seen.hits, seen.soft);
+    p.soft_hits.setPoints(scan.origin, processed.hits, processed.soft);
   } else {
-    p.hits.setPoints(scan.origin, p.observer.hits(), *pool_);
+    p.hits.setPoints(scan.origin, p.preprocessor.hits(), *pool_);
   }
-  p.beams.setBeams(seen.beams);
+  p.beams.setBeams(processed.beams);
   const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
   ScanEvidence evidence;
   evidence.hits = soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits;
@@ -227,7 +229,7 @@ ScanStats SemanticMapper::add(const Scan& scan) {
     const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
     const BeamField& field = p.beams.field(*pool_);
     const double range = sensor.knowsRange() ? sensor.max_range : field.longest();
-    const auto edge = static_cast<double>(map_.geometry().safeRange(scan.origin));  // voxels end there
+    const auto edge = static_cast<double>(map_.geometry().safeRange(scan.origin));  // no indices beyond
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
     evidence.occlusion = &p.occlusion;
   }
@@ -238,7 +240,7 @@ ScanStats SemanticMapper::add(const Scan& scan) {
                                                  limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
   stats.not_finite = update.not_finite;
-  block_bytes_ += static_cast<std::size_t>(update.bytes);  // two's complement: may be negative
+  block_bytes_ += static_cast<std::size_t>(update.bytes);  // may be negative; the sum is right modulo 2^64
   stats.collect_ms = update.collect_ms;
   stats.update_ms = update.update_ms;
   return stats;

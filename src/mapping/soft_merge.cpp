@@ -8,24 +8,24 @@ namespace bki_mapping {
 namespace {
 
 struct CellShares {
-  std::vector<ClassShare> sums;  ///< ascending by class
-  std::uint32_t points = 0;      ///< that were added
+  std::vector<ClassShare> sums;  ///< of the shares, sorted by class
+  std::uint32_t points = 0;      ///< number of points added
 };
 
 void addShare(const ClassShare& share, std::vector<ClassShare>& sums) {
-  const auto place = std::lower_bound(sums.begin(), sums.end(), share,
-                                      [](const auto& a, const auto& b) { return a.id < b.id; });
-  if (place != sums.end() && place->id == share.id) {
-    place->share += share.share;
+  const auto position = std::lower_bound(sums.begin(), sums.end(), share,
+                                         [](const auto& a, const auto& b) { return a.id < b.id; });
+  if (position != sums.end() && position->id == share.id) {
+    position->share += share.share;
   } else {
-    sums.insert(place, share);
+    sums.insert(position, share);
   }
 }
 
 void addPoint(const SoftLabels& soft, const UsedPoint& used, CellShares& cell) {
   ++cell.points;
-  const ClassShare* const begin = soft.begin(used.place);
-  const ClassShare* const end = soft.end(used.place);
+  const ClassShare* const begin = soft.begin(used.offset);
+  const ClassShare* const end = soft.end(used.offset);
   for (const ClassShare* s = begin; s != end; ++s) addShare(*s, cell.sums);
   if (begin == end) addShare({used.id, 1.0f}, cell.sums);
 }
@@ -35,14 +35,14 @@ void addPoint(const SoftLabels& soft, const UsedPoint& used, CellShares& cell) {
 void mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used, double cell,
                      const LabelledPoints& hits, SoftLabels& soft) {
   const GridGeometry grid(cell > 0.0 ? cell : 1.0);
-  IndexNumbering cells;  // in the order in which they are first hit, as the down-sampler's
+  IndexNumbering cells;  // numbered in the same order as the down-sampler's
   std::vector<CellShares> shares(hits.points.size());
   std::size_t next = 0;
   for (const auto& chunk : used) {
     for (const UsedPoint& point : chunk) {
-      const VoxelIndex index = grid.voxelAt(scan.origin + scan.points[point.place].cast<double>());
-      const std::size_t number = cell > 0.0 ? cells.insert(index) : next++;
-      if (hits.labels[number] == point.id) addPoint(scan.soft, point, shares[number]);
+      const VoxelIndex index = grid.voxelAt(scan.origin + scan.points[point.offset].cast<double>());
+      const std::size_t hit = cell > 0.0 ? cells.insert(index) : next++;
+      if (hits.labels[hit] == point.id) addPoint(scan.soft, point, shares[hit]);
     }
   }
   soft.clear();

@@ -1,4 +1,4 @@
-/// @file Soft labels of down-sampled hits.
+/// @file Merges the soft labels of down-sampled hits.
 #pragma once
 
 #include <vector>
@@ -10,15 +10,15 @@ namespace bki_mapping {
 
 /// A point of a scan that became a hit.
 struct UsedPoint {
-  std::uint32_t place;  ///< in the scan
-  ClassId id;           ///< its class
+  std::uint32_t offset;  ///< in Scan::points
+  ClassId id;            ///< of its class
 };
 
-/// The shares of each down-sampled hit: the mean over the points of its cell that have its class as their
-/// likeliest. So labels that are sure give what labels without shares give.
-/// @param used the points that became hits, chunk by chunk, in the order of the scan.
-/// @param cell edge of the cells [m]; 0: each point has its own. @param hits what the down-sampler made.
-/// @param[out] soft the shares; empty if each hit is of one class alone.
+/// Merges shares cell by cell: a down-sampled hit gets the mean over those points of its cell that have its
+/// class as their likeliest. So shares of 0 and 1 give the same map as hard labels.
+/// @param used points that became hits, by chunk, in the order of the scan.
+/// @param cell edge of the down-sampling cells [m]; 0: off. @param hits after down-sampling.
+/// @param[out] soft the shares; empty if each hit has a single class.
 void mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used, double cell,
                      const LabelledPoints& hits, SoftLabels& soft);
 

@@ -1,4 +1,4 @@
-/// @file How a scan's items are split for several threads: into the same pieces for any number of threads.
+/// @file Splits the items of a scan into chunks for several threads.
 #pragma once
 
 #include <algorithm>
@@ -8,10 +8,11 @@
 
 namespace bki_mapping {
 
-/// Splits items 0 to n - 1 into consecutive chunks. The split depends on n alone.
+/// Splits items 0 to n - 1 into consecutive chunks. The split depends only on n, so that results do not
+/// depend on the number of threads.
 class Chunks {
  public:
-  static constexpr std::size_t kMost = 16;  ///< chunks; enough to keep cores busy, few enough to merge
+  static constexpr std::size_t kMost = 16;  ///< enough chunks to keep cores busy, few enough to merge cheaply
 
   explicit Chunks(std::size_t items)
       : items_(items), length_(std::max<std::size_t>(256, (items + kMost - 1) / kMost)) {}

@@ -1,4 +1,4 @@
-/// @file Random numbers from a counter: the same place always draws the same number, on any thread.
+/// @file Counter-based random numbers: each is a function of its keys, whichever thread draws it and when.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ inline std::uint64_t mixBits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Draws for one scan.
+/// The random numbers of one scan.
 class CounterRandom {
  public:
   CounterRandom(std::uint64_t seed, std::uint64_t scan) : key_(mixBits(mixBits(seed) ^ scan)) {}
 
-  /// Of one beam, to draw from.
+  /// The key of one beam, for draw().
   std::uint64_t beamKey(std::uint64_t beam) const { return mixBits(key_ ^ beam); }
   /// @return a number uniform on [0, 1).
   static double draw(std::uint64_t beam_key, std::uint64_t sample) {
@@ -29,7 +29,7 @@ class CounterRandom {
   std::uint64_t key_;
 };
 
-/// @return a number uniform on [0, 1), a function of its four keys alone.
+/// @return a number uniform on [0, 1) that is a function of the four keys.
 inline double counterRandom(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam,
                             std::uint64_t sample) {
   return CounterRandom::draw(CounterRandom(seed, scan).beamKey(beam), sample);

@@ -1,4 +1,4 @@
-/// @file Numbers cells or blocks in the order in which they are first seen.
+/// @file A set of cells or blocks that remembers the order of insertion.
 #pragma once
 
 #include <vector>
@@ -7,20 +7,18 @@
 
 namespace bki_mapping {
 
-/// A set of grid indices that numbers its members 0, 1, 2, ... Keeps its memory when cleared.
+/// A set of grid indices, numbered 0, 1, 2, ... in the order of insertion. Keeps its memory when cleared.
 class IndexNumbering {
  public:
-  static constexpr std::uint32_t kNone = GridTable::kNone;
-
-  /// @return the index's number, a new one if it was not yet a member.
+  /// Inserts an index unless it is a member. @return its position in members().
   std::uint32_t insert(const GridIndex& index) {
-    const std::uint32_t number = table_.insert(index, static_cast<std::uint32_t>(members_.size()));
-    if (number == members_.size()) members_.push_back(index);
-    return number;
+    const std::uint32_t position = table_.insert(index, static_cast<std::uint32_t>(members_.size()));
+    if (position == members_.size()) members_.push_back(index);
+    return position;
   }
-  /// @return the index's number, or kNone.
+  /// @return the index's position in members(), or kNoPosition.
   std::uint32_t find(const GridIndex& index) const { return table_.find(index); }
-  /// The members; each stands at its number.
+  /// The members in the order of insertion.
   const std::vector<GridIndex>& members() const { return members_; }
   std::size_t size() const { return members_.size(); }
   void clear() {

@@ -1,4 +1,4 @@
-/// @file Something done in order with pieces that several threads finish in any order.
+/// @file Processes in order what several threads finish in any order.
 #pragma once
 
 #include <cstddef>
@@ -8,17 +8,18 @@
 
 namespace bki_mapping {
 
-/// Whoever finishes a piece of work takes it in turn, if all before it have been taken, and with it those
-/// behind it that wait. So what must go in order is done while others are still at work.
+/// An ordered commit queue. Threads finish pieces of work in any order; the thread that finishes a piece also
+/// takes it, and those waiting after it, as soon as all earlier pieces have been taken. So the ordered step
+/// overlaps with the work of the other threads.
 class OrderedQueue {
  public:
-  /// Before each piece is finished once. Allocates no memory for no more pieces than ever before.
+  /// Resets the queue for `pieces` pieces. Allocates only if there are more than ever before.
   void start(std::size_t pieces) {
     finished_.assign(pieces, false);
     next_ = 0;
   }
-  /// Calls take(piece) for this piece and others, one at a time and in order, as soon as may be; once all are
-  /// finished, all are taken. Called from any thread.
+  /// Marks a piece as finished, and calls take(p) for each piece that is now ready, one at a time and in
+  /// order. Call it once for each piece, from any thread.
   template <typename Take>
   void finish(std::size_t piece, Take&& take) {
     const std::lock_guard<std::mutex> lock(*mutex_);
@@ -27,7 +28,7 @@ class OrderedQueue {
   }
 
  private:
-  std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  // one does not move
+  std::unique_ptr<std::mutex> mutex_ = std::make_unique<std::mutex>();  // a mutex cannot be moved
   std::vector<bool> finished_;
   std::size_t next_ = 0;  ///< first piece not yet taken
 };

@@ -1,4 +1,4 @@
-/// @file Runs of items, brought together by the tile or block in which they lie.
+/// @file Groups runs of items by the tile or block that contains them.
 #pragma once
 
 #include <vector>
@@ -8,47 +8,47 @@
 
 namespace bki_mapping {
 
-/// Takes runs as several pieces of work have found them, and sorts them by their index. Keeps its memory when
-/// cleared.
+/// Collects runs of items from several pieces of work, and sorts the runs by grid index. Keeps its memory
+/// when cleared.
 template <typename Run>
 class RunsByIndex {
  public:
   void clear() {
     indices_.clear();
     added_.clear();
-    number_.clear();
+    index_of_.clear();
     begin_.assign(1, 0);
   }
   void add(const GridIndex& index, const Run& run) {
-    // What comes one behind the other often lies together.
-    const bool again = !number_.empty() && indices_.members()[number_.back()] == index;
-    const std::uint32_t number = again ? number_.back() : indices_.insert(index);
-    if (number + 1 == begin_.size()) begin_.push_back(0);
-    ++begin_[number + 1];
-    number_.push_back(number);
+    // Consecutive runs often have the same index.
+    const bool again = !index_of_.empty() && indices_.members()[index_of_.back()] == index;
+    const std::uint32_t position = again ? index_of_.back() : indices_.insert(index);
+    if (position + 1 == begin_.size()) begin_.push_back(0);
+    ++begin_[position + 1];
+    index_of_.push_back(position);
     added_.push_back(run);
   }
-  /// Once all are added. Runs of one index stay in their order.
+  /// Call after the last add(). Runs with the same index keep their order.
   void sort() {
     runs_.resize(added_.size());
     groupBy(indices_.size(), begin_.data(), [this](auto&& positionOf) {
-      for (std::size_t r = 0; r < added_.size(); ++r) runs_[positionOf(number_[r])] = added_[r];
+      for (std::size_t r = 0; r < added_.size(); ++r) runs_[positionOf(index_of_[r])] = added_[r];
     });
   }
 
-  /// In the order in which they were first seen.
+  /// The indices of all runs, in the order in which they were first added.
   const IndexNumbering& indices() const { return indices_; }
-  /// The runs of an index by its number in indices(); those of the next number follow.
-  const Run* begin(std::size_t number) const { return runs_.data() + begin_[number]; }
-  const Run* end(std::size_t number) const { return runs_.data() + begin_[number + 1]; }
+  /// The runs of an index, given its position in indices(). Those of the next position follow in memory.
+  const Run* begin(std::size_t index) const { return runs_.data() + begin_[index]; }
+  const Run* end(std::size_t index) const { return runs_.data() + begin_[index + 1]; }
   const Run* end() const { return runs_.data() + runs_.size(); }
 
  private:
   IndexNumbering indices_;
-  std::vector<Run> added_;             ///< in the order in which they came
-  std::vector<std::uint32_t> number_;  ///< of the index of each
-  std::vector<std::uint32_t> begin_;   ///< of each index's runs; one more than indices
-  std::vector<Run> runs_;              ///< sorted
+  std::vector<Run> added_;               ///< in the order of add()
+  std::vector<std::uint32_t> index_of_;  ///< of each run added: position in indices_
+  std::vector<std::uint32_t> begin_;     ///< of each index's runs; one element more than indices_
+  std::vector<Run> runs_;                ///< sorted
 };
 
 }  // namespace bki_mapping

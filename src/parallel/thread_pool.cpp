@@ -7,14 +7,14 @@
 namespace bki_mapping {
 namespace {
 
-/// How long a thread stays awake for the next piece of work: longer than the serial pieces of a scan, far
+/// How long an idle thread spins before it sleeps: longer than the serial parts of a scan's update, far
 /// shorter than the time between scans.
-constexpr auto kAwake = std::chrono::microseconds(200);
+constexpr auto kSpinTime = std::chrono::microseconds(200);
 
-/// Waits awake until ready() or until the time is up. @return ready().
+/// Spins until ready() is true or the time is up. @return ready().
 template <typename Ready>
-bool awaitAwake(Ready&& ready) {
-  const auto end = std::chrono::steady_clock::now() + kAwake;
+bool spinUntil(Ready&& ready) {
+  const auto end = std::chrono::steady_clock::now() + kSpinTime;
   for (;;) {
     for (int n = 0; n < 64; ++n) {
       if (ready()) return true;
@@ -23,7 +23,7 @@ bool awaitAwake(Ready&& ready) {
 #endif
     }
     if (std::chrono::steady_clock::now() > end) return ready();
-    std::this_thread::yield();  // a core that somebody else needs is not worth holding
+    std::this_thread::yield();  // lets other processes use the core
   }
 }
 
@@ -33,7 +33,7 @@ int threadCount(int setting) {
   return setting > 0 ? setting : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-ThreadPool::ThreadPool(int setting) : shares_(static_cast<std::size_t>(threadCount(setting))) {
+ThreadPool::ThreadPool(int setting) : ranges_(static_cast<std::size_t>(threadCount(setting))) {
   for (int worker = 1; worker < threadCount(setting); ++worker) {
     helpers_.emplace_back([this, worker] { help(static_cast<std::size_t>(worker)); });
   }
@@ -50,21 +50,21 @@ ThreadPool::~ThreadPool() {
 
 void ThreadPool::work(std::size_t worker) {
   try {
-    for (std::size_t s = 0; s < shares_.size(); ++s) {
-      Share& share = shares_[(worker + s) % shares_.size()];
-      for (std::size_t j = share.next++; j < share.end; j = share.next++) call_(callable_, j, worker);
+    for (std::size_t s = 0; s < ranges_.size(); ++s) {
+      JobRange& range = ranges_[(worker + s) % ranges_.size()];
+      for (std::size_t j = range.next++; j < range.end; j = range.next++) call_(callable_, j, worker);
     }
   } catch (...) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!failure_) failure_ = std::current_exception();
-    for (Share& share : shares_) share.next = share.end;
+    for (JobRange& range : ranges_) range.next = range.end;
   }
 }
 
 void ThreadPool::help(std::size_t worker) {
   for (std::uint64_t seen = 0;;) {
     const auto ready = [&] { return stop_ || round_ != seen; };
-    if (!awaitAwake(ready)) {
+    if (!spinUntil(ready)) {
       std::unique_lock<std::mutex> lock(mutex_);
       begun_.wait(lock, ready);
     }
@@ -78,13 +78,13 @@ void ThreadPool::help(std::size_t worker) {
   }
 }
 
-void ThreadPool::run(std::size_t jobs, std::size_t shares, Call call, void* callable) {
+void ThreadPool::run(std::size_t jobs, std::size_t parts, Call call, void* callable) {
   if (jobs == 0) return;
   call_ = call;
   callable_ = callable;
-  for (std::size_t s = 0; s < shares_.size(); ++s) {
-    shares_[s].next = std::min(s, shares) * jobs / shares;
-    shares_[s].end = std::min(s + 1, shares) * jobs / shares;
+  for (std::size_t s = 0; s < ranges_.size(); ++s) {
+    ranges_[s].next = std::min(s, parts) * jobs / parts;
+    ranges_[s].end = std::min(s + 1, parts) * jobs / parts;
   }
   if (jobs > 1 && !helpers_.empty()) {
     busy_ = helpers_.size();
@@ -95,7 +95,7 @@ void ThreadPool::run(std::size_t jobs, std::size_t shares, Call call, void* call
     begun_.notify_all();
     work(0);
     const auto done = [&] { return busy_ == 0; };
-    if (!awaitAwake(done)) {
+    if (!spinUntil(done)) {
       std::unique_lock<std::mutex> lock(mutex_);
       finished_.wait(lock, done);
     }

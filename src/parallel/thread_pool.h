@@ -1,4 +1,4 @@
-/// @file Independent jobs on several threads; the only place that starts threads in the core.
+/// @file A thread pool for independent jobs: the only code of the core that starts threads.
 #pragma once
 
 #include <atomic>
@@ -12,14 +12,14 @@
 
 namespace bki_mapping {
 
-/// @return the number of threads meant by a setting: itself, or all cores if it is 0.
+/// @return the number of threads that a setting selects: the setting itself, or all cores for 0.
 int threadCount(int setting);
 
-/// What one thread writes while others are at work stands in cache lines of its own: so many bytes apart,
-/// since some processors fetch lines in pairs.
+/// Alignment of per-thread data [bytes], which avoids false sharing. Two cache lines, since some processors
+/// fetch lines in pairs.
 constexpr std::size_t kThreadsApart = 128;
 
-/// Threads that wait for work. Between two pieces of work they stay awake for a moment, then sleep.
+/// A fixed set of threads. Idle threads spin for a moment, so that the next call starts fast, then sleep.
 class ThreadPool {
  public:
   /// @param setting number of threads, the caller's among them; 0 means all cores.
@@ -31,16 +31,17 @@ class ThreadPool {
   /// Threads that take jobs, the caller's among them.
   std::size_t count() const { return helpers_.size() + 1; }
 
-  /// Calls job(j, worker) for each j in [0, jobs); returns when all are done. Jobs must not depend on each
-  /// other. `worker` in [0, count()) tells threads apart; each begins with a consecutive share of the jobs,
-  /// so that the same job of two calls finds its data in the same core's cache, and then helps the others.
-  /// Allocates no memory. Not to be called from two threads at once, nor from a job.
-  /// @throws what the first failing job threw; jobs not yet begun are then left out.
+  /// Calls job(j, worker) for each j in [0, jobs), and returns when all are done. Jobs must be independent of
+  /// each other; `worker` in [0, count()) identifies the thread. Each thread starts with its own consecutive
+  /// range of jobs, so that a job of the next call finds its data in the same core's cache, and then takes
+  /// jobs from the others' ranges. Allocates no memory. Not to be called
+  /// from two threads at once or from a job.
+  /// @throws what the first failing job threw; jobs that have not started by then are skipped.
   template <typename Job>
   void forEach(std::size_t jobs, Job&& job) {
     runAny(jobs, count(), job);
   }
-  /// The same, but whoever is free takes the next job in order: for jobs sorted by effort, largest first.
+  /// The same, but jobs start in order, each on the next free thread. Use it for jobs sorted by falling cost.
   template <typename Job>
   void forEachInOrder(std::size_t jobs, Job&& job) {
     runAny(jobs, 1, job);
@@ -50,32 +51,32 @@ class ThreadPool {
   using Call = void (*)(void* callable, std::size_t job, std::size_t worker);
 
   template <typename Job>
-  void runAny(std::size_t jobs, std::size_t shares, Job& job) {
+  void runAny(std::size_t jobs, std::size_t parts, Job& job) {
     run(
-        jobs, shares,
+        jobs, parts,
         [](void* callable, std::size_t j, std::size_t worker) { (*static_cast<Job*>(callable))(j, worker); },
         const_cast<void*>(static_cast<const void*>(&job)));
   }
-  /// @param shares into which jobs are split, at most one a worker.
-  void run(std::size_t jobs, std::size_t shares, Call call, void* callable);
+  /// @param parts number of ranges into which the jobs are split, at most one for each worker.
+  void run(std::size_t jobs, std::size_t parts, Call call, void* callable);
   void work(std::size_t worker);
   void help(std::size_t worker);
 
-  /// Consecutive jobs. Each worker begins with the share of its number.
-  struct alignas(kThreadsApart) Share {
-    std::atomic<std::size_t> next{0};  ///< first job that nobody has taken; may pass `end`
+  /// A range of consecutive jobs. Worker n starts with range n.
+  struct alignas(kThreadsApart) JobRange {
+    std::atomic<std::size_t> next{0};  ///< first job that no worker has taken; may exceed `end`
     std::size_t end = 0;
   };
 
-  // Of the work at hand; written before `round_` goes up.
+  // The current call of run(); written before `round_` is incremented, which publishes them.
   Call call_ = nullptr;
   void* callable_ = nullptr;
-  std::vector<Share> shares_;  ///< one a worker
+  std::vector<JobRange> ranges_;  ///< one for each worker
 
   std::atomic<std::size_t> busy_{0};     ///< helpers that have not finished this round
-  std::atomic<std::uint64_t> round_{0};  ///< goes up with each piece of work
+  std::atomic<std::uint64_t> round_{0};  ///< incremented by each call that needs the helpers
   std::atomic<bool> stop_{false};
-  std::mutex mutex_;  ///< of the two conditions and of `failure_`
+  std::mutex mutex_;  ///< guards `failure_` and the two conditions
   std::condition_variable begun_, finished_;
   std::exception_ptr failure_;
   std::vector<std::thread> helpers_;

@@ -1,4 +1,4 @@
-/// @file Which blocks a point reaches, axis by axis.
+/// @file The blocks that a kernel about a point may reach on one axis, for kernels of any length.
 #pragma once
 
 #include <array>
@@ -9,12 +9,12 @@ namespace bki_mapping {
 
 /// A block that a point may reach, on one axis.
 struct AxisBlock {
-  int block;
-  double local;      ///< the point from the block's first voxel centre [voxels]
-  double distance2;  ///< to the block's nearest voxel centre on this axis, squared
+  int block;         ///< index
+  double local;      ///< the point, relative to the block's first voxel centre [voxels]
+  double distance2;  ///< squared distance to the block's nearest voxel centre on this axis [voxels^2]
 };
 
-/// Distance from a coordinate to the nearest voxel centre of a block, both from its first centre [voxels].
+/// Distance to a block's nearest voxel centre [voxels]. @param local relative to its first voxel centre.
 inline double distanceToCentres(double local) {
   const double last = kBlockEdge - 1;
   if (local < 0.0) return -local;
@@ -23,30 +23,35 @@ inline double distanceToCentres(double local) {
   return above < 0.5 ? above : 1.0 - above;
 }
 
-/// The blocks of one axis with a voxel centre within reach of a point.
+/// The blocks that have a voxel centre within reach of a point on one axis.
 class AxisBlocks {
  public:
-  /// @param home the block that holds the point. @param local the point from its first voxel centre [voxels].
-  AxisBlocks(int home, double local, double reach) {
-    const double at_home = distanceToCentres(local);
-    if (at_home < reach) append(home, local, at_home);
-    // The nearest centres of the blocks before and behind it are at -1, -9, ..., and at 8, 16, ...
-    double away = local + 1.0;
-    for (int n = 1; away < reach; ++n, away += kBlockEdge) append(home - n, local + n * kBlockEdge, away);
-    away = kBlockEdge - local;
-    for (int n = 1; away < reach; ++n, away += kBlockEdge) append(home + n, local - n * kBlockEdge, away);
+  /// @param block that contains the point. @param local the point, relative to its first voxel centre
+  /// [voxels]. @param reach of the kernel [voxels].
+  AxisBlocks(int block, double local, double reach) {
+    const double inside = distanceToCentres(local);
+    if (inside < reach) append(block, local, inside);
+    // The nearest centres of preceding blocks are at -1, -9, ..., those of following blocks at 8, 16, ...
+    double distance = local + 1.0;
+    for (int n = 1; distance < reach; ++n, distance += kBlockEdge) {
+      append(block - n, local + n * kBlockEdge, distance);
+    }
+    distance = kBlockEdge - local;
+    for (int n = 1; distance < reach; ++n, distance += kBlockEdge) {
+      append(block + n, local - n * kBlockEdge, distance);
+    }
   }
   const AxisBlock* begin() const { return blocks_.data(); }
   const AxisBlock* end() const { return blocks_.data() + count_; }
 
-  static constexpr std::size_t kMost = 20;
+  static constexpr std::size_t kMost = 20;  ///< blocks; enough for a reach of 72 voxels
 
  private:
   void append(int block, double local, double distance) {
     if (count_ < kMost) blocks_[count_++] = {block, local, distance * distance};
   }
 
-  std::array<AxisBlock, kMost> blocks_;  // not initialised
+  std::array<AxisBlock, kMost> blocks_;  // uninitialised, to save time
   std::size_t count_ = 0;
 };
 

@@ -3,7 +3,7 @@
 namespace bki_mapping {
 
 void CellMerger::voteForOther(Cell& cell, ClassId label) {
-  for (std::uint32_t v = cell.more; v != kNone; v = votes_[v].next) {
+  for (std::uint32_t v = cell.more; v != kNoPosition; v = votes_[v].next) {
     if (votes_[v].label == label) {
       ++votes_[v].count;
       return;
@@ -16,7 +16,7 @@ void CellMerger::voteForOther(Cell& cell, ClassId label) {
 ClassId CellMerger::majority(const Cell& cell) const {
   ClassId label = cell.label;
   std::uint32_t most = cell.votes;
-  for (std::uint32_t v = cell.more; v != kNone; v = votes_[v].next) {
+  for (std::uint32_t v = cell.more; v != kNoPosition; v = votes_[v].next) {
     if (votes_[v].count > most || (votes_[v].count == most && votes_[v].label < label)) {
       most = votes_[v].count;
       label = votes_[v].label;
@@ -30,12 +30,12 @@ void CellMerger::finishTile(MergedPoints& output) {
   output.resize(before + count_);
   for (std::uint32_t c = 0; c < count_; ++c) {
     const Cell& cell = cells_[c];
-    slots_[cell.place] = kEmpty;
-    const double share = 1.0 / cell.count;
-    output.x[before + c] = static_cast<float>(cell.x * share);
-    output.y[before + c] = static_cast<float>(cell.y * share);
-    output.z[before + c] = static_cast<float>(cell.z * share);
-    output.labels[before + c] = cell.more == kNone ? cell.label : majority(cell);
+    slots_[cell.offset] = kEmpty;
+    const double scale = 1.0 / cell.count;
+    output.x[before + c] = static_cast<float>(cell.x * scale);
+    output.y[before + c] = static_cast<float>(cell.y * scale);
+    output.z[before + c] = static_cast<float>(cell.z * scale);
+    output.labels[before + c] = cell.more == kNoPosition ? cell.label : majority(cell);
   }
   count_ = 0;
   votes_.clear();

@@ -1,4 +1,4 @@
-/// @file Merges the points of the cells of one tile.
+/// @file Merges the points of each down-sampling cell, one tile at a time.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,11 @@ namespace bki_mapping {
 /// A point of a tile.
 struct alignas(16) TilePoint {
   float x, y, z;       ///< relative to the sensor [m]
-  std::uint16_t cell;  ///< in the tile
+  std::uint16_t cell;  ///< offset of its cell in the tile
   ClassId label;
 };
 
-/// Points with a class each, axis by axis.
+/// Points and their classes, as one array for each coordinate.
 struct MergedPoints {
   std::vector<float> x, y, z;  ///< relative to the sensor [m]
   std::vector<ClassId> labels;
@@ -29,17 +29,16 @@ struct MergedPoints {
   }
 };
 
-/// Adds up points cell by cell, one tile at a time. Keeps its memory from tile to tile. Each thread has its
-/// own.
+/// Sums the points of each cell, one tile at a time. Keeps its memory from tile to tile; one for each thread.
 class alignas(kThreadsApart) CellMerger {
  public:
-  /// @return the place of the cell among those of this tile, in the order of their first points; kKnown if
-  /// the point is not its cell's first.
+  /// Adds a point to its cell. @return the cell's position in the output of this tile if the point is the
+  /// first of its cell, else kKnown.
   std::uint32_t add(const TilePoint& point) {
     std::uint16_t& slot = slots_[point.cell];
     if (slot == kEmpty) {
       slot = static_cast<std::uint16_t>(count_);
-      return addAlone(point);
+      return addAsCell(point);
     }
     Cell& cell = cells_[slot];
     cell.x += static_cast<double>(point.x);
@@ -53,46 +52,46 @@ class alignas(kThreadsApart) CellMerger {
     }
     return kKnown;
   }
-  /// Adds a point that is a cell of its own. @return as add.
-  std::uint32_t addAlone(const TilePoint& point) {
+  /// Adds a point as a cell of its own. @return the cell's position in the output of this tile.
+  std::uint32_t addAsCell(const TilePoint& point) {
     Cell& cell = cells_[count_];
     cell.x = static_cast<double>(point.x);
     cell.y = static_cast<double>(point.y);
     cell.z = static_cast<double>(point.z);
     cell.count = cell.votes = 1;
-    cell.more = kNone;
-    cell.place = point.cell;
+    cell.more = kNoPosition;
+    cell.offset = point.cell;
     cell.label = point.label;
     return count_++;
   }
-  /// Provides for a tile of so many points.
+  /// Starts a tile of at most `points` points.
   void startTile(std::size_t points) {
     if (cells_.size() < points) cells_.resize(points);
   }
 
-  /// Appends one point a cell, the centroid with the label of most (ties: the smaller id), in the order of
-  /// their first points; then forgets them.
+  /// Appends one point for each cell, its centroid with the label of the majority (ties: the smaller id), in
+  /// the order of the cells' first points. Then forgets the tile.
   void finishTile(MergedPoints& output);
 
-  /// Provides for as many cells as `other` does, so that memory does not depend on who gets which tile.
+  /// Allocates as much memory as `other` has, so that it does not depend on which thread gets which tile.
   void reserveAs(const CellMerger& other);
 
   static constexpr std::uint32_t kKnown = 0xffffffffu;
 
  private:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
   static constexpr std::uint16_t kEmpty = 0xffff;
   static constexpr std::size_t kMostCells = TileGrid::kMostEdge * TileGrid::kMostEdge * TileGrid::kMostEdge;
   static_assert(kMostCells < kEmpty);
 
   struct Cell {
-    double x, y, z;  ///< sums
-    std::uint32_t count;
-    std::uint32_t votes;  ///< for `label`
-    std::uint32_t more;   ///< first of the votes for other labels
-    std::uint16_t place;  ///< in the tile
-    ClassId label;
+    double x, y, z;        ///< sums over the points
+    std::uint32_t count;   ///< points
+    std::uint32_t votes;   ///< points with `label`
+    std::uint32_t more;    ///< head of the list of votes for other labels, or kNoPosition
+    std::uint16_t offset;  ///< in the tile
+    ClassId label;         ///< of the first point
   };
+  /// The votes for one label of a cell: an element of a linked list in votes_.
   struct Votes {
     ClassId label;
     std::uint32_t count, next;
@@ -101,10 +100,10 @@ class alignas(kThreadsApart) CellMerger {
   void voteForOther(Cell& cell, ClassId label);
   ClassId majority(const Cell& cell) const;
 
-  /// Cells by place; one for each number that a place can be.
+  /// Position in cells_ by a cell's offset in the tile, or kEmpty; one for every value of the offset's type.
   std::vector<std::uint16_t> slots_ = std::vector<std::uint16_t>(std::size_t{1} << 16, kEmpty);
   std::uint32_t count_ = 0;
-  std::vector<Cell> cells_;  ///< `count_` of them
+  std::vector<Cell> cells_;  ///< the first count_ are in use
   std::vector<Votes> votes_;
 };
 

@@ -8,12 +8,12 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffu;
-/// A group and a cell in it share one number.
+/// A group and the position of a cell in it are packed into 32 bits.
 constexpr std::uint32_t kGroupBits = 6, kCellBits = 32 - kGroupBits;
 constexpr std::size_t kGroups = 1u << kGroupBits;
 
-/// The edge of a tile [cells]: tiles of the size asked for, or of a whole fraction of it.
+/// The edge of a tile [cells] that is closest to the requested one, or to an integer fraction of it if that
+/// would be too large.
 int tileEdge(double cell, double tile) {
   const double ratio = tile / cell;
   if (!(ratio > 1.0)) return 1;
@@ -21,10 +21,10 @@ int tileEdge(double cell, double tile) {
   return std::max(1, static_cast<int>(std::lround(ratio / parts)));
 }
 
-/// Runs of points are fetched so many runs before they are merged.
+/// Prefetch distance of points [runs].
 constexpr std::ptrdiff_t kAhead = 3;
 
-/// Tiles that are neighbours have different numbers.
+/// A hash of a tile's index that differs between neighbours.
 std::size_t shortCode(const GridIndex& tile) {
   return (tile.x & 15) | (tile.y & 15) << 4 | (tile.z & 3) << 8;
 }
@@ -43,12 +43,12 @@ void Downsampler::start(const Eigen::Vector3d& origin, std::size_t chunks, const
   ordered_ = ordered;
   grid_.emplace(cells_, origin, edge_);
   used_ = chunks;
-  turns_.start(chunks);
+  queue_.start(chunks);
   tiles_.clear();
   if (chunks_.size() < chunks) chunks_.resize(chunks);
   inputs_.resize(pool.count());
   mergers_.resize(pool.count());
-  // Who gets which chunk is chance: all have room for what one has met.
+  // Any worker may get any chunk, so give all of them the capacity of the largest.
   std::size_t most = 0, most_tiles = 0;
   for (const Input& input : inputs_) {
     most = std::max(most, input.points_.size());
@@ -69,20 +69,20 @@ Downsampler::Input& Downsampler::open(std::size_t chunk, std::size_t worker) {
   input.owner_ = this;
   input.tiles_ = &chunks_[chunk].tiles;
   input.tiles_->clear();
-  input.known_.assign(kShortCodes, {{}, kNone});
+  input.known_.assign(kShortCodes, {{}, kNoPosition});
   input.size_ = 0;
   input.tile_sizes_.clear();
   input.count_ = 0;
   return input;
 }
 
-std::uint32_t Downsampler::Input::findNumber(const GridIndex& tile, KnownTile& known) {
+std::uint32_t Downsampler::Input::findPosition(const GridIndex& tile, KnownTile& known) {
   known = {tile, tiles_->insert(tile)};
-  if (known.number == tile_sizes_.size()) tile_sizes_.push_back(0);
-  return known.number;
+  if (known.position == tile_sizes_.size()) tile_sizes_.push_back(0);
+  return known.position;
 }
 
-void Downsampler::Input::place() {
+void Downsampler::Input::flush() {
   const std::size_t count = count_;
   owner_->kernels_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
   if (points_.size() < size_ + count) {
@@ -99,34 +99,34 @@ void Downsampler::Input::place() {
     points[i].label = labels_[i];
     const GridIndex tile = places_.tileOf(i);
     KnownTile& known = known_[shortCode(tile)];
-    const bool is_known = known.index == tile && known.number != kNone;
-    tile_of[i] = is_known ? known.number : findNumber(tile, known);
+    const bool is_known = known.index == tile && known.position != kNoPosition;
+    tile_of[i] = is_known ? known.position : findPosition(tile, known);
     ++tile_sizes_[tile_of[i]];
   }
   size_ += count;
   count_ = 0;
 }
 
-void Downsampler::close(std::size_t chunk_number, std::size_t worker) {
-  Chunk& chunk = chunks_[chunk_number];
+void Downsampler::close(std::size_t chunk_position, std::size_t worker) {
+  Chunk& chunk = chunks_[chunk_position];
   Input& input = inputs_[worker];
-  input.place();
+  input.flush();
   const std::size_t count = input.size_, tiles = chunk.tiles.size();
   chunk.begin.assign(1, 0);
   chunk.begin.insert(chunk.begin.end(), input.tile_sizes_.begin(), input.tile_sizes_.end());
   chunk.points.resize(count);
   if (ordered_) {
-    chunk.place.resize(count);
-    chunk.cell_of.assign(count, kNone);
+    chunk.offset.resize(count);
+    chunk.cell_of.assign(count, kNoPosition);
   }
   groupBy(tiles, chunk.begin.data(), [&](auto&& positionOf) {
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t position = positionOf(input.tile_of_[i]);
       chunk.points[position] = input.points_[i];
-      if (ordered_) chunk.place[position] = static_cast<std::uint32_t>(i);
+      if (ordered_) chunk.offset[position] = static_cast<std::uint32_t>(i);
     }
   });
-  turns_.finish(chunk_number, [this](std::size_t c) { collectRuns(c); });
+  queue_.finish(chunk_position, [this](std::size_t c) { collectRuns(c); });
 }
 
 void Downsampler::collectRuns(std::size_t c) {
@@ -138,14 +138,14 @@ void Downsampler::collectRuns(std::size_t c) {
 }
 
 void Downsampler::splitIntoGroups(std::size_t points) {
-  const std::size_t share = points / kGroups + 1;
+  const std::size_t group_size = points / kGroups + 1;
   if (groups_.size() < kGroups) groups_.resize(kGroups);
   used_groups_ = 0;
   const auto tiles = static_cast<std::uint32_t>(tiles_.indices().size());
   for (std::uint32_t tile = 0; tile < tiles;) {
     Group& group = groups_[used_groups_++];
     group.first_tile = tile;
-    for (std::size_t size = 0; tile < tiles && (size < share || used_groups_ == kGroups); ++tile) {
+    for (std::size_t size = 0; tile < tiles && (size < group_size || used_groups_ == kGroups); ++tile) {
       for (const Run* run = tiles_.begin(tile); run != tiles_.end(tile); ++run) size += run->size();
     }
     group.end_tile = tile;
@@ -153,10 +153,10 @@ void Downsampler::splitIntoGroups(std::size_t points) {
 }
 
 void Downsampler::prefetch(const Run& run) const {
-  constexpr std::uint32_t kPointsALine = 64 / sizeof(TilePoint), kMostLines = 8;
-  const std::uint32_t end = std::min(run.end, run.begin + kMostLines * kPointsALine);
+  constexpr std::uint32_t kPointsPerLine = 64 / sizeof(TilePoint), kMostLines = 8;
+  const std::uint32_t end = std::min(run.end, run.begin + kMostLines * kPointsPerLine);
   const TilePoint* const points = chunks_[run.chunk].points.data();
-  for (std::uint32_t i = run.begin; i < end; i += kPointsALine) __builtin_prefetch(points + i);
+  for (std::uint32_t i = run.begin; i < end; i += kPointsPerLine) __builtin_prefetch(points + i);
 }
 
 void Downsampler::merge(std::uint32_t g, CellMerger& merger) {
@@ -171,9 +171,9 @@ void Downsampler::merge(std::uint32_t g, CellMerger& merger) {
       Chunk& chunk = chunks_[run->chunk];
       if (tiles_.end() - run > kAhead) prefetch(run[kAhead]);
       for (std::uint32_t i = run->begin; i < run->end; ++i) {
-        const std::uint32_t cell = merges_ ? merger.add(chunk.points[i]) : merger.addAlone(chunk.points[i]);
+        const std::uint32_t cell = merges_ ? merger.add(chunk.points[i]) : merger.addAsCell(chunk.points[i]);
         if (ordered_ && cell != CellMerger::kKnown) {
-          chunk.cell_of[chunk.place[i]] = g << kCellBits | (before + cell);
+          chunk.cell_of[chunk.offset[i]] = g << kCellBits | (before + cell);
         }
       }
     }
@@ -194,16 +194,16 @@ void Downsampler::finish(ThreadPool& pool) {
 }
 
 void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {
-  std::size_t place = chunk.output;
+  std::size_t offset = chunk.output;
   for (const std::uint32_t code : chunk.cell_of) {
-    if (code == kNone) continue;
+    if (code == kNoPosition) continue;
     const MergedPoints& merged = groups_[code >> kCellBits].merged;
     const std::size_t cell = code & ((1u << kCellBits) - 1);
-    Eigen::Vector3f& point = output.points[place];
+    Eigen::Vector3f& point = output.points[offset];
     point.x() = merged.x[cell];
     point.y() = merged.y[cell];
     point.z() = merged.z[cell];
-    output.labels[place++] = merged.labels[cell];
+    output.labels[offset++] = merged.labels[cell];
   }
 }
 
@@ -212,7 +212,8 @@ void Downsampler::inOrder(ThreadPool& pool, LabelledPoints& output) {
   for (std::size_t c = 0; c < used_; ++c) {
     const auto& cell_of = chunks_[c].cell_of;
     chunks_[c].output = cells;
-    cells += cell_of.size() - static_cast<std::size_t>(std::count(cell_of.begin(), cell_of.end(), kNone));
+    cells +=
+        cell_of.size() - static_cast<std::size_t>(std::count(cell_of.begin(), cell_of.end(), kNoPosition));
   }
   output.points.resize(cells);
   output.labels.resize(cells);

@@ -1,4 +1,4 @@
-/// @file One point a cell.
+/// @file Down-sampling: merges the points of each cell into one.
 #pragma once
 
 #include <optional>
@@ -15,23 +15,23 @@
 
 namespace bki_mapping {
 
-/// Points with a class each, relative to the sensor.
+/// Points and their classes.
 struct LabelledPoints {
   std::vector<Eigen::Vector3f> points;  ///< relative to the sensor, axes of the map frame [m]
   std::vector<ClassId> labels;          ///< as long as `points`
 };
 
 /// Merges the points of each cubic cell of the map frame into their centroid, labelled by the majority
-/// (ties: the smaller id). Points are added in chunks, which several threads may fill side by side; the
-/// points' order is chunk by chunk. Keeps its memory from scan to scan.
+/// (ties: the smaller id). Points are added in chunks, which several threads may fill at once; the order of
+/// the points is that of the chunks. Keeps its memory from scan to scan.
 ///
-/// Each chunk is sorted by tiles, cubes of some thousand cells about as large as a block of the map, while it
-/// is in a core's cache; then tiles are merged one by one. A tile needs no hash table, and what it gives lies
-/// together in space, which makes sorting it into blocks cheap.
+/// Each chunk is sorted by tile while it is in a core's cache; then tiles are merged one by one. A tile,
+/// about as large as a block, has few enough cells for a plain array instead of a hash table, and its output
+/// is close together in space, which makes sorting it into blocks cheap.
 class Downsampler {
  public:
-  /// @param cell edge [m]; 0 merges nothing. @param tile edge [m] that tiles shall have, if they can.
-  /// @param instruction_set one of instructionSets(); the best there is if empty.
+  /// @param cell edge [m]; 0 merges nothing. @param tile preferred edge of a tile [m].
+  /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
   Downsampler(double cell, double tile, const std::string& instruction_set = "");
 
   /// Takes the points of one chunk; each thread has its own.
@@ -42,67 +42,69 @@ class Downsampler {
       y_[count_] = point.y();
       z_[count_] = point.z();
       labels_[count_] = label;
-      if (++count_ == kBatch) place();
+      if (++count_ == kBatch) flush();
     }
 
    private:
     friend class Downsampler;
     struct KnownTile {
       GridIndex index;
-      std::uint32_t number;
+      std::uint32_t position;  ///< in tiles_, or kNoPosition
     };
-    void place();
-    /// Of a tile that is not the one last met with its short code.
-    std::uint32_t findNumber(const GridIndex& tile, KnownTile& known);
+    /// Finds the tiles and cells of the batch, and appends its points to the chunk.
+    void flush();
+    /// Looks up a tile that is not in the cache, and caches it. @return its position in tiles_.
+    std::uint32_t findPosition(const GridIndex& tile, KnownTile& known);
 
     Downsampler* owner_ = nullptr;
     IndexNumbering* tiles_ = nullptr;  ///< of the chunk
+    // The batch, in arrays of the layout that the vector loops need:
     alignas(64) float x_[kBatch], y_[kBatch], z_[kBatch];
     ClassId labels_[kBatch];
     std::size_t count_ = 0;
     TilePlaces places_;
-    std::vector<KnownTile> known_;           ///< tiles met last, by a few bits of their index
-    std::size_t size_ = 0;                   ///< of the two that follow; they are longer
+    std::vector<KnownTile> known_;           ///< a cache of recent tiles, by shortCode()
+    std::size_t size_ = 0;                   ///< points in the next two arrays, which may be longer
     std::vector<TilePoint> points_;          ///< of the chunk
-    std::vector<std::uint32_t> tile_of_;     ///< number of the tile of each
-    std::vector<std::uint32_t> tile_sizes_;  ///< points of each tile
+    std::vector<std::uint32_t> tile_of_;     ///< of each point: position of its tile in tiles_
+    std::vector<std::uint32_t> tile_sizes_;  ///< number of points in each tile
   };
 
-  /// Forgets all points. @param origin of the points in the map frame [m]. @param ordered whether inOrder is
-  /// to be called.
+  /// Forgets all points. @param origin of the points in the map frame [m]. @param ordered whether inOrder()
+  /// will be called.
   void start(const Eigen::Vector3d& origin, std::size_t chunks, const ThreadPool& pool, bool ordered);
-  /// Begins a chunk, to be ended by the same thread before it begins another one.
+  /// Starts a chunk. The same thread must close it before it opens another one.
   Input& open(std::size_t chunk, std::size_t worker);
   void close(std::size_t chunk, std::size_t worker);
 
-  /// Merges the points, once all chunks are closed.
+  /// Merges the points. Call after all chunks are closed.
   void finish(ThreadPool& pool);
-  std::size_t size() const { return size_; }  ///< points of the result
+  std::size_t size() const { return size_; }  ///< number of merged points
 
-  /// The result is split into groups, the same for any number of workers. Points of a group are near each
-  /// other.
+  /// The merged points come in groups of points that are close together. The groups do not depend on the
+  /// number of workers.
   std::size_t groups() const { return used_groups_; }
   const MergedPoints& merged(std::size_t group) const { return groups_[group].merged; }
 
-  /// The result in the order in which cells were first hit.
+  /// Writes the merged points in the order of their cells' first points.
   void inOrder(ThreadPool& pool, LabelledPoints& output);
 
  private:
   struct alignas(kThreadsApart) Chunk {
     IndexNumbering tiles;
-    std::vector<std::uint32_t> begin;  ///< of each tile's points; one more than tiles
-    std::vector<TilePoint> points;     ///< by tile
-    // Where the order counts:
-    std::vector<std::uint32_t> place;    ///< of each point in the chunk as it was filled
-    std::vector<std::uint32_t> cell_of;  ///< by that place: group and cell of which this is the first point
-    std::size_t output = 0;              ///< where its cells begin in the ordered result
+    std::vector<std::uint32_t> begin;  ///< of each tile's points; one element more than tiles
+    std::vector<TilePoint> points;     ///< sorted by tile
+    // Used only if `ordered`:
+    std::vector<std::uint32_t> offset;   ///< of each point in the order of add()
+    std::vector<std::uint32_t> cell_of;  ///< by that offset: cell whose first point it is, or kNoPosition
+    std::size_t output = 0;              ///< offset of the chunk's first cell in the ordered result
   };
-  /// Points of one tile in one chunk.
+  /// The points of one tile in one chunk.
   struct Run {
     std::uint32_t chunk, begin, end;
     std::uint32_t size() const { return end - begin; }
   };
-  /// Consecutive tiles.
+  /// Consecutive tiles and their merged points.
   struct alignas(kThreadsApart) Group {
     std::uint32_t first_tile, end_tile;
     MergedPoints merged;
@@ -122,9 +124,9 @@ class Downsampler {
   std::optional<TileGrid> grid_;
   std::size_t used_ = 0, used_groups_ = 0, size_ = 0;
   std::vector<Chunk> chunks_;
-  std::vector<Input> inputs_;        ///< one a worker
-  std::vector<CellMerger> mergers_;  ///< one a worker
-  OrderedQueue turns_;               ///< of chunks, to hand their runs to
+  std::vector<Input> inputs_;        ///< one for each worker
+  std::vector<CellMerger> mergers_;  ///< one for each worker
+  OrderedQueue queue_;               ///< of closed chunks, whose runs are collected in order
   RunsByIndex<Run> tiles_;
   std::vector<Group> groups_;
 };

@@ -11,41 +11,40 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::uint32_t kNone = IndexNumbering::kNone;
-/// A kernel longer than this reaches a centre of its own voxel wherever the point is: half a diagonal
-/// [voxels].
-constexpr float kHalfDiagonal = 0.8661f;
-
-/// The 3 x 3 x 3 blocks around one, as TilePlaces::reached numbers them.
-struct Away {
+/// The offset of one of the 3 x 3 x 3 blocks around a block from that block.
+struct Neighbour {
   int blocks[3];
   float voxels[3];
 };
-constexpr std::array<Away, 27> kAway = [] {
-  std::array<Away, 27> around{};
-  for (int code = 0; code < 27; ++code) {
-    Away& away = around[static_cast<std::size_t>(code)];
-    away = {{code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1}, {}};
+/// In the order of the bits of TilePlaces::reached.
+constexpr std::array<Neighbour, 27> kNeighbours = [] {
+  std::array<Neighbour, 27> neighbours{};
+  for (int bit = 0; bit < 27; ++bit) {
+    Neighbour& offset = neighbours[static_cast<std::size_t>(bit)];
+    offset = {{bit % 3 - 1, bit / 3 % 3 - 1, bit / 9 - 1}, {}};
     for (int axis = 0; axis < 3; ++axis)
-      away.voxels[axis] = static_cast<float>(kBlockEdge * away.blocks[axis]);
+      offset.voxels[axis] = static_cast<float>(kBlockEdge * offset.blocks[axis]);
   }
-  return around;
+  return neighbours;
 }();
-constexpr std::size_t kHome = 13;
+/// The block itself.
+constexpr std::size_t kContaining = 13;
 
-/// A point is kept in each block that it reaches; this many take a gigabyte.
+/// A point is stored once for each block that it reaches; this many copies take a gigabyte.
 constexpr double kMostBinned = 1 << 26;
 
-/// Appends point i of the batch to a block. @param away of the block from the point's own [voxels].
+/// Appends point i of the batch to a block. @param block position in group.blocks. @param offset of the block
+/// from the point's containing block [voxels]. @param voxel offset of the point's voxel, or
+/// LocalPoint::kOutside.
 template <typename Scratch, typename Group>
-[[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* away,
+[[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* offset,
                                           std::int32_t voxel, Scratch& scratch, Group& group) {
   if (block + 1 == group.begin.size()) group.begin.push_back(0);
   ++group.begin[block + 1];
   LocalPoint& point = scratch.points[scratch.size];
-  point.x = scratch.places.inside[0][i] - away[0];
-  point.y = scratch.places.inside[1][i] - away[1];
-  point.z = scratch.places.inside[2][i] - away[2];
+  point.x = scratch.places.inside[0][i] - offset[0];
+  point.y = scratch.places.inside[1][i] - offset[1];
+  point.z = scratch.places.inside[2][i] - offset[2];
   point.label = scratch.labels[i];
   point.voxel = static_cast<std::uint16_t>(voxel);
   scratch.block[scratch.size++] = block;
@@ -62,76 +61,79 @@ PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, co
   }
 }
 
-/// For kernels that reach the blocks next to a point's own and no others.
-void PointBins::binNear(std::size_t count, Scratch& scratch, Group& group) const {
+/// For kernels that always reach the containing block, and at most its neighbours.
+void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& group) const {
   for (std::size_t i = 0; i < count; ++i) {
-    const GridIndex home = scratch.places.tileOf(i);
-    if (scratch.home != home) {
-      scratch.home = home;
-      scratch.near.fill(kNone);
+    const GridIndex containing = scratch.places.tileOf(i);
+    if (scratch.containing != containing) {
+      scratch.containing = containing;
+      scratch.neighbours.fill(kNoPosition);
     }
     for (auto left = static_cast<std::uint32_t>(scratch.places.reached[i]); left != 0; left &= left - 1) {
-      const auto code = static_cast<std::size_t>(__builtin_ctz(left));
-      const Away& away = kAway[code];
-      std::uint32_t& near = scratch.near[code];
-      if (near == kNone)
-        near =
-            group.blocks.insert({home.x + away.blocks[0], home.y + away.blocks[1], home.z + away.blocks[2]});
-      append(near, i, away.voxels, code == kHome ? scratch.places.cell[i] : LocalPoint::kOutside, scratch,
-             group);
+      const auto bit = static_cast<std::size_t>(__builtin_ctz(left));
+      const Neighbour& offset = kNeighbours[bit];
+      std::uint32_t& block = scratch.neighbours[bit];
+      if (block == kNoPosition) {
+        block = group.blocks.insert({containing.x + offset.blocks[0], containing.y + offset.blocks[1],
+                                     containing.z + offset.blocks[2]});
+      }
+      append(block, i, offset.voxels, bit == kContaining ? scratch.places.cell[i] : LocalPoint::kOutside,
+             scratch, group);
     }
   }
 }
 
-/// For any kernel.
-void PointBins::binFar(std::size_t i, Scratch& scratch, Group& group) const {
-  const GridIndex home = scratch.places.tileOf(i);
+/// For kernels of any length.
+void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
+  const GridIndex containing = scratch.places.tileOf(i);
   const double reach = kernel_.reach;
-  const AxisBlocks xs(home.x, scratch.places.inside[0][i], reach),
-      ys(home.y, scratch.places.inside[1][i], reach), zs(home.z, scratch.places.inside[2][i], reach);
-  // A kernel may reach hundreds of blocks.
-  const std::size_t room = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
-  if (scratch.points.size() < room) {
-    scratch.block.resize(room);
-    scratch.points.resize(room);
+  const AxisBlocks xs(containing.x, scratch.places.inside[0][i], reach),
+      ys(containing.y, scratch.places.inside[1][i], reach),
+      zs(containing.z, scratch.places.inside[2][i], reach);
+  // A long kernel may reach hundreds of blocks.
+  const std::size_t needed = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
+  if (scratch.points.size() < needed) {
+    scratch.block.resize(needed);
+    scratch.points.resize(needed);
   }
-  bool at_home = false;
+  bool reaches_containing = false;
   for (const AxisBlock& bz : zs) {
     for (const AxisBlock& by : ys) {
       for (const AxisBlock& bx : xs) {
         if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
         const GridIndex block{bx.block, by.block, bz.block};
-        const float away[3] = {static_cast<float>(kBlockEdge * (block.x - home.x)),
-                               static_cast<float>(kBlockEdge * (block.y - home.y)),
-                               static_cast<float>(kBlockEdge * (block.z - home.z))};
-        append(group.blocks.insert(block), i, away,
-               block == home ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
-        at_home |= block == home;
+        const float offset[3] = {static_cast<float>(kBlockEdge * (block.x - containing.x)),
+                                 static_cast<float>(kBlockEdge * (block.y - containing.y)),
+                                 static_cast<float>(kBlockEdge * (block.z - containing.z))};
+        append(group.blocks.insert(block), i, offset,
+               block == containing ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
+        reaches_containing |= block == containing;
       }
     }
   }
-  // A kernel shorter than half a voxel's diagonal may reach no centre, but the point is in its voxel still.
-  if (home_always_ && !at_home) {
-    append(group.blocks.insert(home), i, kAway[kHome].voxels, scratch.places.cell[i], scratch, group);
+  // A kernel shorter than half a voxel's diagonal may reach no centre.
+  if (keep_containing_ && !reaches_containing) {
+    append(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels, scratch.places.cell[i],
+           scratch, group);
   }
 }
 
 void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) const {
-  const std::size_t room = scratch.size + 27 * count;
-  if (scratch.points.size() < room) {
-    scratch.points.resize(2 * room);
-    scratch.block.resize(2 * room);
+  const std::size_t needed = scratch.size + kNeighbours.size() * count;
+  if (scratch.points.size() < needed) {
+    scratch.points.resize(2 * needed);
+    scratch.block.resize(2 * needed);
   }
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
-      append(group.blocks.insert(scratch.places.tileOf(i)), i, kAway[kHome].voxels, scratch.places.cell[i],
-             scratch, group);
+      append(group.blocks.insert(scratch.places.tileOf(i)), i, kNeighbours[kContaining].voxels,
+             scratch.places.cell[i], scratch, group);
     }
-  } else if (kernel_.reach >= kHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
+  } else if (kernel_.reach >= kVoxelHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
     kernels_.reach_blocks(count, kernel_.reach, scratch.places);
-    binNear(count, scratch, group);
+    binToNeighbours(count, scratch, group);
   } else {
-    for (std::size_t i = 0; i < count; ++i) binFar(i, scratch, group);
+    for (std::size_t i = 0; i < count; ++i) binToAll(i, scratch, group);
   }
 }
 
@@ -152,7 +154,7 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
   group.blocks.clear();
   group.begin.assign(1, 0);
   scratch.size = 0;
-  scratch.near.fill(kNone);
+  scratch.neighbours.fill(kNoPosition);
   const std::size_t size = points.size();
   for (std::size_t begin = 0; begin < size; begin += kBatch) {
     const std::size_t count = std::min(size - begin, kBatch);
@@ -178,11 +180,11 @@ void PointBins::collectRuns(const Group& group) {
 
 void PointBins::start(std::size_t groups, const ThreadPool& pool) {
   one_class_ = true;
-  turns_.start(groups);
+  queue_.start(groups);
   blocks_.clear();
   if (groups_.size() < groups) groups_.resize(groups);
   scratch_.resize(pool.count());
-  // Who gets which group is chance: all have room for what one has met.
+  // Any worker may get any group, so give all of them the capacity of the largest.
   std::size_t points = 0;
   for (const Scratch& scratch : scratch_) points = std::max(points, scratch.points.size());
   for (Scratch& scratch : scratch_) {
@@ -191,21 +193,21 @@ void PointBins::start(std::size_t groups, const ThreadPool& pool) {
   }
 }
 
-void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool home_always,
+void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool keep_containing,
                           ThreadPool& pool) {
-  home_always_ = home_always;
-  // A ball about a point meets so many blocks in the mean.
-  const double blocks_a_point =
+  keep_containing_ = keep_containing;
+  // An estimate of the mean number of blocks that the kernel reaches.
+  const double blocks_per_point =
       kernel_.type == KernelType::kCounting
           ? 1.0
           : std::pow(2.0 * static_cast<double>(kernel_.reach) / kBlockEdge + 1.0, 3.0);
-  const double binned = static_cast<double>(points.size()) * blocks_a_point;
+  const double binned = static_cast<double>(points.size()) * blocks_per_point;
   if (binned > kMostBinned) throw TooMuchWork(TooMuchWork::What::kBlocks, binned);
   const TileGrid grid(geometry_, origin, kBlockEdge);
   start(points.groups(), pool);
   pool.forEach(points.groups(), [&](std::size_t g, std::size_t worker) {
     binGroup(grid, points.merged(g), scratch_[worker], groups_[g]);
-    turns_.finish(g, [this](std::size_t next) { collectRuns(groups_[next]); });
+    queue_.finish(g, [this](std::size_t next) { collectRuns(groups_[next]); });
   });
   blocks_.sort();
 }

@@ -24,19 +24,19 @@ const std::vector<GridIndex>& PointEvidence::touchedBlocks(const SemanticMap&, s
   return bins_.blocks().members();
 }
 
-void PointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
+void PointEvidence::markClasses(std::size_t position, ClassSet& classes) const {
   if (bins_.oneClass()) {
-    classes.set(bins_.begin(number)->points->label);
+    classes.set(bins_.begin(position)->points->label);
     return;
   }
   std::uint64_t bits = 0;
-  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) bits |= run->classes;
+  for (const PointRun* run = bins_.begin(position); run != bins_.end(position); ++run) bits |= run->classes;
   constexpr std::uint64_t kShared = std::uint64_t{1} << PointRun::kSharedBit;
   for (std::uint64_t left = bits & ~kShared; left != 0; left &= left - 1) {
     classes.set(static_cast<std::size_t>(__builtin_ctzll(left)));
   }
   if ((bits & kShared) == 0) return;
-  for (const PointRun* run = bins_.begin(number); run != bins_.end(number); ++run) {
+  for (const PointRun* run = bins_.begin(position); run != bins_.end(position); ++run) {
     for (std::size_t i = 0; i < run->count; ++i) classes.set(run->points[i].label);
   }
 }
@@ -110,18 +110,18 @@ void PointEvidence::sumBlock(std::size_t block, Workspace& workspace, BlockSums&
 }
 
 void PointEvidence::prefetch(std::size_t block) const {
-  constexpr std::size_t kPointsALine = 64 / sizeof(LocalPoint), kMostLines = 16;
+  constexpr std::size_t kPointsPerLine = 64 / sizeof(LocalPoint), kMostLines = 16;
   for (const PointRun* run = bins_.begin(block); run != bins_.end(block); ++run) {
-    const std::size_t end = std::min(run->count, kMostLines * kPointsALine);
-    for (std::size_t i = 0; i < end; i += kPointsALine) __builtin_prefetch(run->points + i);
+    const std::size_t end = std::min(run->count, kMostLines * kPointsPerLine);
+    for (std::size_t i = 0; i < end; i += kPointsPerLine) __builtin_prefetch(run->points + i);
   }
 }
 
 void PointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t worker,
                                SumSink& sink) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (b + 1 < blocks.size()) prefetch(blocks[b + 1].number);
-    sumBlock(blocks[b].number, workspaces_[worker], sink.open(b));
+    if (b + 1 < blocks.size()) prefetch(blocks[b + 1].position);
+    sumBlock(blocks[b].position, workspaces_[worker], sink.open(b));
     sink.close();
   }
 }

@@ -1,4 +1,4 @@
-/// @file Evidence of points: hits, or samples of free space.
+/// @file Evidence of points: hits or free samples.
 #pragma once
 
 #include <array>
@@ -9,12 +9,13 @@
 
 namespace bki_mapping {
 
-/// Adds k(|x - c|) to the class of each point x, for every voxel centre c within the kernel's length; with
-/// the counting kernel 1 for the voxel that holds the point. Keeps its memory from scan to scan.
+/// Adds k(|x - c|) to the class of each point x at every voxel centre c within the support radius; with the
+/// counting kernel, 1 at the voxel that contains the point. Equations (3) and (4) of docs/method.md. Keeps
+/// its memory from scan to scan.
 class PointEvidence : public Evidence {
  public:
-  /// @param reports_voxels whether the voxels that hold a point are reported (BlockSums::occupied).
-  /// @param instruction_set one of instructionSets(); the best there is if empty.
+  /// @param reports_voxels whether to report the voxels that contain a point (BlockSums::occupied).
+  /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
   /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels = false,
                 const std::string& instruction_set = "");
@@ -24,29 +25,29 @@ class PointEvidence : public Evidence {
   void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool);
   std::size_t size() const { return size_; }  ///< number of points
 
-  /// Exactly the blocks with a voxel centre within reach of a point, or, if voxels are reported, with a
-  /// point.
+  /// Exactly the blocks that have a voxel centre within reach of a point and, if voxels are reported, those
+  /// that contain a point.
   const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
-  void markClasses(std::size_t number, ClassSet& classes) const override;
+  void markClasses(std::size_t position, ClassSet& classes) const override;
   void reserve(std::size_t workers) override;
   void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
                   SumSink& sink) override;
 
  private:
-  /// Working memory of one thread: the points of a block, class by class.
+  /// Working memory of one thread: the points of a block, sorted by class.
   struct alignas(kThreadsApart) Workspace {
     std::vector<LocalPoint> points;
   };
-  /// Where the points of each class begin.
+  /// The position of the first point of each class.
   using ClassBegins = std::array<std::uint32_t, kMaxClasses + 3>;
 
-  /// Brings the points of a block into the workspace, class by class. @return how many they are.
+  /// Copies the points of a block to the workspace, sorted by class. @return their number.
   std::size_t sortByClass(std::size_t block, Workspace& workspace, ClassBegins& begin) const;
   void sumBlock(std::size_t block, Workspace& workspace, BlockSums& sums) const;
   /// Opens the plane of a class and sets it to the sums of the points.
   void sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const;
-  /// Fetches the points of a block.
+  /// Prefetches the points of a block.
   void prefetch(std::size_t block) const;
 
   VoxelKernel kernel_;

@@ -8,35 +8,36 @@ namespace bki_mapping {
 
 void SoftPointEvidence::bin(const Eigen::Vector3d& point, const ClassShare* begin, const ClassShare* end) {
   const VoxelIndex voxel = geometry_.voxelAt(point);
-  const BlockIndex home = GridGeometry::blockOf(voxel);
+  const BlockIndex containing = GridGeometry::blockOf(voxel);
   const auto offset = static_cast<std::uint16_t>(GridGeometry::offsetInBlock(voxel));
   const auto append = [&](const GridIndex& block, double x, double y, double z) {
-    const std::uint32_t number = blocks_.insert(block);
-    if (number == records_.size()) records_.emplace_back();
+    const std::uint32_t position = blocks_.insert(block);
+    if (position == records_.size()) records_.emplace_back();
     for (const ClassShare* s = begin; s != end; ++s) {
       const LocalPoint local{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z), s->id,
-                             block == home ? offset : LocalPoint::kOutside};
-      records_[number].push_back({local, s->share});
+                             block == containing ? offset : LocalPoint::kOutside};
+      records_[position].push_back({local, s->share});
     }
   };
   const Eigen::Vector3d p = point / geometry_.resolution();
-  const double x = p.x() - home.x * kBlockEdge - 0.5, y = p.y() - home.y * kBlockEdge - 0.5,
-               z = p.z() - home.z * kBlockEdge - 0.5;
-  bool at_home = false;
+  const double x = p.x() - containing.x * kBlockEdge - 0.5, y = p.y() - containing.y * kBlockEdge - 0.5,
+               z = p.z() - containing.z * kBlockEdge - 0.5;
+  bool reaches_containing = false;
   if (kernel_.type == KernelType::kSparse) {
     const double reach = kernel_.reach;
-    for (const AxisBlock& bz : AxisBlocks(home.z, z, reach)) {
-      for (const AxisBlock& by : AxisBlocks(home.y, y, reach)) {
-        for (const AxisBlock& bx : AxisBlocks(home.x, x, reach)) {
+    for (const AxisBlock& bz : AxisBlocks(containing.z, z, reach)) {
+      for (const AxisBlock& by : AxisBlocks(containing.y, y, reach)) {
+        for (const AxisBlock& bx : AxisBlocks(containing.x, x, reach)) {
           if (bx.distance2 + by.distance2 + bz.distance2 >= reach * reach) continue;
           const GridIndex block{bx.block, by.block, bz.block};
           append(block, bx.local, by.local, bz.local);
-          at_home |= block == home;
+          reaches_containing |= block == containing;
         }
       }
     }
   }
-  if (!at_home && (reports_voxels_ || kernel_.type == KernelType::kCounting)) append(home, x, y, z);
+  if (!reaches_containing && (reports_voxels_ || kernel_.type == KernelType::kCounting))
+    append(containing, x, y, z);
 }
 
 void SoftPointEvidence::setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points,
@@ -58,8 +59,8 @@ const std::vector<GridIndex>& SoftPointEvidence::touchedBlocks(const SemanticMap
   return blocks_.members();
 }
 
-void SoftPointEvidence::markClasses(std::size_t number, ClassSet& classes) const {
-  for (const Record& record : records_[number]) classes.set(record.point.label);
+void SoftPointEvidence::markClasses(std::size_t position, ClassSet& classes) const {
+  for (const Record& record : records_[position]) classes.set(record.point.label);
 }
 
 void SoftPointEvidence::sumRecord(const Record& record, float* sums) const {
@@ -94,7 +95,7 @@ void SoftPointEvidence::sumBlock(const std::vector<Record>& records, BlockSums& 
 void SoftPointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t,
                                    SumSink& sink) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    sumBlock(records_[blocks[b].number], sink.open(b));
+    sumBlock(records_[blocks[b].position], sink.open(b));
     sink.close();
   }
 }

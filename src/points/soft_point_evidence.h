@@ -1,4 +1,4 @@
-/// @file Evidence of hits whose class is not sure.
+/// @file Evidence of hits with soft labels.
 #pragma once
 
 #include <vector>
@@ -10,32 +10,32 @@
 
 namespace bki_mapping {
 
-/// As PointEvidence, but each point adds to each of its classes: share * k(|x - c|). For hits alone; not as
-/// fast.
+/// Like PointEvidence, but each point adds share * k(|x - c|) to each of its classes. Only for hits; slower.
 class SoftPointEvidence : public Evidence {
  public:
   /// @param reports_voxels as in PointEvidence.
   SoftPointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels)
       : geometry_(geometry), kernel_(kernel, geometry.resolution()), reports_voxels_(reports_voxels) {}
 
-  /// Replaces the points. @param origin of the points in the map frame [m]. @param soft one set a point.
+  /// Replaces the points. @param origin of the points in the map frame [m]. @param soft their shares.
   void setPoints(const Eigen::Vector3d& origin, const LabelledPoints& points, const SoftLabels& soft);
 
-  /// Exactly the blocks with a voxel centre within reach of a point, or, if voxels are reported, with a
-  /// point.
+  /// Exactly the blocks that have a voxel centre within reach of a point and, if voxels are reported, those
+  /// that contain a point.
   const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
-  void markClasses(std::size_t number, ClassSet& classes) const override;
+  void markClasses(std::size_t position, ClassSet& classes) const override;
   void reserve(std::size_t) override {}
   void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
                   SumSink& sink) override;
 
  private:
   struct Record {
-    LocalPoint point;  ///< its label is the class
+    LocalPoint point;  ///< labelled with the class of the share
     float share;
   };
 
+  /// Stores a point in every block that it reaches.
   void bin(const Eigen::Vector3d& point, const ClassShare* begin, const ClassShare* end);
   void sumRecord(const Record& record, float* sums) const;
   void sumBlock(const std::vector<Record>& records, BlockSums& sums) const;
@@ -44,7 +44,7 @@ class SoftPointEvidence : public Evidence {
   VoxelKernel kernel_;
   bool reports_voxels_;
   IndexNumbering blocks_;
-  std::vector<std::vector<Record>> records_;  ///< of each block, by class
+  std::vector<std::vector<Record>> records_;  ///< of each block, sorted by class
 };
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file Cubes of blocks, each updated by one thread in one go.
+/// @file Groups of blocks: the unit of work of an update.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@ namespace bki_mapping {
 
 /// A group has 4 x 4 x 4 blocks, 32 x 32 x 32 voxels.
 constexpr int kGroupEdge = 4;                          ///< [blocks]
-constexpr int kGroupVoxels = kGroupEdge * kBlockEdge;  ///< of an edge
+constexpr int kGroupVoxels = kGroupEdge * kBlockEdge;  ///< edge [voxels]
 constexpr int kGroupBlocks = kGroupEdge * kGroupEdge * kGroupEdge;
 
-/// Some blocks of a group: bit n is the block in slot n.
+/// A subset of the blocks of a group: bit n stands for the block in slot n.
 struct BlockGroup {
   GridIndex index;
   std::uint64_t blocks = 0;
@@ -23,11 +23,11 @@ inline GridIndex groupOf(const BlockIndex& block) {
   static_assert(kGroupEdge == 4 && -1 >> 2 == -1, "a shift divides by the edge, towards minus infinity");
   return {block.x >> 2, block.y >> 2, block.z >> 2};
 }
-/// The coordinate of a block from its group's first block on, along one axis.
+/// The coordinate of a block within its group along one axis, 0 to 3.
 inline int coordinateInGroup(std::int32_t coordinate) {
   return coordinate & (kGroupEdge - 1);
 }
-/// The slot of a block in its group, 0 to 63: x runs fastest.
+/// The slot of a block in its group, 0 to 63, x fastest.
 inline int slotInGroup(const BlockIndex& block) {
   return coordinateInGroup(block.x) +
          kGroupEdge * (coordinateInGroup(block.y) + kGroupEdge * coordinateInGroup(block.z));

@@ -1,4 +1,4 @@
-/// @file What one piece of evidence adds to one block.
+/// @file The sums that evidence adds to one block.
 #pragma once
 
 #include <vector>
@@ -10,12 +10,13 @@ namespace bki_mapping {
 /// One bit for each voxel of a block.
 using VoxelMask = std::bitset<kBlockVoxels>;
 
-/// Sums of k, or of w k, over the points or beams of a scan: a plane for each class. Keeps its memory.
+/// Sums of k, or of w k, over the points or beams of a scan, as one plane for each class. Keeps its memory
+/// when cleared.
 class BlockSums {
  public:
   struct Plane {
     alignas(64) float values[kBlockVoxels];
-    Block::Layers layers;  ///< all other values are 0
+    Block::Layers layers;  ///< those that may hold values other than 0
     ClassId label;
   };
 
@@ -23,24 +24,24 @@ class BlockSums {
     size_ = 0;
     occupied.reset();
   }
-  /// Takes memory for this many classes.
+  /// Allocates memory for this many classes.
   void reserve(std::size_t classes) {
     if (planes_.size() < classes) planes_.resize(classes);
   }
-  /// Adds the plane of a class that has none yet; its 512 values are to be set.
+  /// Adds the plane of a class that has none. The caller sets all 512 values.
   Plane& open(ClassId label) {
     Plane& plane = planes_[size_++];
     plane.layers = Block::Layers();
     plane.label = label;
     return plane;
   }
-  /// Takes back the plane opened last.
+  /// Removes the plane opened last.
   void drop() { --size_; }
 
   Plane* begin() { return planes_.data(); }
   Plane* end() { return planes_.data() + size_; }
 
-  VoxelMask occupied;  ///< voxels that hold a hit, where the evidence was asked for them
+  VoxelMask occupied;  ///< voxels that contain a hit, if the evidence reports them
 
  private:
   std::vector<Plane> planes_;

@@ -1,4 +1,4 @@
-/// @file What a scan says of the map: which blocks it touches, and what it adds there.
+/// @file Evidence of a scan: which blocks it touches, and what it adds to them.
 #pragma once
 
 #include <bitset>
@@ -12,50 +12,51 @@
 
 namespace bki_mapping {
 
-/// A set of classes, `free` among them.
+/// A set of classes; may contain kFreeClass.
 using ClassSet = std::bitset<256>;
 
-/// A block of a group, and its index in touchedBlocks().
+/// A block of a group, and its position in touchedBlocks().
 struct GroupBlock {
   BlockIndex index;
-  std::uint32_t number;
+  std::uint32_t position;
 };
 
-/// Something that a scan does to blocks, group by group. Owns the working memory of each thread.
+/// A step of the update that works on blocks, group by group. Owns the working memory of each thread.
 class BlockTask {
  public:
   virtual ~BlockTask() = default;
 
-  /// The blocks that the task may change, each once; too many are allowed. They stay until the next call.
-  /// @param map already has the blocks of the tasks that come earlier in the update.
-  /// @param most blocks, not counting those that are listed because they are in the map.
+  /// Lists the blocks that the task may change, each once; it may list too many. Valid until the next call.
+  /// @param map already holds the blocks of the earlier tasks of the update.
+  /// @param most limit of the number of blocks; blocks listed because the map holds them do not count.
   /// @throws TooMuchWork if there are more.
   virtual const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                                       ThreadPool& pool) = 0;
 
-  /// Takes all working memory that the scan can need, once touchedBlocks() was called: a scan that runs out
-  /// of memory halfway would leave half of itself in the map. @param workers threads that will work at once.
+  /// Allocates all working memory that the scan can need. Called after touchedBlocks() and before the map is
+  /// changed, so that a scan cannot run out of memory halfway. @param workers number of threads.
   virtual void reserve(std::size_t workers) = 0;
 
-  /// Grows with the time that a group will take, in any unit: costly groups start first.
+  /// Relative estimate of the time that a group takes, in any unit; the most costly groups start first.
   virtual double cost(const BlockGroup& /*group*/) const { return 0.0; }
 };
 
-/// Hits, or free space. Answers two questions: which blocks do you touch, and what do you add there? It
-/// writes to no block and knows no rule: MapUpdater applies the rules and adds.
+/// The evidence of hits or of free space. It lists the blocks that it touches, and computes the sums for
+/// them. MapUpdater applies the rules of the scan and adds the sums to the blocks.
 class Evidence : public BlockTask {
  public:
-  /// Adds to `classes` those to which accumulate() may add. @param number of a block in touchedBlocks().
-  virtual void markClasses(std::size_t number, ClassSet& classes) const = 0;
+  /// Inserts the classes for which accumulate() may hand over sums. @param position of the block in
+  /// touchedBlocks().
+  virtual void markClasses(std::size_t position, ClassSet& classes) const = 0;
 
-  /// Hands the sums of each of these blocks to the sink, in their order. Called once for each group with
-  /// touched blocks; from several threads at once, for different groups.
-  /// @param group with the bits of `blocks`. @param worker below the count given to reserve().
+  /// Hands the sums of each block to the sink, in the order of `blocks`. Called once for each group that has
+  /// touched blocks, and from several threads at once for different groups.
+  /// @param group the same blocks as bits. @param worker below the number given to reserve().
   virtual void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
                           SumSink& sink) = 0;
 };
 
-/// Marks on blocks that are not sums, made once the evidence of the scan has been added to the block.
+/// A step that sets marks on blocks after the evidence of the scan has been added to them.
 class BlockPass : public BlockTask {
  public:
   /// Marks one block. Called from several threads at once, for different blocks.

@@ -42,12 +42,12 @@ std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
 void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {
   for (std::size_t t = 0; t < task_count_; ++t) {
     const std::vector<GridIndex>& blocks = tasks_[t].work->touchedBlocks(map, limits.blocks, pool);
-    std::vector<std::uint32_t>& numbers = tasks_[t].numbers;
-    numbers.assign(jobs_.size(), kNone);
-    for (std::size_t number = 0; number < blocks.size(); ++number) {
-      const std::uint32_t job = jobOf(map, {blocks[number]});
-      if (job == numbers.size()) numbers.push_back(kNone);
-      numbers[job] = static_cast<std::uint32_t>(number);
+    std::vector<std::uint32_t>& positions = tasks_[t].positions;
+    positions.assign(jobs_.size(), kNoPosition);
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      const std::uint32_t job = jobOf(map, {blocks[b]});
+      if (job == positions.size()) positions.push_back(kNoPosition);
+      positions[job] = static_cast<std::uint32_t>(b);
     }
   }
 }
@@ -68,15 +68,15 @@ void MapUpdater::groupJobs() {
     groups_.push_back(group);
   }
   std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
-    return a.cost != b.cost ? a.cost > b.cost : a.number < b.number;
+    return a.cost != b.cost ? a.cost > b.cost : a.position < b.position;
   });
 }
 
-std::size_t MapUpdater::reservePlanes(Job& job, std::size_t number) {
+std::size_t MapUpdater::reservePlanes(Job& job, std::size_t position) {
   ClassSet classes;
   for (std::size_t t = 0; t < task_count_; ++t) {
-    const std::uint32_t there = tasks_[t].numberOf(number);
-    if (there != kNone && tasks_[t].evidence) tasks_[t].evidence->markClasses(there, classes);
+    const std::uint32_t touched = tasks_[t].positionOf(position);
+    if (touched != kNoPosition && tasks_[t].evidence) tasks_[t].evidence->markClasses(touched, classes);
   }
   const std::size_t count = classes.count();
   job.bytes_before = job.is_new ? 0 : job.block->bytes();
@@ -95,10 +95,10 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
   pool.forEach(groups_.size(), [&](std::size_t g, std::size_t) {
     std::ptrdiff_t of_group = 0;
     std::size_t classes = 0;
-    const std::size_t number = groups_[g].number;
-    constexpr std::ptrdiff_t kAhead = 4;
-    for (const std::uint32_t* job = group_jobs_.begin(number); job != group_jobs_.end(number); ++job) {
-      if (group_jobs_.end(number) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
+    const std::size_t position = groups_[g].position;
+    constexpr std::ptrdiff_t kAhead = 4;  // jobs; long enough to hide the latency of memory
+    for (const std::uint32_t* job = group_jobs_.begin(position); job != group_jobs_.end(position); ++job) {
+      if (group_jobs_.end(position) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
       Job& each = jobs_[*job];
       classes = std::max(classes, reservePlanes(each, *job));
       of_group += static_cast<std::ptrdiff_t>(each.block->bytes() - each.bytes_before);
@@ -132,13 +132,13 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
   to.blocks.clear();
   to.slots.clear();
   to.targets.clear();
-  for (const std::uint32_t* job = group_jobs_.begin(group.number); job != group_jobs_.end(group.number);
+  for (const std::uint32_t* job = group_jobs_.begin(group.position); job != group_jobs_.end(group.position);
        ++job) {
-    const std::uint32_t number = task.numberOf(*job);
-    if (number == kNone) continue;
+    const std::uint32_t touched = task.positionOf(*job);
+    if (touched == kNoPosition) continue;
     const int slot = slotInGroup(jobs_[*job].index);
     selected.blocks |= std::uint64_t{1} << slot;
-    to.blocks.push_back({jobs_[*job].index, number});
+    to.blocks.push_back({jobs_[*job].index, touched});
     to.slots.push_back(slot);
     to.targets.push_back(jobs_[*job].block);
   }
@@ -160,9 +160,9 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
         task.pass->apply(own.blocks[b], worker, *own.targets[b]);
     }
   }
-  for (const std::uint32_t* number = group_jobs_.begin(group.number); number != group_jobs_.end(group.number);
-       ++number) {
-    Job& job = jobs_[*number];
+  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
+       ++j) {
+    Job& job = jobs_[*j];
     job.empty = job.block->empty();
     const std::size_t after = job.empty ? 0 : job.block->bytes();
     job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
@@ -189,7 +189,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   stats.blocks = jobs_.size();
   stats.collect_ms = watch.lap();
 
-  // From here on nothing takes memory, so that nothing can fail.
+  // From here on nothing allocates memory, so that nothing can fail.
   const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], worker); };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add);

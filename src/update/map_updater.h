@@ -9,72 +9,72 @@
 
 namespace bki_mapping {
 
-/// What a scan says. Any of it may be missing.
+/// The evidence of one scan; any part may be nullptr.
 struct ScanEvidence {
   Evidence* hits = nullptr;
-  Evidence* free = nullptr;        ///< free space
-  BlockPass* occlusion = nullptr;  ///< marks, set after the sums
+  Evidence* free = nullptr;        ///< of free space
+  BlockPass* occlusion = nullptr;  ///< sets its marks after the sums are added
 };
 
 struct MapUpdateStats {
   std::size_t blocks = 0;      ///< that the scan may have touched
-  std::ptrdiff_t bytes = 0;    ///< by which the map's blocks grew
-  std::size_t not_finite = 0;  ///< voxels and classes for which evidence would not have stayed finite
+  std::ptrdiff_t bytes = 0;    ///< growth of the memory of the map's blocks
+  std::size_t not_finite = 0;  ///< sums refused because the evidence would not have stayed finite
   double collect_ms = 0.0;     ///< listing and allocating the blocks
   double update_ms = 0.0;      ///< adding to them
 };
 
-/// What an update may take.
+/// Limits of one update.
 struct UpdateLimits {
-  std::size_t blocks = std::numeric_limits<std::size_t>::max();  ///< that a piece of evidence may touch
-  std::size_t bytes = std::numeric_limits<std::size_t>::max();   ///< by which the map may grow
+  std::size_t blocks = std::numeric_limits<std::size_t>::max();  ///< that hits, or free space, may touch
+  std::size_t bytes = std::numeric_limits<std::size_t>::max();   ///< by which the map's memory may grow
 };
 
-/// Adds scans to maps, in three phases: collect the touched blocks and create them, reserve all memory, then
-/// add, one job a group of blocks. Only the first two can fail, and they are undone if they do. Keeps its
-/// memory from scan to scan.
+/// Adds scans to maps in three phases: collect the touched blocks and create those that are missing, reserve
+/// all memory, then add the sums, one job for each group of blocks. Only the first two phases can fail; they
+/// are then undone. Keeps its memory from scan to scan.
 class MapUpdater {
  public:
-  /// Adds a scan: hits, then free space, then marks, as the rules say. The result does not depend on the
-  /// number of threads, to the bit. Blocks about which nothing is known afterwards are not kept.
-  /// @throws TooMuchWork or std::bad_alloc; the map is then as it was.
+  /// Adds a scan: hits, then free space, then marks. The result is the same to the bit for any number of
+  /// threads. Blocks that are empty afterwards are erased.
+  /// @throws TooMuchWork or std::bad_alloc; the map is then unchanged.
   MapUpdateStats update(SemanticMap& map, const ScanEvidence& scan, ThreadPool& pool,
                         const UpdateRules& rules = UpdateRules(),
                         const UpdateLimits& limits = UpdateLimits());
 
-  /// The blocks that the last update may have changed, made or erased; each once.
+  /// The blocks that the last update may have changed, created or erased, each once.
   const std::vector<GridIndex>& touched() const { return touched_; }
 
  private:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
-
-  /// What is done to one block.
+  /// A touched block of the map.
   struct Job {
     BlockIndex index;
     Block* block;
     bool is_new;
-    std::size_t bytes_before;  ///< of the block; 0 if it is new
-    // Once done:
+    std::size_t bytes_before;  ///< memory of the block; 0 if it is new
+    // Set after adding:
     bool empty;
-    std::ptrdiff_t bytes;  ///< by which the block grew
+    std::ptrdiff_t bytes;  ///< growth of the block's memory
   };
 
   struct Group {
     BlockGroup blocks;
-    std::size_t number;  ///< in group_jobs_
+    std::size_t position;  ///< in group_jobs_.indices()
     double cost;
   };
 
-  /// A piece of evidence, or a pass.
+  /// One step of the update: evidence or a pass.
   struct Task {
-    BlockTask* work;     ///< one of those that follow
-    Evidence* evidence;  ///< nullptr if it is a pass
-    BlockPass* pass;
+    BlockTask* work;     ///< `evidence` or `pass`
+    Evidence* evidence;  ///< nullptr for a pass
+    BlockPass* pass;     ///< valid if `evidence` is nullptr
     SumSink::Kind kind;  ///< of the evidence
-    std::vector<std::uint32_t>
-        numbers;  ///< by job: the block's index in touchedBlocks(), or kNone; the rest: none
+    /// For each job, the block's position in touchedBlocks() or kNoPosition. Later jobs have kNoPosition.
+    std::vector<std::uint32_t> positions;
 
-    std::uint32_t numberOf(std::size_t job) const { return job < numbers.size() ? numbers[job] : kNone; }
+    std::uint32_t positionOf(std::size_t job) const {
+      return job < positions.size() ? positions[job] : kNoPosition;
+    }
   };
 
   /// Working memory of one thread: the blocks of a group that a task touches.
@@ -87,30 +87,31 @@ class MapUpdater {
 
   void setTasks(const ScanEvidence& scan);
   void collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool);
-  /// @return the number of a block's job, a new one if it has none yet.
+  /// @return the position of a block's job in jobs_; creates the job, and the block, if missing.
   std::uint32_t jobOf(SemanticMap& map, const BlockIndex& index);
   void groupJobs();
-  /// Takes the memory of all planes and all working memory that the jobs can need.
-  /// @param index_bytes by which the map's index has grown already.
+  /// Allocates all planes and all working memory that the jobs can need.
+  /// @param index_bytes growth of the map's index in this update.
   void reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
                ThreadPool& pool);
-  /// Takes the planes of a job's block. @return the classes that it can then have.
-  std::size_t reservePlanes(Job& job, std::size_t number);
-  /// Erases the blocks that this update made, and gives back what it took.
+  /// Reserves the planes of a job's block. @param position of the job in jobs_.
+  /// @return the number of classes to which this scan may add in the block.
+  std::size_t reservePlanes(Job& job, std::size_t position);
+  /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
-  /// @return the group with the blocks that a task touches, which it puts into the worker's memory.
+  /// Lists the blocks of a group that a task touches in the worker's memory. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
 
   std::vector<GridIndex> touched_;  ///< blocks, job by job
   std::vector<Job> jobs_;
-  /// By position in SemanticMap::entries(): number of the block's job. What an earlier update wrote there is
-  /// the number of no job now, or of another block's.
+  /// For each position in SemanticMap::entries(), the position of the block's job in jobs_. Entries may be
+  /// stale, from an earlier update; the index of the job tells.
   std::vector<std::uint32_t> job_of_entry_;
   RunsByIndex<std::uint32_t> group_jobs_;  ///< jobs by group
-  std::vector<Group> groups_;              ///< the most costly first
-  std::vector<Task> tasks_;                ///< in the order in which they are done
-  std::size_t task_count_ = 0;             ///< of this scan; tasks_ keeps the memory of more
+  std::vector<Group> groups_;              ///< by falling cost
+  std::vector<Task> tasks_;                ///< in the order of execution
+  std::size_t task_count_ = 0;             ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
 };
 

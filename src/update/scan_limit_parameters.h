@@ -1,4 +1,4 @@
-/// @file The limits of a scan by name.
+/// @file The named parameters of ScanLimitConfig.
 #pragma once
 
 #include <vector>

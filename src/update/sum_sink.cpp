@@ -29,11 +29,12 @@ void SumSink::close() {
     applyToFree(rules_, is_protected, sums_);
   }
   for (const BlockSums::Plane& plane : sums_) {
-    // A hit that protects its voxel may reach no centre; what is protected may be all that a beam reaches.
-    const bool nothing =
+    // A rule can leave a plane of zeros, which must not enter the map: a hit that protects its voxel may
+    // reach no voxel centre, and all voxels that a beam reaches may be protected.
+    const bool all_zero =
         rules_.protectsVoxels() && std::all_of(std::begin(plane.values), std::end(plane.values),
                                                [](float value) { return value == 0.0f; });
-    if (!nothing) not_finite_ += (*targets_)[current_]->add(plane.label, plane.values, plane.layers);
+    if (!all_zero) not_finite_ += (*targets_)[current_]->add(plane.label, plane.values, plane.layers);
   }
 }
 

@@ -1,4 +1,4 @@
-/// @file Where evidence hands over its sums.
+/// @file The receiver of the sums of evidence.
 #pragma once
 
 #include <array>
@@ -14,27 +14,27 @@ namespace bki_mapping {
 /// first the hits of all blocks, then their free space. One for each thread.
 class alignas(kThreadsApart) SumSink {
  public:
-  /// Before an update. @param classes that a block may have at most: their memory is taken here.
+  /// Call before an update. @param classes most classes for a block; their memory is allocated here.
   void reserve(const UpdateRules& rules, std::size_t classes);
-  /// Before a group.
+  /// Call before each group.
   void startGroup();
   enum class Kind { kHits, kFree };
-  /// Before a piece of evidence. @param slots of its blocks in the group, @param targets those blocks, in the
-  /// same order; both stay until the evidence is done.
+  /// Call before each piece of evidence. @param slots of its blocks in the group. @param targets those blocks
+  /// in the same order. Both must stay valid until the evidence is done.
   void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets);
 
-  /// For the evidence: the sums of its i-th block, which are empty.
+  /// For the evidence: returns the empty sums of its i-th block, to be filled.
   BlockSums& open(std::size_t i) {
-    // The next block's planes come from memory while this one's sums are computed.
+    // Prefetch the next block's planes while this block's sums are computed.
     if (i + 1 < targets_->size()) (*targets_)[i + 1]->prefetch();
     current_ = i;
     sums_.clear();
     return sums_;
   }
-  /// For the evidence: adds the sums to the block.
+  /// For the evidence: applies the rules to the sums, and adds them to the block.
   void close();
 
-  /// Voxels and classes for which evidence would not have stayed finite, since reserve().
+  /// Sums refused since reserve() because the evidence would not have stayed finite.
   std::size_t notFinite() const { return not_finite_; }
 
  private:

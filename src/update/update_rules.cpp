@@ -7,7 +7,7 @@ namespace bki_mapping {
 namespace {
 
 void limitHits(float most, BlockSums& hits) {
-  alignas(64) float kept[kBlockVoxels] = {};  // sums of all classes, then the fraction that is kept
+  alignas(64) float kept[kBlockVoxels] = {};  // the sum over all classes, then the fraction to keep
   for (const BlockSums::Plane& plane : hits) {
     for (int v = 0; v < kBlockVoxels; ++v) kept[v] += plane.values[v];
   }

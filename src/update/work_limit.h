@@ -1,4 +1,4 @@
-/// @file How large a scan may be.
+/// @file The exception for a scan that exceeds its limits.
 #pragma once
 
 #include <cstddef>
@@ -6,13 +6,13 @@
 
 namespace bki_mapping {
 
-/// A scan is larger than its limits: thrown before memory is taken for it, and turned into a sentence where
-/// the settings are known (SemanticMapper).
+/// A scan exceeds its limits. Thrown before memory is allocated for it; SemanticMapper, which knows the
+/// settings, turns it into a message with the remedy.
 class TooMuchWork : public std::exception {
  public:
   enum class What { kBlocks, kSamples, kBytes };
 
-  /// @param estimate of what the whole scan would take: blocks, samples or bytes of the map.
+  /// @param estimate of what the whole scan would need: blocks, samples or bytes of the map.
   TooMuchWork(What what, double estimate) : what_(what), estimate_(estimate) {}
   const char* what() const noexcept override { return "a scan is larger than its limits"; }
   What of() const { return what_; }
@@ -23,10 +23,10 @@ class TooMuchWork : public std::exception {
   double estimate_;
 };
 
-/// Refuses more blocks than a limit. @param blocks that are named already. @param share of the scan that
-/// named them, for an estimate of the whole.
-inline void limitBlocks(std::size_t blocks, std::size_t most, double share = 1.0) {
-  if (blocks > most) throw TooMuchWork(TooMuchWork::What::kBlocks, static_cast<double>(blocks) / share);
+/// @throws TooMuchWork if there are more than `most` blocks. @param fraction of the scan that these blocks
+/// come from; used to estimate the total.
+inline void limitBlocks(std::size_t blocks, std::size_t most, double fraction = 1.0) {
+  if (blocks > most) throw TooMuchWork(TooMuchWork::What::kBlocks, static_cast<double>(blocks) / fraction);
 }
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-// Bad and unwanted points are left out, each counted under its reason.
+// Bad and unwanted points are skipped, and each is counted under its reason.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -10,10 +10,10 @@
 namespace bki_mapping {
 namespace {
 
-PreprocessedScan observe(const Scan& scan, const MapperConfig& config) {
+PreprocessedScan preprocess(const Scan& scan, const MapperConfig& config) {
   ThreadPool pool(2);
-  ScanPreprocessor observer(config);
-  return observer.observe(scan, *reference::smallTable(), pool);
+  ScanPreprocessor preprocessor(config);
+  return preprocessor.process(scan, *reference::smallTable(), pool);
 }
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -40,8 +40,8 @@ TEST(PreprocessedScan, CountsEveryReason) {
   const Scan scan = scanOf(
       {{kNan, 1, 1}, {1, kInfinity, 1}, {0, 0, 0}, {0.2f, 0, 0}, {60, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}},
       {10, 10, 10, 10, 10, 10, 0, 77});
-  const PreprocessedScan seen = observe(scan, config);
-  const PointCounts& c = seen.counts;
+  const PreprocessedScan processed = preprocess(scan, config);
+  const PointCounts& c = processed.counts;
   EXPECT_EQ(c.points, 8u);
   EXPECT_EQ(c.not_finite, 2u);
   EXPECT_EQ(c.at_sensor, 1u);
@@ -53,8 +53,8 @@ TEST(PreprocessedScan, CountsEveryReason) {
   EXPECT_EQ(c.used, 1u);
   EXPECT_EQ(c.points, c.used + c.not_finite + c.at_sensor + c.too_near + c.beyond_max + c.outside_map +
                           c.unknown_label + c.unlabelled);
-  ASSERT_EQ(seen.beams.ends.size(), 2u);  // to the hit, and the one cut at max_range
-  EXPECT_NEAR(seen.beams.ends[1].x(), 50.0f, 1e-4f);
+  ASSERT_EQ(processed.beams.ends.size(), 2u);  // one to the hit, and one cut at max_range
+  EXPECT_NEAR(processed.beams.ends[1].x(), 50.0f, 1e-4f);
 }
 
 TEST(PreprocessedScan, PointsAtTheSensorsRangeAreNoReturnsWhereTheScanSaysSo) {
@@ -63,25 +63,25 @@ TEST(PreprocessedScan, PointsAtTheSensorsRangeAreNoReturnsWhereTheScanSaysSo) {
   config.clear_beyond_max_range = false;
   Scan scan = scanOf({{50, 0, 0}, {0, 49.999f, 0}, {0, 0, 50.001f}, {49.9f, 0, 0}, {50.1f, 0, 0}},
                      {10, 10, 10, 10, 10});
-  EXPECT_EQ(observe(scan, config).counts.used, 3u);
+  EXPECT_EQ(preprocess(scan, config).counts.used, 3u);
   scan.no_returns_at_max_range = true;
-  const PreprocessedScan seen = observe(scan, config);
-  EXPECT_EQ(seen.counts.no_returns, 3u);
-  EXPECT_EQ(seen.counts.used, 1u);
-  EXPECT_EQ(seen.counts.beyond_max, 1u);
-  EXPECT_EQ(seen.hits.points.size(), 1u);
-  EXPECT_EQ(seen.beams.ends.size(), 4u);  // three of them cut at 50 m
+  const PreprocessedScan processed = preprocess(scan, config);
+  EXPECT_EQ(processed.counts.no_returns, 3u);
+  EXPECT_EQ(processed.counts.used, 1u);
+  EXPECT_EQ(processed.counts.beyond_max, 1u);
+  EXPECT_EQ(processed.hits.points.size(), 1u);
+  EXPECT_EQ(processed.beams.ends.size(), 4u);  // three of them cut at 50 m
 }
 
 TEST(PreprocessedScan, UnlabelledIsAHitUnlessIgnored) {
   MapperConfig config = plainConfig();
   const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}}, {0, 77});
-  EXPECT_EQ(observe(scan, config).hits.labels, std::vector<ClassId>{0});
+  EXPECT_EQ(preprocess(scan, config).hits.labels, std::vector<ClassId>{0});
   config.unknown_labels = UnknownLabels::kUnlabelled;
-  const PreprocessedScan seen = observe(scan, config);
-  EXPECT_EQ(seen.hits.labels, (std::vector<ClassId>{0, 0}));
-  EXPECT_EQ(seen.counts.labels_not_in_table, 1u);
-  EXPECT_EQ(seen.counts.unknown_label, 0u);
+  const PreprocessedScan processed = preprocess(scan, config);
+  EXPECT_EQ(processed.hits.labels, (std::vector<ClassId>{0, 0}));
+  EXPECT_EQ(processed.counts.labels_not_in_table, 1u);
+  EXPECT_EQ(processed.counts.unknown_label, 0u);
 }
 
 TEST(PreprocessedScan, CountsEveryOneOfEqualLabels) {
@@ -90,16 +90,16 @@ TEST(PreprocessedScan, CountsEveryOneOfEqualLabels) {
     std::vector<Eigen::Vector3f> points;
     for (std::size_t n = 0; n < labels.size(); ++n)
       points.emplace_back(2.0f + static_cast<float>(n), 0.0f, 0.0f);
-    return observe(scanOf(points, labels), config);
+    return preprocess(scanOf(points, labels), config);
   };
   EXPECT_EQ(countsOf({77, 77, 10, 10, 77, 10}).counts.unknown_label, 3u);
   EXPECT_EQ(countsOf({10, 77, 10}).hits.labels.size(), 2u);
   config.unknown_labels = UnknownLabels::kUnlabelled;
-  const PreprocessedScan seen = countsOf({77, 77, 10, 0, 77, 0});
-  EXPECT_EQ(seen.counts.labels_not_in_table, 3u);
-  const ClassId car = seen.hits.labels[2];
+  const PreprocessedScan processed = countsOf({77, 77, 10, 0, 77, 0});
+  EXPECT_EQ(processed.counts.labels_not_in_table, 3u);
+  const ClassId car = processed.hits.labels[2];
   EXPECT_NE(car, 0);
-  EXPECT_EQ(seen.hits.labels, (std::vector<ClassId>{0, 0, car, 0, 0, 0}));
+  EXPECT_EQ(processed.hits.labels, (std::vector<ClassId>{0, 0, car, 0, 0, 0}));
   config.unlabelled_points = UnlabelledPoints::kIgnore;
   const PreprocessedScan fewer = countsOf({77, 77, 10, 0, 0, 10});
   EXPECT_EQ(fewer.counts.labels_not_in_table, 2u);
@@ -111,9 +111,9 @@ TEST(PreprocessedScan, LabelsMayBeIds) {
   MapperConfig config = plainConfig();
   config.label_values = LabelValues::kId;
   const Scan scan = scanOf({{2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 1, 1}}, {3, 10, 255, 4294967295u});
-  const PreprocessedScan seen = observe(scan, config);
-  EXPECT_EQ(seen.hits.labels, std::vector<ClassId>{3});
-  EXPECT_EQ(seen.counts.unknown_label, 3u);
+  const PreprocessedScan processed = preprocess(scan, config);
+  EXPECT_EQ(processed.hits.labels, std::vector<ClassId>{3});
+  EXPECT_EQ(processed.counts.unknown_label, 3u);
 }
 
 TEST(PreprocessedScan, PointsFarFromTheMapAreCounted) {
@@ -135,10 +135,10 @@ TEST(PreprocessedScan, ACentroidAtTheSensorIsAHitWithoutABeam) {
   config.downsample_resolution = 0.1;
   Scan scan = scanOf({{0.01f, 0, 0}, {-0.01f, 0, 0}, {3, 0, 0}}, {10, 10, 10});
   scan.origin = {0.05, 0.05, 0.05};  // in the middle of a cell
-  const PreprocessedScan seen = observe(scan, config);
-  EXPECT_EQ(seen.hits.points.size(), 2u);
-  ASSERT_EQ(seen.beams.ends.size(), 1u);
-  EXPECT_FLOAT_EQ(seen.beams.ends[0].x(), 3.0f);
+  const PreprocessedScan processed = preprocess(scan, config);
+  EXPECT_EQ(processed.hits.points.size(), 2u);
+  ASSERT_EQ(processed.beams.ends.size(), 1u);
+  EXPECT_FLOAT_EQ(processed.beams.ends[0].x(), 3.0f);
 }
 
 TEST(Mapper, SurvivesBeamsWhereCellsHaveNoIndex) {
@@ -156,7 +156,7 @@ TEST(Mapper, SurvivesBeamsWhereCellsHaveNoIndex) {
   }
 }
 
-TEST(PreprocessedScan, LabelsMustBeAsManyAsPoints) {
+TEST(PreprocessedScan, RefusesScansWithoutOneLabelForEachPoint) {
   SemanticMapper mapper(plainConfig(), reference::smallTable());
   EXPECT_THROW(mapper.integrate(scanOf({{1, 0, 0}}, {})), std::invalid_argument);
 }

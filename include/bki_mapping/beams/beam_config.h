@@ -1,4 +1,4 @@
-/// @file Settings of beam lines.
+/// @file Choices of the settings that concern beams.
 #pragma once
 
 namespace bki_mapping {

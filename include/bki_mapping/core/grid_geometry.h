@@ -7,34 +7,34 @@
 
 namespace bki_mapping {
 
-/// The largest whole number not above x. @param x within the range of an int. Unlike std::floor it needs no
-/// instruction beyond the basic set of a processor.
+/// The largest integer not above x. Unlike std::floor, it needs no instruction set beyond the baseline.
+/// @param x within the range of an int32.
 [[gnu::always_inline]] inline std::int32_t floorToInt(double x) {
   const auto towards_zero = static_cast<std::int32_t>(x);
   return towards_zero - static_cast<std::int32_t>(x < towards_zero);
 }
 
-/// So near to a face between two cells [cells] rounding of a quotient matters.
+/// Distance from a cell's face [cells] below which the rounding of a quotient can change the cell.
 constexpr double kFaceMargin = 1e-6;
 
 /// A grid of cubic voxels of edge `resolution` [m]; voxel (0,0,0) spans [0, resolution) on each axis.
 /// Blocks hold 8 x 8 x 8 voxels.
 class GridGeometry {
  public:
-  /// Largest magnitude of a voxel coordinate that points may have; farther points are refused.
+  /// Largest magnitude of a voxel's coordinates; points farther from the map's origin are refused.
   static constexpr double kMaxCoordinate = 1 << 28;
 
   /// @param resolution edge of a voxel [m], > 0.
   explicit GridGeometry(double resolution) : resolution_(resolution), per_metre_(1.0 / resolution) {}
 
   double resolution() const { return resolution_; }
-  double blockSize() const { return resolution_ * kBlockEdge; }  ///< [m]
+  double blockSize() const { return resolution_ * kBlockEdge; }  ///< edge of a block [m]
 
-  /// True for finite points whose voxel has a valid index.
+  /// Whether the point is finite and its voxel has a valid index.
   bool contains(const Eigen::Vector3d& point) const {
     return (point.array().abs() < kMaxCoordinate * resolution_).all();  // false for NaN
   }
-  /// All points nearer to `origin` than that have one [m]; 0 or less if there are none.
+  /// A radius about `origin` within which every point has a valid index [m]; 0 or less if there is none.
   float safeRange(const Eigen::Vector3d& origin) const {
     return static_cast<float>(kMaxCoordinate * resolution_ * (1.0 - 1e-6) - origin.cwiseAbs().maxCoeff());
   }
@@ -55,7 +55,7 @@ class GridGeometry {
   static BlockIndex blockOf(const VoxelIndex& v) {
     return {{floorDivide(v.x), floorDivide(v.y), floorDivide(v.z)}};
   }
-  /// Place of a voxel in its block's planes, x fastest: x + 8 y + 64 z of its offsets.
+  /// Offset of a voxel in the planes of its block: x + 8 y + 64 z, with x, y and z counted within the block.
   static int offsetInBlock(const VoxelIndex& v) {
     const int m = kBlockEdge - 1;
     return (v.x & m) + kBlockEdge * ((v.y & m) + kBlockEdge * (v.z & m));
@@ -67,7 +67,7 @@ class GridGeometry {
 
  private:
   std::int32_t cell(double metres) const {
-    // The quotient, but for rounding, without a division; near a face between two cells rounding matters.
+    // A product is faster than the exact quotient, which decides only next to a cell's face.
     const double quotient = metres * per_metre_;
     const std::int32_t floor = floorToInt(quotient);
     const double above = quotient - floor;

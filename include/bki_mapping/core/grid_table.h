@@ -1,4 +1,4 @@
-/// @file A hash table from grid indices to numbers.
+/// @file A hash table from grid indices to positions in an array.
 #pragma once
 
 #include <cstdint>
@@ -9,41 +9,40 @@
 
 namespace bki_mapping {
 
-/// Maps grid indices to numbers: open addressing with linear probing, at most half full. Keeps its memory
+/// Maps grid indices to positions by open addressing with linear probing; at most half full. Keeps its memory
 /// when cleared.
 class GridTable {
  public:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
-
-  /// @return the number of an index, or kNone.
+  /// @return the position of an index, or kNoPosition.
   std::uint32_t find(const GridIndex& index) const {
-    return slots_.empty() ? kNone : slots_[slotOf(index)].number;
+    return slots_.empty() ? kNoPosition : slots_[slotOf(index)].position;
   }
-  /// Gives an index its number unless it has one. @param number not kNone. @return the number it has now.
-  std::uint32_t insert(const GridIndex& index, std::uint32_t number) {
+  /// Inserts an index with its position unless it is present. @param position not kNoPosition.
+  /// @return the position that the table now has for the index.
+  std::uint32_t insert(const GridIndex& index, std::uint32_t position) {
     if (2 * (size_ + 1) > slots_.size()) grow();
     Slot& slot = slots_[slotOf(index)];
-    if (slot.number == kNone) {
-      slot = {index, number};
+    if (slot.position == kNoPosition) {
+      slot = {index, position};
       ++size_;
     }
-    return slot.number;
+    return slot.position;
   }
-  /// Changes the number of an index that is in the table.
-  void set(const GridIndex& index, std::uint32_t number) { slots_[slotOf(index)].number = number; }
+  /// Changes the position of an index that is in the table.
+  void set(const GridIndex& index, std::uint32_t position) { slots_[slotOf(index)].position = position; }
 
   void erase(const GridIndex& index) {
-    if (slots_.empty() || slots_[slotOf(index)].number == kNone) return;
+    if (slots_.empty() || slots_[slotOf(index)].position == kNoPosition) return;
     std::size_t hole = slotOf(index);
-    // Members behind the hole that were pushed past it move up (Knuth, TAOCP 3, algorithm 6.4 R).
-    for (std::size_t s = next(hole); slots_[s].number != kNone; s = next(s)) {
-      const std::size_t home = GridIndexHash()(slots_[s].index) & mask();
-      if (((s - home) & mask()) >= ((s - hole) & mask())) {
+    // Move later entries back so that no probe sequence meets a hole (Knuth, TAOCP 3, algorithm 6.4 R).
+    for (std::size_t s = next(hole); slots_[s].position != kNoPosition; s = next(s)) {
+      const std::size_t preferred = GridIndexHash()(slots_[s].index) & mask();
+      if (((s - preferred) & mask()) >= ((s - hole) & mask())) {
         slots_[hole] = slots_[s];
         hole = s;
       }
     }
-    slots_[hole].number = kNone;
+    slots_[hole].position = kNoPosition;
     --size_;
   }
 
@@ -57,22 +56,22 @@ class GridTable {
  private:
   struct Slot {
     GridIndex index;
-    std::uint32_t number = kNone;
+    std::uint32_t position = kNoPosition;
   };
 
   std::size_t mask() const { return slots_.size() - 1; }
   std::size_t next(std::size_t slot) const { return (slot + 1) & mask(); }
-  /// Where an index is, or would be put.
+  /// The slot that holds an index, or the free slot that would.
   std::size_t slotOf(const GridIndex& index) const {
     std::size_t slot = GridIndexHash()(index) & mask();
-    while (slots_[slot].number != kNone && slots_[slot].index != index) slot = next(slot);
+    while (slots_[slot].position != kNoPosition && slots_[slot].index != index) slot = next(slot);
     return slot;
   }
   void grow() {
     std::vector<Slot> old(slots_.empty() ? 64 : 2 * slots_.size());
     slots_.swap(old);
     for (const Slot& slot : old) {
-      if (slot.number != kNone) slots_[slotOf(slot.index)] = slot;
+      if (slot.position != kNoPosition) slots_[slotOf(slot.index)] = slot;
     }
   }
 

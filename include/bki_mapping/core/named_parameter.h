@@ -1,4 +1,4 @@
-/// @file How a setting gets a name: one description serves files, command lines, ROS and the documentation.
+/// @file Named parameters: one description of each setting for files, command lines, ROS and the documents.
 #pragma once
 
 #include <algorithm>
@@ -14,21 +14,20 @@
 
 namespace bki_mapping {
 
-/// The largest evidence, gain or kernel value that a parameter allows: sums of larger ones could exceed a
-/// float.
+/// The largest evidence, gain or kernel value that a parameter allows. Larger ones could overflow a float.
 constexpr double kMostEvidence = 1e9;
 
-/// The numbers that a parameter may have. Neither infinity nor NaN is one.
+/// The values that a numeric parameter allows. Infinity and NaN are never allowed.
 class NumberRange {
  public:
   static NumberRange any() { return {}; }
   static NumberRange atLeast(double least);
   static NumberRange above(double least);  ///< `least` itself is not allowed
-  /// The same, but nothing above `most`.
+  /// This range with an upper limit.
   NumberRange upTo(double most) const;
-  /// The same, and one value more. @param meaning of that value; "": the description gives it.
+  /// This range and one more value. @param meaning of that value; "" if the description gives it.
   NumberRange orElse(double value, const std::string& meaning = "") const;
-  /// The same numbers; sliders show only those from `least` to `most`.
+  /// This range with narrower limits for sliders.
   NumberRange slider(double least, double most) const;
 
   bool allows(double value) const;
@@ -53,12 +52,12 @@ enum class Changes {
   kWhileMapping,  ///< at any time; the map stays
 };
 
-/// What a user learns of a parameter.
+/// What the user interfaces show of a parameter.
 struct ParameterFacts {
   std::string name;  ///< with `/` between the parts, as in ROS
   ParameterType type = ParameterType::kText;
   std::string values;       ///< the values allowed, in words
-  std::string unit;         ///< "" where it has none
+  std::string unit;         ///< "" if it has none
   std::string description;  ///< what it does, and what to set it to
   Changes changes = Changes::kAtStart;
   std::vector<std::string> words;  ///< the values of a kWord or kTruth
@@ -67,11 +66,11 @@ struct ParameterFacts {
   bool changesWhileMapping() const { return changes == Changes::kWhileMapping; }
 };
 
-/// @throws std::invalid_argument that names the parameter, the value, the values allowed and the nearest
-/// word.
+/// @throws std::invalid_argument that names the parameter, the value, the allowed values and the closest
+/// word among them.
 [[noreturn]] void refuseValue(const ParameterFacts& parameter, const std::string& value);
 
-/// @throws std::invalid_argument: the parameter changes only at the start.
+/// @throws std::invalid_argument that says that the parameter can change only at the start.
 [[noreturn]] void refuseChange(const ParameterFacts& parameter);
 
 /// One named setting of a struct `Config`. Values are text as YAML writes it.
@@ -80,8 +79,8 @@ struct NamedParameter : ParameterFacts {
   /// Sets the value; false, with `config` unchanged, if it is not allowed.
   std::function<bool(Config&, const std::string& value)> assign;
   std::function<std::string(const Config&)> get;
-  std::function<bool(const Config&)> allowed;               ///< whether the value in a Config is
-  std::function<bool(const Config&, const Config&)> equal;  ///< whether two have the same value, to the bit
+  std::function<bool(const Config&)> allowed;               ///< whether the value in a Config is allowed
+  std::function<bool(const Config&, const Config&)> equal;  ///< whether both values are the same to the bit
 
   /// Sets the value. @throws std::invalid_argument (refuseValue).
   void set(Config& config, const std::string& value) const {
@@ -93,26 +92,25 @@ struct NamedParameter : ParameterFacts {
   }
 };
 
-/// "; did you mean 'X'?" for the known word nearest in spelling; "" where none is near.
+/// "; did you mean 'X'?" for the known word closest in spelling; "" if none is close.
 std::string nearestWord(const std::string& word, const std::vector<std::string>& known);
 
 /// "one of X, Y", or "true or false".
 std::string wordsText(const std::vector<std::string>& words);
-/// Where `word` stands in `words`; nothing if it does not.
+/// The position of `word` in `words`; no value if it is missing.
 std::optional<std::size_t> indexOf(const std::vector<std::string>& words, const std::string& word);
 
-/// The shortest text that names a number to 15 digits; integers up to 2^53 with all their digits.
+/// The shortest text of a number that keeps 15 digits; integers up to 2^53 keep all of theirs.
 std::string numberText(double value);
-/// The number that a whole text names; NaN if it names none.
+/// The number that the whole text spells; NaN if it spells none.
 double parseNumber(const std::string& text);
 
-/// Text of unknown origin as part of a sentence: whoever sends it must not choose how long the sentence is,
-/// nor what it does to a terminal. Control characters become '?', and what is longer than `most` bytes is
-/// cut.
+/// Makes text of unknown origin safe to quote in a message: it is cut after `most` bytes, so that it cannot
+/// flood a log, and control characters become '?', so that they cannot reach a terminal.
 std::string shortText(const std::string& text, std::size_t most = 100);
 
 /// The member `field` as a parameter.
-/// @param parse std::optional<Value>(text), without a value if the text names none that is allowed.
+/// @param parse std::optional<Value>(text), without a value if the text spells no allowed value.
 /// @param print text(Value). @param allows bool(Value).
 template <typename Config, typename Value, typename Parse, typename Print, typename Allows>
 NamedParameter<Config> memberParameter(ParameterFacts facts, Value Config::*field, Parse parse, Print print,
@@ -141,7 +139,7 @@ NamedParameter<Config> realParameter(const std::string& name, double Config::*fi
                                  field, parse, numberText, allows);
 }
 
-/// @param range within what Value and a double hold.
+/// @param range of integers that both Value and double represent exactly.
 template <typename Config, typename Value>
 NamedParameter<Config> integerParameter(const std::string& name, Value Config::*field,
                                         const NumberRange& range, Changes changes,
@@ -158,7 +156,7 @@ NamedParameter<Config> integerParameter(const std::string& name, Value Config::*
                                  field, parse, print, allows);
 }
 
-/// One of several words. @param words in the order of the enumeration Value, or of false and true.
+/// A choice between words. @param words in the order of the enumeration Value, or of false and true.
 template <typename Config, typename Value>
 NamedParameter<Config> choiceParameter(const std::string& name, Value Config::*field,
                                        const std::vector<std::string>& words, Changes changes,
@@ -185,7 +183,7 @@ NamedParameter<Config> truthParameter(const std::string& name, bool Config::*fie
   return parameter;
 }
 
-/// One of several words, kept as text.
+/// A choice between words that is stored as text.
 template <typename Config>
 NamedParameter<Config> wordParameter(const std::string& name, std::string Config::*field,
                                      const std::vector<std::string>& words, Changes changes,
@@ -200,7 +198,7 @@ NamedParameter<Config> wordParameter(const std::string& name, std::string Config
                                  field, parse, print, allows);
 }
 
-/// Any text. @param values what the text means, in words.
+/// Any text. @param values what the text means.
 template <typename Config>
 NamedParameter<Config> textParameter(const std::string& name, std::string Config::*field,
                                      const std::string& values, Changes changes,
@@ -211,7 +209,7 @@ NamedParameter<Config> textParameter(const std::string& name, std::string Config
                                  field, parse, same, [](const std::string&) { return true; });
 }
 
-/// Appends the parameters of the member `part`. @param prefix put before their names.
+/// Appends the parameters of the member `part`. @param prefix of their names.
 template <typename Config, typename Part>
 void appendParameters(std::vector<NamedParameter<Config>>& parameters, const std::string& prefix,
                       Part Config::*part, const std::vector<NamedParameter<Part>>& of_part) {

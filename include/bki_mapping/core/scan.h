@@ -13,39 +13,41 @@
 
 namespace bki_mapping {
 
-/// How near to max_range a point is at it, as a share of max_range: 1 cm at 100 m, more than clouds round by.
+/// Relative tolerance for treating a point as being at max_range (1 cm at 100 m); covers drivers' rounding.
 constexpr double kAtMaxRange = 1e-4;
 
-/// The hits of one sweep. Points are kept relative to the sensor so that single precision is enough
-/// however far the map's origin is away.
+/// The hits of one sweep. Points are relative to the sensor, so that single precision is enough however far
+/// the sensor is from the map's origin.
 struct Scan {
-  /// Sensor origin in the map frame [m]; where the beams start.
+  /// Sensor origin in the map frame [m], where the beams start.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   /// Hits relative to `origin`, in the axes of the map frame [m].
   std::vector<Eigen::Vector3f> points;
-  /// The label of each hit, as `label_values` says; as long as `points`.
+  /// The label of each hit, encoded as `label_values` says; as long as `points`.
   std::vector<std::uint32_t> labels;
-  /// Whether `labels` are ids of the class table, whatever `label_values` says.
+  /// Whether `labels` are ids of the class table; overrides `label_values`.
   bool labels_are_ids = false;
-  /// Shares of the classes in each hit; empty where labels are all there is. Else `labels` holds ids.
+  /// The probabilities of the classes for each hit. Empty if there are only hard labels; otherwise `labels`
+  /// holds ids.
   SoftLabels soft;
-  /// Directions of beams that met nothing up to the sensor's range, in the axes of the map frame; any length.
+  /// Directions of beams without a return, in the axes of the map frame; of any length > 0.
   std::vector<Eigen::Vector3f> no_returns;
-  /// Whether points at max_range (within kAtMaxRange of it) met nothing either: some drivers put them there.
+  /// Whether points at max_range (within kAtMaxRange) mean that the beam had no return: some drivers report
+  /// it so.
   bool no_returns_at_max_range = false;
-  /// Ranges of the sensor, where they are not those of the mapper's settings.
+  /// Range limits of the sensor; without a value, those of the mapper's settings.
   std::optional<SensorModelConfig> sensor_model;
-  /// Time of the scan [ns]. Seeds the random free-space samples: scans drawn at the same time and with the
-  /// same seed draw the same numbers, whatever their order.
+  /// Time of the scan [ns]. With the seed it determines the random free samples, so that these do not depend
+  /// on the order of the scans.
   std::uint64_t stamp = 0;
 };
 
-/// What the labels of a scan are that is judged without a mapper's settings.
+/// How the labels of a scan are encoded where no mapper's settings apply.
 inline LabelValues labelValues(const Scan& scan) {
   return scan.labels_are_ids ? LabelValues::kId : LabelValues::kRaw;
 }
 
-/// A scan from points of the sensor's own frame. The rotation is rounded to 2^-30 (0.1 um at 100 m), so that
+/// Makes a scan from points in the sensor frame. The rotation is rounded to 2^-30 (0.1 um at 100 m), so that
 /// a pose gives the same map to the bit whether it comes from a file or, interpolated, from tf.
 /// @param T_map_sensor pose of the sensor in the map frame. @param points in the sensor frame [m].
 inline Scan scanFromSensorFrame(const Eigen::Isometry3d& T_map_sensor,

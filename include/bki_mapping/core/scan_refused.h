@@ -1,4 +1,4 @@
-/// @file Scans that are not added to the map.
+/// @file The exception for a scan that was not added to the map.
 #pragma once
 
 #include <stdexcept>
@@ -6,12 +6,12 @@
 
 namespace bki_mapping {
 
-/// Why a scan was refused, in a sentence with the remedy. The map is as it was before the scan.
+/// A scan was refused; what() says why and what to do. The map is as it was before the scan.
 class ScanRefused : public std::runtime_error {
  public:
   enum class Reason {
     kTooLarge,  ///< it would touch more blocks, or take more samples, than the limits allow
-    kMemory,    ///< memory_limit, or the computer's memory, does not hold it
+    kMemory,    ///< it would exceed memory_limit or the computer's memory
   };
 
   ScanRefused(Reason reason, const std::string& sentence) : std::runtime_error(sentence), reason_(reason) {}

@@ -1,14 +1,14 @@
-/// @file How far a sensor sees.
+/// @file The range limits of a sensor.
 #pragma once
 
 namespace bki_mapping {
 
 struct SensorModelConfig {
   double min_range = 0.0;   ///< hits closer than this are dropped [m]
-  double max_range = -1.0;  ///< hits beyond this do not occupy [m]; -1: not known
+  double max_range = -1.0;  ///< hits beyond this do not occupy voxels [m]; -1: not known
 
-  /// Where max_range is not known, points beyond this are faults of the driver [m]: they neither occupy nor
-  /// clear. Lidars see up to about 250 m; a corrupt point may lie anywhere.
+  /// With an unknown max_range, points beyond this are taken for faults of the driver [m]: they neither
+  /// occupy nor clear. Lidars see up to about 250 m, but a corrupt point may lie anywhere.
   static constexpr double kFarthest = 300.0;
   bool knowsRange() const { return max_range > 0.0; }
   double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< range of the farthest hit [m]

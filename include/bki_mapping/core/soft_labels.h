@@ -1,4 +1,4 @@
-/// @file Labels that are not sure.
+/// @file Soft labels: the probabilities of several classes for each point.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,13 @@
 
 namespace bki_mapping {
 
-/// The share of a class in a point: its probability.
+/// The probability of one class for a point.
 struct ClassShare {
   ClassId id;
-  float share;  ///< > 0
+  float share;  ///< probability, > 0
 };
 
-/// The shares of the classes in each of a row of points. Those of a point add up to 1, or it has none.
+/// The shares of the classes for each point of a scan. Those of a point sum to 1, or it has none.
 class SoftLabels {
  public:
   bool empty() const { return begin_.empty(); }  ///< whether there are no points
@@ -27,7 +27,7 @@ class SoftLabels {
   }
   /// Starts a new point.
   void startPoint() { begin_.push_back(shares_.size()); }
-  /// Adds a share to the last point.
+  /// Adds a class to the last point.
   void add(const ClassShare& share) { shares_.push_back(share); }
 
   const ClassShare* begin(std::size_t point) const { return shares_.data() + begin_[point]; }

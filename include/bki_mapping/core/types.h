@@ -1,4 +1,4 @@
-/// @file Small types shared by all rooms.
+/// @file Ids, indices and constants that all rooms share.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,19 +17,26 @@ constexpr ClassId kFreeClass = 255;
 constexpr int kBlockEdge = 8;
 constexpr int kBlockVoxels = kBlockEdge * kBlockEdge * kBlockEdge;
 
-/// Integer coordinates of a voxel, or of a block, in the map frame's grid.
+/// Half the diagonal of a voxel, sqrt(3) / 2, rounded up by more than single precision errs [voxels]. No
+/// point is farther from the centre of its voxel.
+constexpr float kVoxelHalfDiagonal = 0.8661f;
+
+/// Marks a missing position in an array.
+constexpr std::uint32_t kNoPosition = 0xffffffffu;
+
+/// Integer coordinates of a voxel or block in the map frame's grid.
 struct GridIndex {
   std::int32_t x = 0, y = 0, z = 0;
   bool operator==(const GridIndex& o) const { return x == o.x && y == o.y && z == o.z; }
   bool operator!=(const GridIndex& o) const { return !(*this == o); }
-  /// Lexicographic in z, y, x: the order in which files list blocks.
+  /// Compares z, then y, then x: the order in which files list blocks.
   bool operator<(const GridIndex& o) const { return z != o.z ? z < o.z : (y != o.y ? y < o.y : x < o.x); }
 };
 struct VoxelIndex : GridIndex {};
 struct BlockIndex : GridIndex {};
 
-/// Spreads the three coordinates over 64 bits: sums of products with odd constants of the golden-ratio
-/// family. The high bits are mixed well; they are folded into the low ones.
+/// Multiplicative hash of the three coordinates. Tables use the low bits, so the high bits, which products
+/// mix best, are folded into them.
 struct GridIndexHash {
   std::size_t operator()(const GridIndex& i) const {
     const std::uint64_t h = static_cast<std::uint32_t>(i.x) * 0x9E3779B97F4A7C15ull +

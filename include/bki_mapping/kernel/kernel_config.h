@@ -6,10 +6,10 @@ namespace bki_mapping {
 enum class KernelType { kSparse, kCounting };
 struct KernelConfig {
   KernelType type = KernelType::kSparse;
-  double length = 0.0;  ///< support radius l [m]; 0: as long as the resolution
+  double length = 0.0;  ///< support radius l [m]; 0: equal to the resolution
   double scale = 0.1;   ///< sigma0, the kernel's value at distance 0
 
-  /// The support radius in force [m]. @param resolution edge of a voxel [m].
+  /// The support radius that applies [m]. @param resolution edge of a voxel [m].
   double lengthFor(double resolution) const { return length > 0.0 ? length : resolution; }
 };
 

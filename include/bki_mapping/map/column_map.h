@@ -1,4 +1,4 @@
-/// @file The map seen from above, for navigation: where the ground is, and what is in the way.
+/// @file The map as seen from above, for navigation: the ground and the obstacles.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@
 
 namespace bki_mapping {
 
-/// From which height obstacles are measured.
+/// From where the heights of obstacles are measured.
 enum class HeightReference { kMap, kGround };
 
-/// Which voxels are in the way.
+/// Which voxels count as obstacles.
 struct ColumnRules {
-  double min_z = -1e6;  ///< lower end of the heights looked at [m]
-  double max_z = 1e6;   ///< upper end [m]
+  double min_z = -1e6;  ///< lowest height of an obstacle [m]
+  double max_z = 1e6;   ///< greatest height of an obstacle [m]
   HeightReference reference = HeightReference::kMap;
   bool operator==(const ColumnRules& o) const {
     return min_z == o.min_z && max_z == o.max_z && reference == o.reference;
@@ -28,32 +28,34 @@ struct ColumnRules {
   bool operator!=(const ColumnRules& o) const { return !(*this == o); }
 };
 
-/// What a column of voxels, one above the other, has to say.
+/// Summary of one vertical column of voxels.
 struct ColumnView {
   enum class Occupancy : std::int8_t { kUnknown = -1, kFree = 0, kOccupied = 100 };
 
-  /// Top of the ground: of the lowest run of occupied voxels, one on the other, whose class is flagged
-  /// ground; NaN without any [m].
+  /// Top of the ground, which is the lowest uninterrupted run of occupied voxels whose class has the flag
+  /// ground [m]; NaN without ground.
   float ground = std::numeric_limits<float>::quiet_NaN();
-  ClassId ground_class = kFreeClass;  ///< class of its topmost voxel
-  /// From the ground to the bottom of the first occupied voxel above it that is not ignored; infinite without
-  /// any, NaN without ground [m].
+  ClassId ground_class = kFreeClass;  ///< class of the topmost voxel of the ground
+  /// Distance from the ground to the bottom of the first occupied voxel above it whose class is not ignored
+  /// [m]; infinite without such a voxel, NaN without ground.
   float clearance = std::numeric_limits<float>::quiet_NaN();
-  /// Height of all occluded voxels above the ground, added up; without ground, of all in the column [m].
+  /// Total height of the occluded voxels above the ground, or, without ground, in the whole column [m].
   float occluded = 0.0f;
-  /// Occupied if a voxel within the rules' heights is occupied by a class neither ground nor ignored; else
-  /// free if there is ground, or a free voxel within the heights; else unknown. Measured from the ground,
-  /// obstacles count at any height in columns without ground.
+  /// Occupied if there is an obstacle: an occupied voxel within the rules' heights whose class is neither
+  /// ground nor ignored. Otherwise free if there is ground or a free voxel within the heights; otherwise
+  /// unknown. If heights are measured from the ground, obstacles in columns without ground count at
+  /// any height.
   Occupancy occupancy = Occupancy::kUnknown;
 };
 
-/// The columns of a map, kept up block by block. 64 columns, x fastest, share a column of blocks.
+/// The columns of a map, updated block by block. Columns are stored by stack, a vertical column of blocks.
 class ColumnMap {
  public:
-  using Place = std::pair<std::int32_t, std::int32_t>;  ///< x and y of a column of blocks
+  using Place = std::pair<std::int32_t, std::int32_t>;  ///< x and y of a stack [blocks]
+  /// The 8 x 8 columns of voxels of a stack, x fastest.
   using Columns = std::array<ColumnView, kBlockEdge * kBlockEdge>;
 
-  /// Begins anew with other rules.
+  /// Forgets all columns and sets the rules.
   void start(const ColumnRules& rules) {
     rules_ = rules;
     blocks_.clear();
@@ -61,8 +63,8 @@ class ColumnMap {
   }
   const ColumnRules& rules() const { return rules_; }
 
-  /// Looks again at columns with blocks that changed, were made or erased.
-  /// @return the columns of blocks looked at; those without a block left are gone from columns().
+  /// Recomputes the stacks that contain the given blocks. @param changed blocks that have changed, or were
+  /// created or erased. @return those stacks; stacks without blocks are no longer in columns().
   std::set<Place> update(const SemanticMap& map, const ClassTable& classes,
                          const std::vector<GridIndex>& changed);
 
@@ -70,7 +72,7 @@ class ColumnMap {
 
  private:
   ColumnRules rules_;
-  std::map<Place, std::set<std::int32_t>> blocks_;  ///< z of the blocks in each column of blocks
+  std::map<Place, std::set<std::int32_t>> blocks_;  ///< z of the blocks in each stack
   std::map<Place, Columns> columns_;
 };
 

@@ -1,14 +1,14 @@
-/// @file Settings of how the state of a voxel is decided.
+/// @file Settings of the gains that decide the state of a voxel.
 #pragma once
 
 namespace bki_mapping {
 
-/// Gains on the evidence for `free` when the state of a voxel is decided, by its likeliest class; 1 is the
-/// posterior's own verdict. Voxels of the unlabelled class have 1.
+/// Gains on the evidence for `free` when the state of a voxel is decided, by its class with the most
+/// evidence. With a gain of 1 the state follows the posterior; the unlabelled class always has 1.
 struct FreeGainConfig {
   double dynamic_classes = 1.0;  ///< classes flagged dynamic
-  double static_classes = 1.0;   ///< the others
-  /// A gain g above 1 falls with the evidence from hits, to 1 + (g - 1) exp(-hits / persistence); 0: never.
+  double static_classes = 1.0;   ///< all other classes
+  /// Evidence of hits over which a gain g > 1 decays, to 1 + (g - 1) exp(-hits / persistence); 0: never.
   double persistence = 0.0;
 };
 

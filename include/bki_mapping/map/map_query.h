@@ -1,4 +1,4 @@
-/// @file What the map says of a voxel.
+/// @file Queries: the state and the posterior of a voxel.
 #pragma once
 
 #include <utility>
@@ -8,34 +8,35 @@
 
 namespace bki_mapping {
 
-/// The numbers are those of files and messages.
+/// The state of a voxel. Files and messages use these values.
 enum class VoxelState : std::uint8_t {
   kUnknown = 0,   ///< no evidence
   kFree = 1,      ///< `free` has more evidence, times the class's gain, than any class
-  kOccupied = 2,  ///< a class has as much or more; with a gain of 1, the largest alpha
-  kOccluded = 3,  ///< no evidence, and behind a hit in the last scan that reached it
+  kOccupied = 2,  ///< otherwise; with a gain of 1, some class has the largest alpha
+  kOccluded = 3,  ///< no evidence; the last scan to reach it saw it only beyond the ends of beams
 };
 
-/// The Dirichlet posterior of one voxel, summed up.
+/// Summary of the Dirichlet posterior of one voxel.
 struct VoxelView {
   VoxelState state = VoxelState::kUnknown;
   ClassId label = kFreeClass;  ///< the class of an occupied voxel (ties: the smaller id), else kFreeClass
   float probability = 0.0f;    ///< p = alpha / sum(alpha) of `label`
   float variance = 0.0f;       ///< p (1 - p) / (sum(alpha) + 1)
   float entropy = 0.0f;        ///< of the expected class distribution, over all classes and `free` [nat]
-  float evidence = 0.0f;       ///< sum(alpha) minus the prior's
+  float evidence = 0.0f;       ///< sum(alpha) minus the sum of the priors
   float occupancy = 0.0f;      ///< 1 - p(free)
 };
 
+/// The state and posterior of a voxel. @param offset of the voxel in its block.
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
-/// The same, but with entropy 0: most of the time goes into its logarithms.
+/// The same with entropy 0, which is much faster: the logarithms take most of the time.
 VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset);
-/// The same for a voxel by its index; unknown where there is no block.
+/// The same for a voxel by index; unknown if the map has no block there.
 VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel);
-/// @param point in the map frame [m].
+/// viewVoxel for the voxel that contains a point. @param point in the map frame [m].
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
 
-/// The blocks sorted by index (z, then y, then x), so that output does not depend on their history.
+/// All blocks, sorted by index (z, then y, then x), so that output does not depend on the order of creation.
 std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map);
 
 /// Calls visit(const VoxelIndex&, const VoxelView&) for every voxel that is not unknown, in sorted order.

@@ -1,4 +1,4 @@
-/// @file Every setting of the mapper with its default; parameters.h gives them names.
+/// @file All settings of the mapper with their defaults; parameters.h gives them names.
 #pragma once
 
 #include "bki_mapping/core/class_table.h"
@@ -18,13 +18,13 @@ struct MapperConfig {
   double prior = 0.001;                ///< alpha0, concentration of each class before any scan
   double downsample_resolution = 0.1;  ///< edge of a down-sampling cell [m]; 0: off
   int threads = 0;                     ///< 0: all cores
-  double memory_limit = 0.0;           ///< of the map [MB]; 0: none. A scan that would exceed it is refused
+  double memory_limit = 0.0;           ///< of the map [MB]; a scan that would exceed it is refused; 0: none
   KernelConfig kernel;
   FreeSpaceConfig free_space;
   FreeGainConfig free_gain;
   ScanLimitConfig scan_limit;
   SensorModelConfig sensor_model;
-  bool clear_beyond_max_range = true;  ///< hits beyond max_range clear as beams cut there
+  bool clear_beyond_max_range = true;  ///< beams of hits beyond max_range clear space up to there
   OcclusionExtent occlusion = OcclusionExtent::kNone;
   UnlabelledPoints unlabelled_points = UnlabelledPoints::kOccupied;
   UnknownLabels unknown_labels = UnknownLabels::kIgnore;

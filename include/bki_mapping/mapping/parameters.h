@@ -1,4 +1,4 @@
-/// @file The mapper's parameters by name.
+/// @file The named parameters of MapperConfig.
 #pragma once
 
 #include <map>
@@ -12,20 +12,20 @@ namespace bki_mapping {
 
 using Parameter = NamedParameter<MapperConfig>;
 
-/// All parameters of the mapper, in the order in which they are documented. Those of a component stand in
-/// its room, in `*_parameters.h` beside the code that reads them.
+/// All parameters of the mapper in the order of the documentation. Those of a component are defined in its
+/// room, in `*_parameters.h`.
 std::vector<Parameter> mapperParameters();
 
-/// setNamedParameters with the mapper's parameters.
+/// setNamedParameters() for the mapper's parameters.
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values);
 
-/// checkNamedParameters with the mapper's parameters.
+/// checkNamedParameters() for the mapper's parameters.
 void checkParameters(const MapperConfig& config);
 
-/// @throws std::invalid_argument that names a parameter that differs, but can change only at the start.
+/// @throws std::invalid_argument that names a parameter that differs but can change only at the start.
 void checkChanges(const MapperConfig& before, const MapperConfig& after);
 
-/// What a user should know about settings that are allowed, but hardly meant: a sentence each.
+/// One sentence for each setting that is allowed but probably not intended.
 std::vector<std::string> settingWarnings(const MapperConfig& config);
 
 }  // namespace bki_mapping

@@ -1,40 +1,39 @@
-/// @file What became of one scan.
+/// @file Counts and times of one scan.
 #pragma once
 
 #include <cstddef>
 
 namespace bki_mapping {
 
-/// What became of a scan's points; `points` is the sum of those that follow.
+/// What happened to the points of a scan; `points` is the sum of the counts that follow, except the last.
 struct PointCounts {
   std::size_t points = 0;
   std::size_t used = 0;           ///< became hits
-  std::size_t not_finite = 0;     ///< NaN or infinite: a coordinate, or a share of a class
+  std::size_t not_finite = 0;     ///< a coordinate is not finite, or a share is not a probability
   std::size_t at_sensor = 0;      ///< within 1 mm of the sensor
-  std::size_t too_near = 0;       ///< nearer than sensor_model/min_range
+  std::size_t too_near = 0;       ///< closer than sensor_model/min_range
   std::size_t beyond_max = 0;     ///< farther than SensorModelConfig::reach()
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
-  std::size_t unknown_label = 0;  ///< not in the class table, and unknown_labels is ignore
-  std::size_t unlabelled = 0;     ///< of the unlabelled class, and unlabelled_points is ignore
-  std::size_t no_returns = 0;     ///< beams that met nothing, which clear up to the sensor's range
-  /// Labels not in the class table, whatever became of them (not part of the sum).
+  std::size_t unknown_label = 0;  ///< not in the class table, with unknown_labels `ignore`
+  std::size_t unlabelled = 0;     ///< of the unlabelled class, with unlabelled_points `ignore`
+  std::size_t no_returns = 0;     ///< beams without a return, which clear up to the sensor's range
+  /// Points whose label is not in the class table; they are also counted above.
   std::size_t labels_not_in_table = 0;
 
   PointCounts& operator+=(const PointCounts& other);
 };
 
-/// What one scan did, and how long its phases took.
+/// What one scan added, and how long each phase took.
 struct ScanStats {
   PointCounts counts;
   std::size_t hits = 0;        ///< after down-sampling
   std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
   std::size_t blocks = 0;      ///< blocks touched
-  std::size_t not_finite =
-      0;                     ///< voxels and classes that refused evidence since it would not have been finite
-  double observe_ms = 0.0;   ///< filtering, down-sampling
-  double evidence_ms = 0.0;  ///< sampling, binning, indexing
-  double collect_ms = 0.0;   ///< naming and allocating blocks
-  double update_ms = 0.0;    ///< adding to the blocks
+  std::size_t not_finite = 0;  ///< sums refused because the evidence would not have stayed finite
+  double observe_ms = 0.0;     ///< filtering, down-sampling
+  double evidence_ms = 0.0;    ///< sampling, sorting, indexing
+  double collect_ms = 0.0;     ///< listing and allocating blocks
+  double update_ms = 0.0;      ///< adding to the blocks
   double totalMs() const { return observe_ms + evidence_ms + collect_ms + update_ms; }
 };
 

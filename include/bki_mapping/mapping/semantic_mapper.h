@@ -1,4 +1,4 @@
-/// @file The mapper: scans in, a map out.
+/// @file The mapper: builds a map from scans.
 #pragma once
 
 #include <memory>
@@ -15,45 +15,44 @@ namespace bki_mapping {
 
 class ThreadPool;
 
-/// Owns a map, adds scans to it, and keeps threads and working memory for that. Not for several threads at
-/// once; each call may use several inside.
+/// Owns a map and adds scans to it. Keeps its threads and working memory between scans. Not thread-safe; a
+/// call may use several threads itself.
 class SemanticMapper {
  public:
-  /// @throws std::invalid_argument if a setting is not allowed, or needs an unlabelled class that the table
-  /// lacks.
+  /// @throws std::invalid_argument if a setting is not allowed, or requires an unlabelled class that the
+  /// table lacks.
   SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes);
   ~SemanticMapper();
 
-  /// Adds one scan to the map, all of it or nothing. Bad points are left out and counted.
-  /// @throws std::invalid_argument if the scan's labels are not as many as its points, or its origin is not a
-  /// point that the map can hold; ScanRefused if it is larger than scan_limit/blocks, or memory does not hold
-  /// it. The map is then as it was.
+  /// Adds one scan to the map, either all of it or nothing. Bad points are skipped and counted.
+  /// @throws std::invalid_argument if the scan has not one label for each point, or its origin has no valid
+  /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
   ScanStats integrate(const Scan& scan);
 
-  /// Takes over other settings; the map stays, and its states follow the gains.
-  /// @throws std::invalid_argument if a setting is not allowed, or cannot change while mapping
-  /// (Changes::kAtStart); the settings are then as they were.
+  /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
+  /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start
+  /// (Changes::kAtStart); the settings are then unchanged.
   void reconfigure(const MapperConfig& config);
 
-  /// Forgets all scans, and gives their memory back to the system.
+  /// Clears the map, and returns its memory to the system.
   void reset();
 
-  /// Forgets the blocks for which forget(index) is true. @return their indices.
+  /// Erases the blocks for which forget(index) is true. @return their indices.
   template <typename Forget>
   std::vector<GridIndex> eraseBlocks(Forget&& forget) {
-    std::vector<GridIndex> gone;
+    std::vector<GridIndex> erased;
     for (const SemanticMap::Entry& entry : map_.entries()) {
       if (!forget(entry.index)) continue;
-      gone.push_back(entry.index);
+      erased.push_back(entry.index);
       block_bytes_ -= entry.block->bytes();
     }
-    for (const GridIndex& index : gone) map_.erase({index});
-    return gone;
+    for (const GridIndex& index : erased) map_.erase({index});
+    return erased;
   }
 
-  /// The blocks that the last integrate() may have changed, made or erased; each once.
+  /// The blocks that the last integrate() may have changed, created or erased, each once.
   const std::vector<GridIndex>& touchedBlocks() const;
-  /// Memory of the map, its index included [bytes]: map().bytes(), without a look at every block.
+  /// Memory of the map and its index [bytes]. Equals map().bytes(), but does not visit every block.
   std::size_t mapBytes() const { return block_bytes_ + map_.indexBytes(); }
 
   const SemanticMap& map() const { return map_; }
@@ -61,11 +60,11 @@ class SemanticMapper {
   const MapperConfig& config() const { return config_; }
 
  private:
-  /// What a scan goes through; holds all working memory.
+  /// The stages that a scan passes; holds all working memory.
   struct Pipeline;
 
   ScanStats add(const Scan& scan);
-  /// After a failure: counts the map's bytes anew, and drops working memory, which may be large or half made.
+  /// Cleans up after a failure: recounts the map's bytes, and frees the working memory, which may be large.
   void recover() noexcept;
   void setGains();
 
@@ -73,9 +72,9 @@ class SemanticMapper {
   std::shared_ptr<const ClassTable> classes_;
   SemanticMap map_;
   std::unique_ptr<ThreadPool> pool_;
-  std::unique_ptr<Pipeline> pipeline_;  ///< none between a failure and the next scan
+  std::unique_ptr<Pipeline> pipeline_;  ///< nullptr between a failure and the next scan
   std::vector<GridIndex> no_blocks_;
-  std::size_t block_bytes_ = 0;  ///< of the blocks alone
+  std::size_t block_bytes_ = 0;  ///< memory of the blocks, without the index
 };
 
 }  // namespace bki_mapping
