@@ -1,4 +1,4 @@
-// The beam table and the R-tree find every beam that passes a ball: at the seam, at the poles, at the sensor.
+// The beam table and the R-tree find every beam through a ball: at the seam, the poles and the sensor.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace bki_mapping {
 namespace {
 
-/// A table, and the order in which it wants its beams.
+/// A table and the order of its beams.
 struct SortedTable {
   std::unique_ptr<BeamTable> table = std::make_unique<BeamTable>();
   std::vector<std::uint32_t> order;
@@ -52,7 +52,7 @@ std::vector<Eigen::Vector3f> directionsOf(const Scan& scan) {
   return sorted(directions);
 }
 
-/// The half-lines that pass a ball, one by one.
+/// The half-lines that pass through a ball, by testing each.
 std::set<std::uint32_t> bruteForce(const std::vector<Eigen::Vector3f>& directions,
                                    const Eigen::Vector3d& centre, double radius) {
   std::set<std::uint32_t> found;
@@ -72,7 +72,7 @@ TEST_P(BothIndices, FindAllBeamsOfEveryBall) {
     const auto directions = directionsOf(scene.scan);
     const auto index = makeBeamIndex(GetParam(), directions);
     for (int trial = 0; trial < 300; ++trial) {
-      // Balls about places on beams, about the axes and the seam, and everywhere.
+      // Balls about points on beams, on the coordinate planes (and so on the seam), and beside beams.
       const float scale = std::uniform_real_distribution<float>(0.0f, 1.5f)(random);
       Eigen::Vector3f centre = scene.scan.points[random() % scene.scan.points.size()] * scale;
       if (trial % 3 == 1) centre[static_cast<int>(random() % 3)] = 0.0f;
@@ -80,15 +80,16 @@ TEST_P(BothIndices, FindAllBeamsOfEveryBall) {
       const float radius = std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
       const std::vector<std::uint32_t> beams = query(*index, centre, radius);
       const std::set<std::uint32_t> found(beams.begin(), beams.end());
-      EXPECT_EQ(found.size(), beams.size()) << scene.name << ": a beam is named twice";
+      EXPECT_EQ(found.size(), beams.size()) << scene.name << ": a beam is found twice";
       for (const std::uint32_t b : bruteForce(directions, centre.cast<double>(), radius)) {
-        ASSERT_TRUE(found.count(b)) << scene.name << ": beam " << b << " misses at " << centre.transpose();
+        ASSERT_TRUE(found.count(b)) << scene.name << ": beam " << b << " is missing at "
+                                    << centre.transpose();
       }
     }
   }
 }
 
-TEST_P(BothIndices, NameFewOthers) {
+TEST_P(BothIndices, FindFewOtherBeams) {
   std::mt19937 random(3);
   std::normal_distribution<float> normal;
   std::vector<Eigen::Vector3f> directions;
@@ -97,13 +98,13 @@ TEST_P(BothIndices, NameFewOthers) {
   }
   directions = sorted(directions);
   const auto index = makeBeamIndex(GetParam(), directions);
-  std::size_t named = 0, needed = 0;
+  std::size_t found = 0, needed = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const Eigen::Vector3f centre = 10.0f * directions[static_cast<std::size_t>(trial)];
-    named += query(*index, centre, 1.0f).size();
+    found += query(*index, centre, 1.0f).size();
     needed += bruteForce(directions, centre.cast<double>(), 1.0).size();
   }
-  EXPECT_LT(named, 3 * needed);
+  EXPECT_LT(found, 3 * needed);
 }
 
 TEST_P(BothIndices, AllBeamsAtTheSensorAndNoneOfNone) {

@@ -1,4 +1,4 @@
-// Occlusion against brute force, and scenes worked out by hand.
+// Occlusion equals brute force, and is right on scenes worked out by hand.
 #include <gtest/gtest.h>
 
 #include "bki_mapping/map/map_query.h"

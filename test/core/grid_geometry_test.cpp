@@ -1,4 +1,4 @@
-// Points, voxels and blocks.
+// Conversions between points, voxels and blocks, also below zero and at the ends of the map.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,4 +1,4 @@
-// Random free samples: their distribution and their keys.
+// Random free samples have the right distribution and depend on all of their keys.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace bki_mapping {
 namespace {
 
-/// The Kolmogorov-Smirnov distance of values from the uniform distribution on [0, 1].
+/// The Kolmogorov-Smirnov statistic of values against the uniform distribution on [0, 1].
 double distanceFromUniform(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   double greatest = 0.0;
@@ -23,26 +23,26 @@ double distanceFromUniform(std::vector<double> values) {
   return greatest;
 }
 
-/// The critical distance at level 0.001 for n values: sqrt(-ln(0.0005) / 2 / n).
+/// Critical value of the statistic at significance level 0.001 for n values: sqrt(-ln(0.0005) / (2 n)).
 double criticalDistance(double n) {
   return std::sqrt(-std::log(0.0005) / 2.0 / n);
 }
 
-std::vector<double> squaredShares(double (*distance)(double, double)) {
-  std::vector<double> shares;
+std::vector<double> squaredFractions(double (*distance)(double, double)) {
+  std::vector<double> fractions;
   for (std::uint64_t beam = 0; beam < 20000; ++beam) {
     const double length = 1.0 + static_cast<double>(beam % 50);
-    shares.push_back(std::pow(distance(counterRandom(1, 42, beam, 0), length) / length, 2));
+    fractions.push_back(std::pow(distance(counterRandom(1, 42, beam, 0), length) / length, 2));
   }
-  return shares;
+  return fractions;
 }
 
 TEST(LinearSamples, CoverThePlaneEvenly) {  // Theorem 1: (r / d)^2 is uniform
-  EXPECT_LT(distanceFromUniform(squaredShares(linearDistance)), criticalDistance(20000));
+  EXPECT_LT(distanceFromUniform(squaredFractions(linearDistance)), criticalDistance(20000));
 }
 
 TEST(UniformSamples, DoNot) {
-  EXPECT_GT(distanceFromUniform(squaredShares(uniformDistance)), 10 * criticalDistance(20000));
+  EXPECT_GT(distanceFromUniform(squaredFractions(uniformDistance)), 10 * criticalDistance(20000));
 }
 
 TEST(CounterRandom, IsUniformAndDependsOnEveryKey) {

@@ -1,5 +1,4 @@
-// The map from above: ground, clearance, occlusion and obstacles of columns built by hand; updates equal a
-// new look.
+// Ground, clearance, occlusion and obstacles of columns built by hand; updates equal a recomputation.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +42,7 @@ class Columns : public testing::Test {
     for (const auto& entry : map_.entries()) blocks.push_back(entry.index);
     return blocks;
   }
-  /// The column of voxels (0, 0).
+  /// The column of voxels at x = y = 0.
   ColumnView column(const ColumnRules& rules = {}) const {
     ColumnMap columns;
     columns.start(rules);
@@ -72,7 +71,7 @@ TEST_F(Columns, KnowTheGroundAndWhatIsAboveIt) {
   EXPECT_EQ(view.occupancy, Occupancy::kOccupied);
 }
 
-TEST_F(Columns, TellFreeFromUnknownAndWhatIsInTheWay) {
+TEST_F(Columns, DistinguishFreeUnknownAndObstacles) {
   add({{0, 0, 0}}, kSky);
   EXPECT_EQ(column().occupancy, Occupancy::kUnknown);
   EXPECT_TRUE(std::isnan(column().ground));
@@ -86,7 +85,7 @@ TEST_F(Columns, TellFreeFromUnknownAndWhatIsInTheWay) {
   EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
 }
 
-TEST_F(Columns, HeightsAreThoseOfTheMapOrAboveTheGround) {
+TEST_F(Columns, HeightsCountFromTheMapOrFromTheGround) {
   add({{0, 0, -10}}, kRoad);  // top at -4.5 m
   add({{0, 0, -5}}, kCar);    // centre at -2.25 m, 2.25 m above the ground
   ColumnRules rules;
@@ -112,7 +111,7 @@ TEST_F(Columns, WithoutGroundBelowAnObstacleCountsAtAnyHeight) {
   EXPECT_EQ(column(rules).occupancy, Occupancy::kOccupied);
 }
 
-TEST_F(Columns, UpdatesEqualANewLook) {
+TEST_F(Columns, UpdatesEqualARecomputation) {
   std::mt19937 random(5);
   const auto draw = [&](int edge) {
     return static_cast<int>(random() % static_cast<unsigned>(2 * edge)) - edge;
@@ -139,9 +138,9 @@ TEST_F(Columns, UpdatesEqualANewLook) {
     fresh.update(map_, classes_, allBlocks());
     ASSERT_EQ(kept.columns().size(), fresh.columns().size());
     const auto same = [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); };
-    for (const auto& [place, columns] : fresh.columns()) {
+    for (const auto& [stack, columns] : fresh.columns()) {
       for (std::size_t c = 0; c < columns.size(); ++c) {
-        const ColumnView &a = columns[c], &b = kept.columns().at(place)[c];
+        const ColumnView &a = columns[c], &b = kept.columns().at(stack)[c];
         ASSERT_TRUE(same(a.ground, b.ground) && same(a.clearance, b.clearance) && a.occluded == b.occluded &&
                     a.occupancy == b.occupancy && a.ground_class == b.ground_class);
       }

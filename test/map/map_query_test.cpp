@@ -1,4 +1,4 @@
-// What the map says of a voxel, on cases worked out by hand.
+// The state and the posterior of voxels, on cases worked out by hand.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPrior = 0.001;
 
-/// A map of 3 classes with the given evidence (class, value) at one voxel of block 0.
+/// A map of 3 classes with the given evidence (class, value) at one voxel of the block at index 0.
 SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offset) {
   SemanticMap map(GridGeometry(1.0), kPrior, 3);
   for (const auto& [label, value] : evidence) {
@@ -67,12 +67,12 @@ TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
   EXPECT_NEAR(view().probability, (0.4 + kPrior) / sum, 1e-6);
   EXPECT_NEAR(view().occupancy, 1.0 - (0.5 + kPrior) / sum, 1e-6);
   map.setFreeGain(1, 1.0);
-  map.setFreeGain(2, 0.1);  // not the likeliest class
+  map.setFreeGain(2, 0.1);  // not the class with the most evidence
   EXPECT_EQ(view().state, VoxelState::kFree);
 }
 
-TEST(MapQuery, WhatIsHitAgainAndAgainStands) {
-  // Seen free as often as hit, or twice as often; a gain of 4, and a persistence of 1.
+TEST(MapQuery, RepeatedHitsOutweighTheGain) {
+  // With a gain of 4, free wins with over a quarter of the hits' evidence; persistence lowers the gain.
   const auto state = [](float hits, float free, double persistence) {
     SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
     map.setFreeGain(1, 4.0);
@@ -80,13 +80,13 @@ TEST(MapQuery, WhatIsHitAgainAndAgainStands) {
     return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
   };
   EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
-  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have passed";  // gain 3.5
+  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have been passing";  // gain 3.5
   EXPECT_EQ(state(4.0f, 2.0f, 0.0), VoxelState::kFree);
-  EXPECT_EQ(state(4.0f, 2.0f, 1.0), VoxelState::kOccupied) << "twenty hits: it stands";  // gain 1.05
+  EXPECT_EQ(state(4.0f, 2.0f, 1.0), VoxelState::kOccupied) << "twenty hits: it is parked";  // gain 1.05
   EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
 }
 
-TEST(MapQuery, GainsAloneMakeNothingFree) {
+TEST(MapQuery, GainsWithoutEvidenceForFreeMakeNothingFree) {
   SemanticMap map = mapWith({{1, 0.4f}}, 77);
   map.setFreeGain(1, 1000.0);
   EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);

@@ -1,4 +1,4 @@
-// Blocks come and go as in a plain map, and those near a point are found.
+// Blocks are created and erased as in a std::map, memory is reused, and all blocks near a point are found.
 #include <gtest/gtest.h>
 
 #include <map>

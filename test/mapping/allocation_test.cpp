@@ -1,5 +1,5 @@
-// Once its memory has grown to the size of the scans, mapping allocates nothing; and whichever allocation
-// fails, a scan is in the map whole or not at all.
+// In the steady state mapping allocates nothing; and whichever allocation fails, the map holds a scan whole
+// or not at all.
 #include <gtest/gtest.h>
 
 #include <malloc.h>
@@ -17,8 +17,8 @@ namespace {
 
 std::atomic<std::size_t> allocations{0};
 std::atomic<std::ptrdiff_t> allocated_bytes{0};
-/// Allocations that are yet to succeed before one fails, or, if `fails_on`, all that follow; none if
-/// negative.
+/// Number of allocations that still succeed before one fails, or, with `fails_on`, all later ones; negative:
+/// none fails.
 std::atomic<std::ptrdiff_t> until_failure{-1};
 std::atomic<bool> fails_on{false};
 
@@ -85,7 +85,7 @@ std::size_t allocationsOf(SemanticMapper& mapper, const Scan& scan) {
 
 TEST(Allocation, TheCounterCounts) {
   const std::size_t before = allocations;
-  ::operator delete(::operator new(1));  // compilers may leave out `delete new int`
+  ::operator delete(::operator new(1));  // compilers may optimise `delete new int` away
   EXPECT_EQ(allocations - before, 1u);
 }
 
@@ -106,7 +106,7 @@ TEST(Allocation, NoneInTheSteadyState) {
 }
 
 TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {
-  // Which thread takes which block is chance, so that a thread's memory may grow late, but not for ever.
+  // Any thread may get any job, so that a thread's memory may grow late, but not forever.
   const Scan scan = everywhere();
   MapperConfig config;
   config.threads = 2;
@@ -117,7 +117,7 @@ TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {
   EXPECT_GE(quiet, 15u);
 }
 
-/// A map's planes as bytes, block by block, and its marks of occlusion.
+/// The planes and the occlusion marks of each block as bytes.
 std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
   std::map<GridIndex, std::string> content;
   for (const auto& entry : map.entries()) {
@@ -131,8 +131,8 @@ std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
   return content;
 }
 
-/// A failure somewhere in a scan, then the scan once more with the failure one allocation later, until it
-/// meets none.
+/// Lets the first allocation of a scan fail, then the second, and so on, until the scan succeeds.
+/// @param on whether all later allocations fail, too.
 void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& second, bool on) {
   SemanticMapper whole(config, reference::smallTable()), failing(config, reference::smallTable());
   whole.integrate(first);
@@ -150,7 +150,7 @@ void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& s
       succeeded = true;
     } catch (const ScanRefused& refused) {
       EXPECT_EQ(refused.reason(), ScanRefused::Reason::kMemory);
-    } catch (const std::bad_alloc&) {  // there was not even memory for the sentence
+    } catch (const std::bad_alloc&) {  // there was no memory for the message either
     }
     until_failure = -1;
     if (succeeded) break;
@@ -160,7 +160,7 @@ void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& s
   }
   EXPECT_EQ(contentOf(failing.map()), after);
   EXPECT_EQ(failing.mapBytes(), failing.map().bytes());
-  EXPECT_GT(failures, 50) << "too few allocations to have tried much";
+  EXPECT_GT(failures, 50) << "too few allocations for the test to mean much";
 }
 
 Scan fewPoints(unsigned seed) {

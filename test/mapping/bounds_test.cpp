@@ -1,5 +1,5 @@
-// What a scan or a setting may take: far points, fine voxels and long beams cost bounded memory and time, or
-// are refused in a sentence, and the map stays as it was.
+// Far points, fine voxels and long beams take bounded memory and time, or are refused with a message, and the
+// map stays unchanged.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// A ring of hits about the sensor, 10 m away, with walls 3 m high.
+/// A round room about the sensor, with a radius of 10 m and walls 3 m high.
 Scan room(std::size_t points = 2000) {
   Scan scan;
   for (std::size_t i = 0; i < points; ++i) {
@@ -42,14 +42,14 @@ double residentMemory() {
   return pages * 4096e-6;
 }
 
-/// The most resident memory since the last call of forgetPeak [MB].
+/// Peak of the resident memory since the last forgetPeak() [MB].
 double peakMemory() {
   std::ifstream in("/proc/self/status");
   for (std::string word; in >> word;) {
     double kilobytes = 0.0;
     if (word == "VmHWM:" && in >> kilobytes) return 1e-3 * 1.024 * kilobytes;
   }
-  ADD_FAILURE() << "the system does not say the peak of memory";
+  ADD_FAILURE() << "the system does not report the peak of resident memory";
   return 0.0;
 }
 void forgetPeak() {
@@ -246,11 +246,11 @@ TEST(Bounds, BeamsCutWhereTheMapEndsAreLeftOut) {
     for (const auto& entry : mapper.map().entries()) {
       EXPECT_LE(mapper.map().geometry().blockOrigin(entry.index).x(), edge) << mode;
     }
-    // A range with which no beam ends inside the map.
+    // With this range no cut beam ends inside the map.
     Scan far = scan;
     far.sensor_model = SensorModelConfig{0.0, 1e9};
     scan.points = {{-200.0f, 0.0f, 0.0f}, {3.0f, 0.0f, 0.0f}};
-    EXPECT_EQ(mapper.integrate(far).counts.used, 2u) << "what lies inside the map counts";
+    EXPECT_EQ(mapper.integrate(far).counts.used, 2u) << "hits inside the map are used";
   }
 }
 

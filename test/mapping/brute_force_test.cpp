@@ -1,4 +1,5 @@
-// The law: every mode and kernel equals the brute-force sum at every voxel, inside blocks and outside.
+// The law: with every mode and kernel, the map equals the brute-force sum at every voxel, inside and outside
+// of its blocks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 namespace bki_mapping {
 namespace {
 
-/// The voxels that span all hits, the sensor and a margin of 1.2 m.
+/// The box of voxels that contains all hits and the sensor, with a margin of 1.2 m.
 std::pair<VoxelIndex, VoxelIndex> bounds(const Scan& scan, const GridGeometry& geometry) {
   Eigen::Vector3d low = scan.origin, high = scan.origin;
   for (const auto& point : scan.points) {
@@ -156,7 +157,7 @@ TEST_P(EveryScene, RangeLimitsEqualBruteForce) {
   }
 }
 
-/// The scene with one to three classes a point, in random shares; each point's label is its likeliest.
+/// The scene with one to three classes for each point in random shares; the label is the likeliest class.
 Scan withSoftLabels(Scan scan) {
   std::mt19937 random(17);
   scan.labels_are_ids = true;

@@ -1,4 +1,4 @@
-// Laws of the map that need no reference: threads, order, sums, shifts, and what a mode may change.
+// Laws of the map that need no reference: of threads, order, sums, shifts, and of what a mode may change.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -41,7 +41,7 @@ MapperConfig configOf(const std::string& mode, int threads = 2) {
   return config;
 }
 
-/// Calls check(label, evidence in a, evidence in b, index, offset) for everything in a; a missing plane is 0.
+/// Calls check(label, evidence in a, evidence in b, index, offset) for all evidence in a; no plane means 0.
 template <typename Check>
 void compare(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift, Check&& check) {
   static const std::vector<float> kNothing(kBlockVoxels, 0.0f);
@@ -129,7 +129,7 @@ TEST(Laws, AModeChangesOnlyFree) {
 }
 
 TEST(Laws, ModesDiffer) {
-  // Each mode, weight and extent gives a map of its own.
+  // Each mode, weight and extent gives a different map.
   std::vector<SemanticMap> maps;
   for (const std::string mode : {"none", "even", "uniform", "linear"})
     maps.push_back(mapOf(someScans(), configOf(mode)));
@@ -239,9 +239,9 @@ TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
       EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes()) << mode;
       std::set<std::tuple<int, int, int>> touched;
       for (const GridIndex& b : mapper.touchedBlocks()) {
-        EXPECT_TRUE(touched.emplace(b.x, b.y, b.z).second) << "a block is named twice";
+        EXPECT_TRUE(touched.emplace(b.x, b.y, b.z).second) << "a block is listed twice";
       }
-      // What is not named is as it was.
+      // Blocks that are not listed are unchanged.
       for (const auto& entry : mapper.map().entries()) {
         if (touched.count({entry.index.x, entry.index.y, entry.index.z}) > 0) continue;
         const Block* old = before.find(entry.index);

@@ -1,4 +1,4 @@
-// Parameters: names, refusals, what changes while mapping, and files.
+// Parameters by name: which values are refused, which can change while mapping, and parameter files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,7 +81,7 @@ TEST(Parameters, AValueIsCheckedWhereverItComesFrom) {
   EXPECT_NE(two.find("a number > 0, or -1 for not known"), std::string::npos) << two;
 }
 
-/// What a mapper knows of each voxel after a scan; nothing if it refuses the scan.
+/// State, class, probability and evidence of each known voxel after a scan; empty if the mapper refuses it.
 std::vector<std::tuple<int, int, int, VoxelState, ClassId, float, float>> knownAfterAScan(
     SemanticMapper& mapper) {
   try {

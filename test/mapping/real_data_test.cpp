@@ -1,5 +1,5 @@
-// The law on real scans. Needs the environment variable BKI_MAPPING_TEST_DATA: a folder that holds
-// semantickitti/sequences/04. Skips, loudly, where it is not set.
+// Every mode equals brute force on real scans. Needs the environment variable BKI_MAPPING_TEST_DATA: a folder
+// that holds semantickitti/sequences/04. Skips with a message if it is not set.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,14 +24,14 @@ void expectSampledVoxelsEqualBruteForce(const Scan& scan, const MapperConfig& co
   std::mt19937 random(4);
   double free_seen = 0.0;
   for (int trial = 0; trial < 150; ++trial) {
-    // Voxels of the map, and voxels beside it (shifted by a block) that must hold nothing more than the sum.
+    // Voxels of the map and, every fifth time, voxels one block above, which may lie outside the map.
     VoxelIndex voxel =
         GridGeometry::voxelOf(entries[random() % entries.size()].index, static_cast<int>(random() % 512));
     if (trial % 5 == 4) voxel.z += kBlockEdge;
     const Block* block = mapper.map().find(GridGeometry::blockOf(voxel));
     for (int label = -1; label < 20; ++label) {
       const ClassId id = label < 0 ? kFreeClass : static_cast<ClassId>(label);
-      if (id != kFreeClass && trial % 5) continue;  // hits are few: fewer looks suffice
+      if (id != kFreeClass && trial % 5) continue;  // most voxels have no hits
       const float* plane = block ? block->evidence(id) : nullptr;
       const double got = plane ? plane[GridGeometry::offsetInBlock(voxel)] : 0.0;
       const reference::Value truth = brute.evidence(voxel, id);

@@ -11,7 +11,7 @@
 namespace bki_mapping {
 namespace {
 
-using Item = std::pair<std::uint32_t, std::size_t>;  // key, place in the input
+using Item = std::pair<std::uint32_t, std::size_t>;  // key, position in the input
 
 TEST(GroupBy, SortsAsStableSortDoes) {
   std::mt19937 random(1);

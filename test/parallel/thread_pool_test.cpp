@@ -1,4 +1,4 @@
-// ThreadPool do every job once, pass on what jobs throw, and go on; what goes in turn goes in order.
+// A ThreadPool does every job once, rethrows exceptions, and stays usable; an OrderedQueue keeps the order.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -13,7 +13,7 @@
 namespace bki_mapping {
 namespace {
 
-TEST(ThreadPool, DoEachJobOnceRoundAfterRound) {
+TEST(ThreadPool, DoesEachJobOnceRoundAfterRound) {
   for (const int threads : {1, 2, 5}) {
     ThreadPool pool(threads);
     EXPECT_EQ(pool.count(), static_cast<std::size_t>(threads));
@@ -30,7 +30,7 @@ TEST(ThreadPool, DoEachJobOnceRoundAfterRound) {
   }
 }
 
-TEST(ThreadPool, BeginWithAShareOfTheirOwn) {
+TEST(ThreadPool, StartsEachWorkerWithItsOwnRange) {
   ThreadPool pool(2);
   for (int round = 0; round < 50; ++round) {
     std::atomic<int> begun{0};
@@ -44,7 +44,7 @@ TEST(ThreadPool, BeginWithAShareOfTheirOwn) {
   }
 }
 
-TEST(ThreadPool, TakeJobsInOrderWhereAsked) {
+TEST(ThreadPool, StartsJobsInOrderIfAsked) {
   ThreadPool pool(2);
   for (int round = 0; round < 50; ++round) {
     std::vector<std::atomic<int>> times(40);
@@ -52,18 +52,18 @@ TEST(ThreadPool, TakeJobsInOrderWhereAsked) {
     std::atomic<bool> in_order{true};
     pool.forEachInOrder(times.size(), [&](std::size_t job, std::size_t) {
       ++times[job];
-      if (job > begun++ + 1) in_order = false;  // the other thread may be about to begin one before it
+      if (job > begun++ + 1) in_order = false;  // the other thread may be about to start the job before
     });
     ASSERT_TRUE(in_order);
     for (const auto& each : times) ASSERT_EQ(each, 1);
   }
 }
 
-TEST(ThreadPool, HelpThoseWhoHaveMoreToDo) {
+TEST(ThreadPool, IdleWorkersTakeJobsFromOthers) {
   ThreadPool pool(2);
   std::atomic<bool> others_done{false};
   std::atomic<int> done{0};
-  // The first job ends when all others have, those of its share among them.
+  // The first job ends after all others, including those of its own range.
   pool.forEach(20, [&](std::size_t job, std::size_t) {
     if (job == 0) {
       while (!others_done) std::this_thread::yield();
@@ -74,7 +74,7 @@ TEST(ThreadPool, HelpThoseWhoHaveMoreToDo) {
   EXPECT_EQ(done, 19);
 }
 
-TEST(ThreadPool, PassOnWhatAJobThrowsAndGoOn) {
+TEST(ThreadPool, RethrowsFromJobsAndStaysUsable) {
   ThreadPool pool(3);
   for (int time = 0; time < 20; ++time) {
     const auto job = [](std::size_t j, std::size_t) {
@@ -87,7 +87,7 @@ TEST(ThreadPool, PassOnWhatAJobThrowsAndGoOn) {
   }
 }
 
-TEST(ThreadPool, WakeFromSleep) {
+TEST(ThreadPool, WakesFromSleep) {
   ThreadPool pool(2);
   for (int time = 0; time < 5; ++time) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -97,33 +97,33 @@ TEST(ThreadPool, WakeFromSleep) {
   }
 }
 
-TEST(OrderedQueue, TakesEachPieceInOrderAsSoonAsItMay) {
-  OrderedQueue turns;
+TEST(OrderedQueue, TakesEachPieceInOrderAsSoonAsPossible) {
+  OrderedQueue queue;
   for (int round = 0; round < 2; ++round) {
     std::vector<std::size_t> taken;
     const auto take = [&](std::size_t piece) { taken.push_back(piece); };
-    turns.start(4);
-    turns.finish(1, take);
+    queue.start(4);
+    queue.finish(1, take);
     EXPECT_EQ(taken, std::vector<std::size_t>());
-    turns.finish(0, take);
+    queue.finish(0, take);
     EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
-    turns.finish(3, take);
+    queue.finish(3, take);
     EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1}));
-    turns.finish(2, take);
+    queue.finish(2, take);
     EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1, 2, 3}));
   }
 }
 
-TEST(OrderedQueue, KeepsTheOrderWhateverThreadsDo) {
+TEST(OrderedQueue, KeepsTheOrderWithSeveralThreads) {
   ThreadPool pool(4);
-  OrderedQueue turns;
+  OrderedQueue queue;
   for (std::size_t round = 0; round < 200; ++round) {
     const std::size_t pieces = round % 40;
     std::vector<std::size_t> taken, all;
     for (std::size_t p = 0; p < pieces; ++p) all.push_back(p);
-    turns.start(pieces);
+    queue.start(pieces);
     pool.forEach(pieces, [&](std::size_t piece, std::size_t) {
-      turns.finish(piece, [&](std::size_t next) { taken.push_back(next); });
+      queue.finish(piece, [&](std::size_t next) { taken.push_back(next); });
     });
     ASSERT_EQ(taken, all);
   }

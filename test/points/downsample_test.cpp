@@ -1,4 +1,4 @@
-// Down-sampling against its slow reference, and the majority rule.
+// Down-sampling equals the reference for every tile size and number of threads; the majority rule.
 #include <gtest/gtest.h>
 
 #include "points/downsample.h"
@@ -14,13 +14,13 @@ LabelledPoints downsample(const Eigen::Vector3d& origin, const LabelledPoints& i
   ThreadPool pool(threads);
   Downsampler downsampler(cell, tile, instruction_set);
   LabelledPoints output;
-  for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
+  for (int time = 0; time < 2; ++time) {  // the second time reuses the memory of the first
     const std::size_t chunks = 3;
     downsampler.start(origin, chunks, pool, true);
-    const std::size_t share = input.points.size() / chunks + 1;
+    const std::size_t chunk_size = input.points.size() / chunks + 1;
     pool.forEach(chunks, [&](std::size_t c, std::size_t worker) {
       Downsampler::Input& into = downsampler.open(c, worker);
-      for (std::size_t i = c * share; i < std::min(input.points.size(), (c + 1) * share); ++i) {
+      for (std::size_t i = c * chunk_size; i < std::min(input.points.size(), (c + 1) * chunk_size); ++i) {
         into.add(input.points[i], input.labels[i]);
       }
       downsampler.close(c, worker);
@@ -42,7 +42,7 @@ TEST(Downsample, EqualsReferenceOnNastyScenes) {
     }
     const auto slow = reference::downsample(scene.scan.origin, points, 0.4);
     EXPECT_LT(slow.size(), points.size()) << scene.name;
-    // Tiles that cells fill, that they do not, of one cell, and cut in parts since they would hold too many.
+    // Tiles that are a multiple of the cell, that are not, of one cell, and too large for one tile.
     for (const double tile : {2.4, 0.7, 0.1, 16.0}) {
       for (const std::string& set : instructionSets()) {
         const LabelledPoints fast = downsample(scene.scan.origin, input, 0.4, 2, tile, set);
@@ -57,7 +57,7 @@ TEST(Downsample, EqualsReferenceOnNastyScenes) {
   }
 }
 
-TEST(Downsample, ThreadsDoNotShow) {
+TEST(Downsample, ThreadCountChangesNoBit) {
   const reference::Scene scene = reference::nastyScenes(2000).front();
   LabelledPoints input{scene.scan.points, {}};
   for (std::size_t i = 0; i < input.points.size(); ++i) input.labels.push_back(static_cast<ClassId>(i % 3));

@@ -1,5 +1,4 @@
-// Points are sorted into exactly the blocks that they reach, however long the kernel, whichever way they
-// come.
+// Points are stored in exactly the blocks that they reach, for kernels of any length and points in any order.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -24,16 +23,16 @@ LabelledPoints randomPoints(std::size_t count) {
   return points;
 }
 
-/// The blocks near a point, and how many of their voxel centres it reaches; voxel by voxel.
+/// The blocks that have a voxel centre within `length` [m] of a point, by a search over all voxels.
 std::set<GridIndex> blocksReached(const Eigen::Vector3d& point, double length) {
   const GridGeometry geometry(kResolution);
-  const VoxelIndex home = geometry.voxelAt(point);
+  const VoxelIndex centre = geometry.voxelAt(point);
   const int reach = static_cast<int>(length / kResolution) + 2;
   std::set<GridIndex> blocks;
   for (int z = -reach; z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
       for (int x = -reach; x <= reach; ++x) {
-        const VoxelIndex voxel{{home.x + x, home.y + y, home.z + z}};
+        const VoxelIndex voxel{{centre.x + x, centre.y + y, centre.z + z}};
         if ((geometry.voxelCentre(voxel) - point).norm() < length)
           blocks.insert(GridGeometry::blockOf(voxel));
       }
@@ -50,17 +49,17 @@ KernelConfig kernelOf(double length) {
 
 class Bins {
  public:
-  /// @param tile edge [m] in which neighbours come: blocks, or cubes that are none.
-  Bins(double length, bool home_always, const LabelledPoints& points, double tile)
+  /// @param tile edge of the down-sampler's tiles [m], which need not be blocks.
+  Bins(double length, bool keep_containing, const LabelledPoints& points, double tile)
       : downsampler_(0.0, tile),
         bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), pointKernelsFor("")) {
-    for (int time = 0; time < 2; ++time) {  // the second time with the memory of the first
+    for (int time = 0; time < 2; ++time) {  // the second time reuses the memory of the first
       downsampler_.start(kOrigin, 1, pool_, false);
       Downsampler::Input& input = downsampler_.open(0, 0);
       for (std::size_t i = 0; i < points.points.size(); ++i) input.add(points.points[i], points.labels[i]);
       downsampler_.close(0, 0);
       downsampler_.finish(pool_);
-      bins_.setPoints(kOrigin, downsampler_, home_always, pool_);
+      bins_.setPoints(kOrigin, downsampler_, keep_containing, pool_);
     }
   }
   const PointBins& bins() const { return bins_; }
@@ -95,7 +94,7 @@ TEST(PointBins, HoldsEachPointInTheBlocksThatItReaches) {
   }
 }
 
-TEST(PointBins, KeepsPointsWhereTheyAre) {
+TEST(PointBins, KeepsPointsInTheirContainingBlocks) {
   const LabelledPoints points = randomPoints(300);
   const GridGeometry geometry(kResolution);
   const Bins made(0.05, true, points, kBlock);  // most points reach no centre

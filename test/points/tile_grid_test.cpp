@@ -1,4 +1,4 @@
-// Placing many points at a time gives what placing one gives, on every instruction set.
+// Batches of points get the same tiles and cells as single points, with every instruction set.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ struct Points {
   Eigen::Vector3d at(std::size_t i) const { return Eigen::Vector3f(x[i], y[i], z[i]).cast<double>(); }
 };
 
-/// Points anywhere, on faces between cells of the map, and a hair beside these; a full batch.
+/// A full batch of points: random ones, ones on the faces of cells, and ones a few roundings beside these.
 Points nastyPoints(double cell, const Eigen::Vector3d& origin) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> anywhere(-80.0f, 80.0f);
@@ -30,12 +30,14 @@ Points nastyPoints(double cell, const Eigen::Vector3d& origin) {
   Points points;
   while (points.x.size() < kBatch) {
     const auto beside = [&](int axis) {
-      // A face, near the sensor.
+      // A coordinate within a few roundings of a cell's face.
       const double at = std::round(origin[axis] / cell) + face(random);
-      float place = static_cast<float>(at * cell - origin[axis]);
+      float coordinate = static_cast<float>(at * cell - origin[axis]);
       const int count = hairs(random);
-      for (int n = 0; n < std::abs(count); ++n) place = std::nextafter(place, count > 0 ? 1e9f : -1e9f);
-      return place;
+      for (int n = 0; n < std::abs(count); ++n) {
+        coordinate = std::nextafter(coordinate, count > 0 ? 1e9f : -1e9f);
+      }
+      return coordinate;
     };
     const auto on = [&] { return static_cast<float>(face(random) * cell); };
     points.add(anywhere(random), anywhere(random), anywhere(random));
@@ -82,7 +84,7 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
   }
 }
 
-TEST(TileGrid, PlacesPointsOutOfThisWorldSomewhere) {
+TEST(TileGrid, ClampsPointsTooFarAway) {
   Points points;
   for (const float far : {1e9f, -1e9f, 1e12f, -3e38f, 3e38f}) points.add(far, -far, 1.0f);
   for (const std::string& set : instructionSets()) {
@@ -101,12 +103,12 @@ TEST(TileGrid, PlacesPointsOutOfThisWorldSomewhere) {
   }
 }
 
-/// Distance from a point to the nearest voxel centre of the block that is `away` blocks off [voxels]; voxel
-/// by voxel.
-double distanceTo(const Eigen::Vector3d& from_first_centre, const Eigen::Vector3i& away) {
+/// Distance from a point to the nearest voxel centre of a neighbour block [voxels], by testing each.
+/// @param offset of the block [blocks].
+double distanceTo(const Eigen::Vector3d& from_first_centre, const Eigen::Vector3i& offset) {
   double least = 1e9;
   for (int v = 0; v < kBlockVoxels; ++v) {
-    const Eigen::Vector3d centre(v % 8 + 8 * away.x(), v / 8 % 8 + 8 * away.y(), v / 64 + 8 * away.z());
+    const Eigen::Vector3d centre(v % 8 + 8 * offset.x(), v / 8 % 8 + 8 * offset.y(), v / 64 + 8 * offset.z());
     least = std::min(least, (from_first_centre - centre).norm());
   }
   return least;

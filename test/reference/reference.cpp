@@ -9,7 +9,7 @@ namespace bki_mapping::reference {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// Comparisons nearer than this are left open: single precision cannot tell.
+/// Comparisons closer than this are undecided: single precision may round either way.
 constexpr double kClose = 2e-5;
 
 }  // namespace
@@ -47,10 +47,10 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
         merged.label = label;
       }
     }
-    const int votes_for_it = most;
+    const int votes_for_label = most;
     for (const Point& point : cells[key]) {
       if (point.label != merged.label) continue;
-      for (const auto& [label, share] : point.shares) merged.shares[label] += share / votes_for_it;
+      for (const auto& [label, share] : point.shares) merged.shares[label] += share / votes_for_label;
     }
     result.push_back(merged);
   }
@@ -251,7 +251,7 @@ Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
 
 int ScanReference::occluded(const VoxelIndex& voxel, double range) const {
   const Eigen::Vector3d centre = relativeCentre(voxel);
-  bool behind = false, close = false;
+  bool beyond_end = false, close = false;
   for (const Eigen::Vector3d& beam : beams_) {
     double rho = 0.0, k = 0.0;
     if (!reaches(beam, centre, rho, k)) continue;
@@ -259,9 +259,9 @@ int ScanReference::occluded(const VoxelIndex& voxel, double range) const {
     if (std::min(std::abs(rho), std::abs(1.0 - rho)) < kClose) close = true;
     if (std::abs(rho * beam.norm() - range) < kClose) close = true;
     if (rho > 0.0 && rho < 1.0) return close ? -2 : 0;
-    if (rho >= 1.0 && rho * beam.norm() <= range) behind = true;
+    if (rho >= 1.0 && rho * beam.norm() <= range) beyond_end = true;
   }
-  return close ? -2 : (behind ? 1 : -1);
+  return close ? -2 : (beyond_end ? 1 : -1);
 }
 
 }  // namespace bki_mapping::reference

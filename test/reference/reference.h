@@ -1,5 +1,5 @@
-/// @file The slow, obvious mapper that every fast path is held to: brute-force sums in double precision,
-/// written from the formulas alone.
+/// @file The reference for every fast path: brute-force sums in double precision, written directly from the
+/// formulas of docs/method.md.
 #pragma once
 
 #include <map>
@@ -13,21 +13,21 @@
 
 namespace bki_mapping::reference {
 
-/// A sum, and the part of it that hangs on comparisons too close to call in single precision.
+/// A sum, and the part of it (slack) whose comparisons are too close to decide in single precision.
 struct Value {
   double sum = 0.0;
   double slack = 0.0;
-  int beams = 0;  ///< that reach the voxel
+  int beams = 0;  ///< number of beams that reach the voxel
 
-  /// By how much a sum in single precision may err: where many beams hardly reach a voxel, the sum is small,
-  /// but each errs for itself, by some roundings of a number like the kernel's scale.
+  /// Greatest error of the sum in single precision. The term in `beams` covers voxels that many beams barely
+  /// reach: the sum is small, but each beam contributes rounding errors in proportion to the kernel's scale.
   double tolerance(double scale) const { return 2e-5 * scale + 2e-7 * scale * beams + 2e-5 * sum + slack; }
 };
 
 struct Point {
   Eigen::Vector3d p;  ///< relative to the sensor [m]
   int label;
-  std::map<int, double> shares = {};  ///< of classes, where the label is not sure
+  std::map<int, double> shares = {};  ///< soft labels; empty for a hard label
 
   double shareOf(int id) const {
     if (shares.empty()) return id == label ? 1.0 : 0.0;
@@ -36,20 +36,20 @@ struct Point {
   }
 };
 
-/// k(d) in double precision. @param d, length [m].
+/// k(d), Equation (1). @param d, length [m].
 double sparseKernel(double d, double length, double scale);
 
 std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<Point>& points, double cell);
 
-/// One scan, ready to be summed at any voxel.
+/// The evidence of one scan, summed at any voxel on request.
 class ScanReference {
  public:
   ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config);
 
   /// Evidence that this scan adds to a class (kFreeClass for free) at a voxel.
   Value evidence(const VoxelIndex& voxel, ClassId label) const;
-  /// Whether the scan sees a voxel only behind ends of beams: 1 yes, 0 crossed, -1 not reached, -2 too close
-  /// to call. Shadows end at `range` [m].
+  /// Whether the scan sees a voxel only beyond the ends of beams: 1 yes, 0 crossed, -1 not reached, -2 too
+  /// close to decide. Voxels are marked up to `range` from the sensor [m].
   int occluded(const VoxelIndex& voxel, double range) const;
 
   const std::vector<Point>& hits() const { return hits_; }
@@ -60,12 +60,12 @@ class ScanReference {
   Value unlimited(const VoxelIndex& voxel, ClassId label) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
-  /// Of all hits, whatever their class.
+  /// The evidence of all hits, whatever their class.
   Value anyHit(const VoxelIndex& voxel) const;
   Value lineEvidence(const VoxelIndex& voxel) const;
   bool blockIsHit(const BlockIndex& block) const;
   void drawSamples(std::uint64_t stamp);
-  /// Whether the beam's line reaches the voxel, and rho and k there.
+  /// Whether the beam's line reaches the voxel; sets rho and k there.
   bool reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho, double& k) const;
 
   MapperConfig config_;

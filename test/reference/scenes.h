@@ -1,4 +1,4 @@
-/// @file Small scenes for tests, some of them nasty.
+/// @file Small scenes for tests, most of them edge cases.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace bki_mapping::reference {
 
-/// Classes 0 (unlabelled, raw 0) to 3; class c has the raw label 10 c.
+/// Classes 0 to 3; class c has the raw label 10 c, and class 0 is unlabelled.
 inline std::shared_ptr<const ClassTable> smallTable() {
   std::vector<SemanticClass> classes(4);
   for (std::uint8_t id = 0; id < 4; ++id) {
@@ -43,8 +43,8 @@ Scene makeScene(const std::string& name, const Eigen::Vector3d& origin, int coun
   return scene;
 }
 
-/// Scenes that cover: all directions, the azimuth seam, both poles, beams along the axes, many hits in one
-/// place, hits about the sensor, an origin far from zero.
+/// Scenes that cover all directions, the azimuth seam, both poles, beams along the axes, a dense cluster of
+/// hits, hits about the sensor, and an origin far from zero.
 inline std::vector<Scene> nastyScenes(int count = 120) {
   const auto uniform = [](std::mt19937& r, double a, double b) {
     return std::uniform_real_distribution<double>(a, b)(r);
