@@ -56,7 +56,7 @@ class Tools(unittest.TestCase):
     def test_scripts_are_documented_with_all_options(self):
         source = os.environ['BKI_MAPPING_SOURCE_DIR']
         rows = self.rows_of_document()
-        for script in ('demo', 'reproduce', 'soak', 'test'):
+        for script in ('demo', 'reproduce', 'soak', 'test', 'test_on'):
             with open(os.path.join(source, 'scripts', script)) as file:
                 options = set(re.findall(r'^ +(--[a-z-]+)\)', file.read(), re.MULTILINE)) - {'--help'}
             self.assertTrue(options, script)
