@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rooms include only rooms that their library links; the core knows neither ROS nor PCL."""
+"""Rooms include only rooms that their library links; the core depends neither on ROS nor on PCL."""
 import os
 import re
 import unittest
