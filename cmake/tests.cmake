@@ -62,6 +62,7 @@ target_link_libraries(instruction_sets_test PRIVATE bki_mapping_points)
 target_link_libraries(parameters_test PRIVATE bki_mapping_io)
 target_link_libraries(real_data_test PRIVATE bki_mapping_io)
 target_link_libraries(map_export_test PRIVATE pcl_io)
+set_target_properties(map_export_test PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # VTK brings Qt, which wants -fPIC
 target_link_libraries(yaml_file_test PRIVATE bki_mapping_simulation yaml-cpp)
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
