@@ -1,5 +1,5 @@
-# The core: no ROS, no PCL. Everything a scan passes through until it is in the map. One library a room: what it links is
-# all that it may use, and the linker refuses the rest.
+# The core: no ROS, no PCL. Everything a scan passes through until it is in the map. Each room is one
+# library. It may use only what it links; the linker refuses the rest.
 
 # bki_mapping_room(NAME SOURCES file... [LINK target...]): the library bki_mapping_NAME from files in src/NAME, or from
 # paths below src.

@@ -106,7 +106,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/mapping_nodelet.test)
   add_rostest(test/ros/publishing.test)
   add_rostest(test/ros/replay.test)
-  # rostest does not say that a test skipped: ctest is told before.
+  # rostest does not report skipped tests, so a wrapper tells ctest beforehand.
   add_test(NAME real_bag_rostest
     COMMAND ${PROJECT_SOURCE_DIR}/test/with_data bags/luminar_no_label_no_tf.bag ${CATKIN_ENV}
       rostest --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} --results-filename test_ros_real_bag.xml

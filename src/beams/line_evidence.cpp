@@ -5,6 +5,8 @@
 namespace bki_mapping {
 namespace {
 
+/// Equation (7) of docs/method.md, for the counting kernel; for the sparse one, VecWeight in
+/// raster/slices_inl.h.
 float weightAt(BeamWeight weight, float rho) {
   if (!(rho > 0.0f && rho < 1.0f)) return 0.0f;
   switch (weight) {

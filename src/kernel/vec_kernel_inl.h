@@ -16,12 +16,12 @@ template <typename Table>
 class TableKernel {
  public:
   static constexpr float kScale = KernelTable::kScale, kShift = KernelTable::kShift;
-  /// In which distances are measured whose squares are taken, by lengths of the kernel.
+  /// Factor by which distances, in kernel lengths, are multiplied before they are squared.
   static float unit() { return std::sqrt(kScale); }
 
   TableKernel() : TableKernel(kernelTable()) {}
 
-  /// t where e and g are distances across each other.
+  /// t from two perpendicular distances e and g.
   [[gnu::always_inline]] static FloatVec squared(FloatVec e, FloatVec g) { return e * e + kShift + g * g; }
   /// t of a squared distance. @param scale kScale / (its unit of the kernel's length)^2.
   [[gnu::always_inline]] static FloatVec squared(FloatVec d2, float scale) { return d2 * scale + kShift; }

@@ -1,4 +1,5 @@
-/// @file Colours of voxels by state and class.
+/// @file Colours of voxels by state and class; ros/publishers/cell_markers.cpp has the other ways to colour
+/// them.
 #pragma once
 
 #include <array>

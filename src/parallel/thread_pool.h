@@ -34,8 +34,8 @@ class ThreadPool {
   /// Calls job(j, worker) for each j in [0, jobs), and returns when all are done. Jobs must be independent of
   /// each other; `worker` in [0, count()) identifies the thread. Each thread starts with its own consecutive
   /// range of jobs, so that a job of the next call finds its data in the same core's cache, and then takes
-  /// jobs from the others' ranges. Allocates no memory. Not to be called
-  /// from two threads at once or from a job.
+  /// jobs from the others' ranges. Allocates no memory. Must not be called from two threads at once, nor
+  /// from a job.
   /// @throws what the first failing job threw; jobs that have not started by then are skipped.
   template <typename Job>
   void forEach(std::size_t jobs, Job&& job) {

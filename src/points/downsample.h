@@ -22,8 +22,8 @@ struct LabelledPoints {
 };
 
 /// Merges the points of each cubic cell of the map frame into their centroid, labelled by the majority
-/// (ties: the smaller id). Points are added in chunks, which several threads may fill at once; the order of
-/// the points is that of the chunks. Keeps its memory from scan to scan.
+/// (ties: the smaller id; CellMerger). Points are added in chunks, which several threads may fill at once;
+/// the order of the points is that of the chunks. Keeps its memory from scan to scan.
 ///
 /// Each chunk is sorted by tile while it is in a core's cache; then tiles are merged one by one. A tile,
 /// about as large as a block, has few enough cells for a plain array instead of a hash table, and its output

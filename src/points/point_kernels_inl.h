@@ -44,7 +44,7 @@ class HaloAdder {
       addAround(count);
     }
   }
-  /// Of the points added, of which there was one at least.
+  /// The layers that the added points touch; at least one point must have been added.
   HaloLayers touched() const {
     HaloLayers layers;
     for (int z = 2; z < kLanes; z += kFields) {
@@ -56,7 +56,7 @@ class HaloAdder {
 
  private:
   static constexpr int kAtOnce = 32, kCorners = 8;
-  static constexpr int kFields = 4;  ///< of a point: x, y, z, and what is of no interest here
+  static constexpr int kFields = 4;  ///< of a point: x, y, z, and one that is ignored here
   static_assert(sizeof(LocalPoint) == kFields * sizeof(float) &&
                 offsetof(LocalPoint, z) == 2 * sizeof(float));
 
@@ -66,7 +66,7 @@ class HaloAdder {
       FloatVec c;
       if (p + kStep <= count) {
         c = LoadU(&points[p].x);
-      } else {  // the last points over and over: what is past them must not be read
+      } else {  // repeats the last point, because memory after it must not be read
         LocalPoint last[kStep];
         for (int n = 0; n < kStep; ++n) last[n] = points[std::min(p + n, count - 1)];
         c = LoadU(&last[0].x);

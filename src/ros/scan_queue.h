@@ -1,4 +1,5 @@
-/// @file The queue of clouds that wait for their transforms or for the mapper.
+/// @file The queue of clouds that wait for their transforms or for the mapper. MappingServer::processQueue
+/// drops those whose transform does not come within tf_timeout.
 #pragma once
 
 #include <sensor_msgs/PointCloud2.h>

@@ -13,7 +13,7 @@ struct Named {
 std::vector<Named> available() {
   std::vector<Named> sets = {{"generic", InstructionSet::kGeneric}};
 #if defined(__x86_64__)
-  // Both ask whether the operating system saves the registers, too.
+  // Both built-ins also ask whether the operating system saves the registers.
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
     sets.push_back({"avx2", InstructionSet::kAvx2});
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&

@@ -18,19 +18,20 @@
 /// - IfThenElse(m, a, b): a where the mask is set, else b.
 /// - AnyTrue(m): whether any lane of the mask is set.
 /// - TableLookupLanes(v, i): lane n is v[i[n]].
-/// - TableLookup(t, i): lane n is number i[n] of a table: Table8, eight numbers in memory, or Table32, 32
+/// - TableLookup(t, i): lane n is element i[n] of a table: Table8, eight numbers in memory, or Table32, 32
 ///   floats in two registers, of i[n] modulo 32. The latter only where kHasTable32.
 /// - ExtractLanes<k>(v, n): the n-th k lanes; k is 4, 8 or kLanes.
-/// - StoreInterleaved2(a, b, p): stores pairs, one of a and one of b; that of a lane is at p +
-///   Interleaved2(lane), that of the odd lane after it follows. StoreInterleaved4(v, p): stores fours, one of
+/// - StoreInterleaved2(a, b, p): stores pairs of one element of a and one of b; the pair of an even lane is
+/// at
+///   p + Interleaved2(lane), followed by that of the next lane. StoreInterleaved4(v, p): stores fours, one of
 ///   each of v[0] to v[3], at p + Interleaved4(lane). Unlike Highway's, they do not keep the order of lanes:
 ///   that would cost a permutation across the register for each vector.
 /// - Transpose4(rows): rows to columns, in four Float4.
 ///
-/// There is no MulAdd: a * b + c is fused where the instruction set can, and then rounded once.
+/// MulAdd is not needed: a * b + c is fused where the instruction set allows, and is then rounded only once.
 ///
-/// Everything stands in unnamed namespaces, as do the algorithms: of a function with one name in two objects,
-/// the linker keeps one, and that may be the one with instructions that a processor lacks.
+/// Everything is in unnamed namespaces, as are the algorithms: if two objects define a function of the same
+/// name, the linker keeps one, and that one may use instructions that the processor lacks.
 #pragma once
 
 #include <algorithm>
@@ -117,7 +118,8 @@ struct Table8 {
 };
 struct Table32;  // defined where kHasTable32
 
-// What unpacking the halves of 128 bits gives: the low ones in the first register, the high ones behind.
+// What unpacking the halves of 128 bits gives: the low ones in the first register, the high ones in the
+// second.
 constexpr int Interleaved2(int lane) {
   return lane / 4 * 4 + lane % 2 * 2 + lane % 4 / 2 * kLanes;
 }

@@ -100,7 +100,7 @@ class MapUpdater {
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
-  /// Lists the blocks of a group that a task touches in the worker's memory. @return them as a group.
+  /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
 
   std::vector<GridIndex> touched_;  ///< blocks, job by job

@@ -3,6 +3,7 @@
 
 namespace bki_mapping {
 
+/// The sparse kernel, Equation (1) of docs/method.md, or the counting sensor model (S-CSM), Equation (2).
 enum class KernelType { kSparse, kCounting };
 struct KernelConfig {
   KernelType type = KernelType::kSparse;

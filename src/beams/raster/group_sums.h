@@ -10,7 +10,7 @@
 namespace bki_mapping {
 
 /// Sums of the sparse kernel over beams: three arrays of the group's voxels, which differ in the axis along
-/// which voxels are adjacent in memory. Padding around the group takes what loops add beside it.
+/// which voxels are adjacent in memory. Padding around the group receives what loops add outside it.
 class GroupSums {
  public:
   static constexpr int kPad = 8;                                           ///< voxels before and after a row
@@ -33,16 +33,18 @@ class GroupSums {
 
   /// Forgets all sums. @param blocks that matter; sums of others are undefined.
   void start(std::uint64_t blocks);
-  /// Sets the array of a row axis to 0, which must not be used before. @return the group's first voxel there.
+  /// Sets the array of a row axis to 0. To be called before the array is used. @return the group's first
+  /// voxel there.
   float* open(int row_axis);
-  /// Sets `sums` to those of a block that matters. @param place in the group [blocks].
+  /// Sets `sums` to those of a block that matters. @param place coordinates of the block in the group
+  /// [blocks].
   void sumsOf(const std::array<int, 3>& place, float* sums) const;
   /// Allocates all memory that sums over up to this many beams need.
   void reserve(std::size_t beams);
 
   /// Loops may write up to this many passes past the last.
   static constexpr std::size_t kPassPadding = 16;
-  /// Working memory of what adds: the passes of beams, at most one a beam, and their count.
+  /// Working memory of the loops that add: the passes of beams, at most one for each beam, and their count.
   std::vector<BeamPass> passes;
   std::size_t pass_count = 0;
 

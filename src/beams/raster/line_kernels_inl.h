@@ -2,20 +2,18 @@
 ///
 /// 1. line_setup_inl.h, once a scan: for each beam the slices it is swept through, its slopes there, and the
 ///    quadratic form of the distance from its line (LineSetup).
-/// 2. pass_search_inl.h, for each group of blocks: which beams pass through the group's box, and in which
-/// slices
-///    (BeamPass). The beams it looks at are those of BeamField::findRangesNear.
+/// 2. pass_search_inl.h, for each group of blocks: which of the beams that BeamField::findRangesNear gives
+///    pass through the group's box, and in which slices (BeamPass).
 /// 3. slices_inl.h: the box in slices of each kind, and the line's position in its middle slice.
 /// 4. For each pass, by how far the kernel reaches from the line (in findLines):
-///      - narrow_kernel_inl.h, where skew slices have the reach within one column: always where the kernel is
-///      as
-///        long as a voxel or shorter, as by default. Two voxels of a column hold it, or four where the line
-///        is steep along the column (half_height > 1). Lanes are slices.
+///      - narrow_kernel_inl.h, where skew (sheared) slices have the reach within one column: always where the
+///        kernel is as long as a voxel or shorter, as by default. Two voxels of a column hold it, or four
+///        where the line is steep along the column (half_height > 1). Lanes are slices.
 ///      - wide_kernel_inl.h, in straight slices, for longer kernels. Lanes are the voxels of a slice.
 /// 5. GroupSums holds the sums of all beams, in rows along the axis that suits each kind of slice.
 ///
-/// The narrow way exists since per beam and slice it evaluates the kernel twice, where a straight slice takes
-/// a whole vector for the three or four voxels that matter.
+/// The narrow way exists because it evaluates the kernel only twice for a beam and a slice, whereas a
+/// straight slice takes a whole vector for the three or four voxels that matter.
 ///
 /// These files are included once for each instruction set, by line_kernels_*.cpp.
 #pragma once
@@ -35,7 +33,7 @@ namespace {
 /// Adds the beams whose passes have been found.
 template <BeamWeight kWeight>
 void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums) {
-  // From here on [voxels], the search, in single precision, includes slices beside the box.
+  // Beyond this distance [voxels] the search, in single precision, also finds slices outside the box.
   constexpr double kDistant = 1e5;
   const bool distant = box.centre().cwiseAbs().maxCoeff() > kDistant;
   constexpr auto kSlicing = BeamSlicing::of;
@@ -47,8 +45,8 @@ void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums)
     for (int k = 0; k < kGroupEdge; ++k) layers[axis][k] = layerOf(box.blocks, axis, k);
   }
   // Reaches below two voxels get columns in fours. With columns in eights for all, kernels of 1.5 voxels cost
-  // 17 % more (user time of map_sequence --threads 1, presets/robot.yaml, KITTI sequence 04, AVX-512); with
-  // fours and heights cut down to blocks that matter, as much.
+  // 17 % more (user time of map_sequence --threads 1, presets/robot.yaml, KITTI sequence 04, AVX-512); fours
+  // whose heights are cut down to the blocks that matter cost as much more.
   constexpr int kFour = 4, kEight = kLanes < 8 ? kLanes : 8;
   const VecKernel kernel;
   WideKernelRaster<kWeight, kFour> fours(kernel);

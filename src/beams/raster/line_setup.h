@@ -20,7 +20,7 @@ constexpr std::int32_t kOneVoxel = 1 << kPositionBits;
 /// From this fraction of its length on, the sparse kernel is below 1.1e-7, and is left out.
 constexpr double kReachThatCounts = 0.974;
 
-/// The line of a beam in its slices. Lengths are in voxels where nothing else is said; `side` counts columns
+/// The line of a beam in its slices. Lengths are in voxels unless stated otherwise; `side` counts columns
 /// of the slice, `height` voxels of a column.
 struct alignas(64) LineSetup {
   double slope_side, slope_height;      ///< steps from slice to slice
@@ -30,7 +30,7 @@ struct alignas(64) LineSetup {
   /// sqrt(LineKernels::kernel_scale)]; rho is greater there by rho_side side + rho_height height.
   float e_side, e_height, g_height, rho_side, rho_height;
   float rho_slice;               ///< change of rho from slice to slice
-  float half_side, half_height;  ///< how far from the line the kernel reaches in a slice, as far as it counts
+  float half_side, half_height;  ///< distance from the line, within a slice, up to which the kernel counts
   std::int32_t slicing;          ///< as BeamSlicing numbers them
 };
 
@@ -55,7 +55,8 @@ struct LineKernels;
 /// The lines of a scan's beams. Keeps its memory from scan to scan.
 class LineSetups {
  public:
-  /// Replaces the beams. @param length of the kernel [m]. @param kernels that will read them, too.
+  /// Replaces the beams. @param length of the kernel [m]. @param kernels the same that will read the lines
+  /// later.
   /// @throws std::invalid_argument if that is more than 72 voxels.
   void set(const Beams& beams, double resolution, double length, const LineKernels& kernels,
            ThreadPool& pool);

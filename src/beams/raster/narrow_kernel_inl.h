@@ -61,8 +61,8 @@ class NarrowKernelRaster {
       step += static_cast<float>(kLanes);
       n += kLanes;
     } while (n < end);
-    // Pairs are added two at a time, which must not overlap: of two slices of one beam, they never do. If the
-    // count is odd, the slice past the last, whose values are 0, fills up.
+    // Pairs are added two at a time and must not overlap; those of two slices of one beam never do. If the
+    // count is odd, a slice of zeros after the last completes the pair.
     count_ = kVoxels == 2 ? end + end % 2 : end;
   }
 
@@ -122,7 +122,7 @@ class NarrowKernelRaster {
   const VecKernel kernel_;
   float* sums_ = nullptr;
   int count_ = 0;
-  // The lowest voxel of each slice; of each voxel the squared distance, as the kernel takes it, and rho.
+  // For each slice its lowest voxel; for each voxel the squared distance, in the kernel's unit, and rho.
   alignas(64) std::int32_t voxel_[kRoom + kLanes];
   alignas(64) float squared_[kVoxels][kRoom + kLanes];
   alignas(64) float rho_[kVoxels][kRoom + kLanes];

@@ -161,7 +161,7 @@ class BoxSearch {
 constexpr std::size_t kAhead = 8;
 
 /// Finds the passes of beams through a box, in the order of the beams. `sums` has room for all of them
-/// (GroupSums::reserve). The kAhead passes past the last may be read, and have any value.
+/// (GroupSums::reserve). The kAhead passes after the last may be read; their values are arbitrary.
 inline void findPasses(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
                        const BeamBox& box, GroupSums& sums) {
   const BoxSearch search(box);

@@ -12,12 +12,12 @@
 namespace bki_mapping {
 namespace {
 
-/// The slice of a box in which a line's position is computed; from there it goes by steps. So what a beam
-/// adds to a voxel does not depend on the slice where its pass begins.
+/// The slice of a box in which a line's position is computed. Other slices are reached from it in steps, so
+/// that what a beam adds to a voxel does not depend on the slice where its pass begins.
 constexpr int kMiddleSlice = kGroupVoxels / 2, kMiddleSkewSlice[3] = {15, 0, 46};  ///< -1 and 1: by skew + 1
 
-/// Weights along beams, 0 unless 0 < rho < 1. @param rho less kMiddle: the bilinear weight is then one MinAbs
-/// and one difference.
+/// Weights along beams, Equation (7) of docs/method.md: 0 unless 0 < rho < 1. @param rho minus kMiddle, so
+/// that the bilinear weight is one MinAbs and one difference.
 template <BeamWeight kWeight>
 struct VecWeight {
   static constexpr float kMiddle = kWeight == BeamWeight::kBilinear ? 0.5f : 0.0f;
@@ -39,11 +39,12 @@ struct VecWeight {
 /// The line of a beam, and its position in the middle slice of a box.
 struct LineInBox {
   const LineSetup& line;
-  float rho;                  ///< less the weight's middle
+  float rho;                  ///< minus VecWeight::kMiddle
   std::int32_t side, height;  ///< from the group's first voxel, in fixed point
 };
 
-/// From one slice's voxels to the next's, and along the side and height axes in a slice [floats].
+/// Distances in memory [floats]: from a voxel to the same one in the next slice, and along the side and
+/// height axes within a slice.
 struct SliceStrides {
   int slice, side, height;
 };
