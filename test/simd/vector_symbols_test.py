@@ -7,7 +7,8 @@ import subprocess
 import sys
 import unittest
 
-OBJECTS = [path for argument in sys.argv[1:] for path in argument.split(';')]
+# CMake also lists precompiled headers (.gch).
+OBJECTS = [path for argument in sys.argv[1:] for path in argument.split(';') if path.endswith('.o')]
 # Those that include simd/vec_avx2.h or simd/vec_avx512.h.
 VECTOR = [path for path in OBJECTS if re.search(r'_kernels_avx\w+\.cpp', os.path.basename(path))]
 # AVX and what came after it is coded in a form (VEX, EVEX) that disassemblers show by a leading v.
