@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "bki_mapping/kernel/kernel_config.h"
 
@@ -28,14 +29,24 @@ constexpr float kSparsePolynomial[kSparseTerms] = {
 
 /// A kernel in units of voxels.
 struct VoxelKernel {
+  /// The farthest that a sparse kernel may reach [voxels]: fixed-point positions and the lists of blocks
+  /// around a point are made for it.
+  static constexpr double kMaxReach = 72.0;
+
   KernelType type = KernelType::kSparse;
   float reach = 1.0f;           ///< l / resolution
   float inverse_reach2 = 1.0f;  ///< 1 / reach^2
   float scale = 1.0f;           ///< sigma0; 1 for the counting model
 
+  /// @throws std::invalid_argument if a sparse kernel is longer than kMaxReach voxels.
   VoxelKernel(const KernelConfig& config, double resolution)
       : type(config.type), scale(type == KernelType::kSparse ? static_cast<float>(config.scale) : 1.0f) {
     const double length = config.lengthFor(resolution);
+    constexpr double kRounding = 1.0 + 1e-9;  // of the quotient
+    if (type == KernelType::kSparse && !(length <= kMaxReach * kRounding * resolution)) {
+      throw std::invalid_argument(
+          "kernel/length is more than 72 voxels; make it shorter, or resolution coarser");
+    }
     reach = static_cast<float>(length / resolution);
     inverse_reach2 = static_cast<float>(resolution * resolution / (length * length));
   }

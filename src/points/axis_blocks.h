@@ -44,7 +44,7 @@ class AxisBlocks {
   const AxisBlock* begin() const { return blocks_.data(); }
   const AxisBlock* end() const { return blocks_.data() + count_; }
 
-  static constexpr std::size_t kMost = 20;  ///< blocks; enough for a reach of 72 voxels
+  static constexpr std::size_t kMost = 20;  ///< blocks; enough for VoxelKernel::kMaxReach
 
  private:
   void append(int block, double local, double distance) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "parallel/group_by.h"
 #include "points/axis_blocks.h"
@@ -54,11 +53,7 @@ template <typename Scratch, typename Group>
 
 PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels)
     : geometry_(geometry), kernel_(kernel), kernels_(kernels) {
-  const double most = kBlockEdge * (AxisBlocks::kMost - 2) / 2.0;
-  if (kernel_.type == KernelType::kSparse && !(kernel_.reach < most)) {
-    throw std::invalid_argument("kernel/length is more than " + std::to_string(static_cast<int>(most)) +
-                                " voxels; make it shorter, or resolution coarser");
-  }
+  static_assert(kBlockEdge * (AxisBlocks::kMost - 2) >= 2.0 * VoxelKernel::kMaxReach);
 }
 
 /// For kernels that always reach the containing block, and at most its neighbours.

@@ -19,7 +19,6 @@ namespace bki_mapping {
 /// reach; with the counting kernel, in its containing block. Keeps its memory from scan to scan.
 class PointBins {
  public:
-  /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
   PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels);
 
   /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].

@@ -16,7 +16,7 @@ class PointEvidence : public Evidence {
  public:
   /// @param reports_voxels whether to report the voxels that contain a point (BlockSums::occupied).
   /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
-  /// @throws std::invalid_argument if a sparse kernel is longer than 72 voxels.
+  /// @throws std::invalid_argument as VoxelKernel.
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels = false,
                 const std::string& instruction_set = "");
 

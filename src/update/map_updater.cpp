@@ -72,7 +72,7 @@ void MapUpdater::groupJobs() {
   });
 }
 
-std::size_t MapUpdater::reservePlanes(Job& job, std::size_t position) {
+std::size_t MapUpdater::reservePlanes(BlockJob& job, std::size_t position) {
   ClassSet classes;
   for (std::size_t t = 0; t < task_count_; ++t) {
     const std::uint32_t touched = tasks_[t].positionOf(position);
@@ -99,7 +99,7 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     constexpr std::ptrdiff_t kAhead = 4;  // jobs; long enough to hide the latency of memory
     for (const std::uint32_t* job = group_jobs_.begin(position); job != group_jobs_.end(position); ++job) {
       if (group_jobs_.end(position) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
-      Job& each = jobs_[*job];
+      BlockJob& each = jobs_[*job];
       classes = std::max(classes, reservePlanes(each, *job));
       of_group += static_cast<std::ptrdiff_t>(each.block->bytes() - each.bytes_before);
     }
@@ -119,7 +119,7 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
 }
 
 void MapUpdater::rollBack(SemanticMap& map) noexcept {
-  for (const Job& job : jobs_) {
+  for (const BlockJob& job : jobs_) {
     job.block->shrink();
     if (job.is_new) map.erase(job.index);
   }
@@ -162,7 +162,7 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   }
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
        ++j) {
-    Job& job = jobs_[*j];
+    BlockJob& job = jobs_[*j];
     job.empty = job.block->empty();
     const std::size_t after = job.empty ? 0 : job.block->bytes();
     job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
@@ -196,7 +196,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   } else {
     pool.forEach(groups_.size(), add);
   }
-  for (const Job& job : jobs_) {
+  for (const BlockJob& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }

@@ -47,7 +47,7 @@ class MapUpdater {
 
  private:
   /// A touched block of the map.
-  struct Job {
+  struct BlockJob {
     BlockIndex index;
     Block* block;
     bool is_new;
@@ -96,7 +96,7 @@ class MapUpdater {
                ThreadPool& pool);
   /// Reserves the planes of a job's block. @param position of the job in jobs_.
   /// @return the number of classes to which this scan may add in the block.
-  std::size_t reservePlanes(Job& job, std::size_t position);
+  std::size_t reservePlanes(BlockJob& job, std::size_t position);
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
@@ -104,7 +104,7 @@ class MapUpdater {
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
 
   std::vector<GridIndex> touched_;  ///< blocks, job by job
-  std::vector<Job> jobs_;
+  std::vector<BlockJob> jobs_;
   /// For each position in SemanticMap::entries(), the position of the block's job in jobs_. Entries may be
   /// stale, from an earlier update; the index of the job tells.
   std::vector<std::uint32_t> job_of_entry_;

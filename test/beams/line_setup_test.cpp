@@ -96,14 +96,5 @@ TEST(LineSetups, AgreeWithGeometryOnEachInstructionSet) {
   }
 }
 
-TEST(LineSetups, KernelsOfMoreThan72VoxelsAreTooLong) {
-  ThreadPool pool(1);
-  LineSetups setups;
-  const std::string fastest;
-  const LineKernels& kernels = lineKernelsFor(fastest);
-  setups.set({{}, directions()}, 0.1, 7.2, kernels, pool);
-  EXPECT_THROW(setups.set({{}, directions()}, 0.1, 7.21, kernels, pool), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace bki_mapping

@@ -59,5 +59,15 @@ TEST(KernelTable, IsNothingAtTheEdgeAndHardlyBelowNothingBeforeIt) {
   for (int i = 0; i <= 100000; ++i) ASSERT_GE(fromTable(tablePlaceOf(i * 1e-5)), -1e-8f) << i;
 }
 
+TEST(VoxelKernel, ReachesUpTo72VoxelsUnlessItCounts) {
+  KernelConfig config;
+  config.length = 7.2;
+  EXPECT_FLOAT_EQ(VoxelKernel(config, 0.1).reach, 72.0f);
+  config.length = 7.21;
+  EXPECT_THROW(VoxelKernel(config, 0.1), std::invalid_argument);
+  config.type = KernelType::kCounting;  // has no length
+  EXPECT_NO_THROW(VoxelKernel(config, 0.1));
+}
+
 }  // namespace
 }  // namespace bki_mapping

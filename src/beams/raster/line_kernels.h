@@ -15,7 +15,7 @@ namespace bki_mapping {
 struct LineKernels {
   const char* instruction_set;
   /// Computes the lines of beams. @param beams from the sensor to their ends [m]. @param resolution [m].
-  /// @param reach length of the kernel [voxels], at most kMostLineReach.
+  /// @param reach length of the kernel [voxels], at most VoxelKernel::kMaxReach.
   void (*set_up_lines)(const Eigen::Vector3f* beams, std::size_t count, double resolution, float reach,
                        const LineSetupTargets& to);
   /// Sets the sums of the blocks of a box that matter to those of w(rho) k(d) over the beams of some ranges,

@@ -1,7 +1,5 @@
 #include "beams/raster/line_setup.h"
 
-#include <stdexcept>
-
 #include "beams/beam_cells.h"
 #include "beams/raster/line_kernels.h"
 #include "parallel/chunks.h"
@@ -14,9 +12,6 @@ void LineSetups::set(const Beams& beams, double resolution, double length, const
   axis_.resize(padded, 0);
   for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
   lines_.resize(count);
-  if (length > kMostLineReach * resolution) {
-    throw std::invalid_argument("a kernel of more than 72 voxels is too long for lines");
-  }
   const auto reach = static_cast<float>(length / resolution);
   const Chunks chunks(count);
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {

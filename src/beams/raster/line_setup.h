@@ -12,9 +12,8 @@
 namespace bki_mapping {
 
 /// Positions in a slice are also stored in fixed point, with this many fractional bits. With a kernel of up
-/// to kMostLineReach voxels what is computed with them stays below 256 voxels.
+/// to VoxelKernel::kMaxReach what is computed with them stays below 256 voxels.
 constexpr int kPositionBits = 23;
-constexpr double kMostLineReach = 72.0 * (1.0 + 1e-9);  ///< with room for rounding
 constexpr std::int32_t kOneVoxel = 1 << kPositionBits;
 
 /// From this fraction of its length on, the sparse kernel is below 1.1e-7, and is left out.
@@ -57,7 +56,6 @@ class LineSetups {
  public:
   /// Replaces the beams. @param length of the kernel [m]. @param kernels the same that will read the lines
   /// later.
-  /// @throws std::invalid_argument if that is more than 72 voxels.
   void set(const Beams& beams, double resolution, double length, const LineKernels& kernels,
            ThreadPool& pool);
 
