@@ -11,6 +11,7 @@
 #include <new>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "free_space/registry.h"
 #include "reference/scenes.h"
 
 namespace {
@@ -91,7 +92,7 @@ TEST(Allocation, TheCounterCounts) {
 
 TEST(Allocation, NoneInTheSteadyState) {
   const Scan scan = everywhere();
-  for (const char* mode : {"none", "even", "uniform", "linear", "line"}) {
+  for (const std::string& mode : freeSpaceModes()) {
     for (const FreeSpaceExtent extent : {FreeSpaceExtent::kMapped, FreeSpaceExtent::kObserved}) {
       MapperConfig config;
       config.free_space.mode = mode;
@@ -185,7 +186,7 @@ Scan withShares(Scan scan) {
 
 TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
   for (const bool on : {false, true}) {
-    for (const char* mode : {"none", "even", "uniform", "linear", "line"}) {
+    for (const std::string& mode : freeSpaceModes()) {
       MapperConfig config;
       config.free_space.mode = mode;
       config.threads = 1;

@@ -9,6 +9,7 @@
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "free_space/registry.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
@@ -84,7 +85,7 @@ bool has(const std::string& text, const std::string& words) {
 }
 
 TEST(Bounds, OneFarPointIsLeftOut) {
-  for (const char* mode : {"none", "even", "uniform", "linear", "line"}) {
+  for (const std::string& mode : freeSpaceModes()) {
     MapperConfig config;
     config.free_space.mode = mode;
     config.occlusion = OcclusionExtent::kAll;

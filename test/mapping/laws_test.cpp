@@ -8,12 +8,13 @@
 
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "free_space/registry.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
 namespace {
 
-const std::vector<std::string> kModes = {"none", "even", "uniform", "linear", "line"};
+const std::vector<std::string> kModes = freeSpaceModes();
 
 std::vector<Scan> someScans() {
   std::vector<Scan> scans;
