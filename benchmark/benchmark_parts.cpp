@@ -51,14 +51,14 @@ void observing(benchmark::State& state) {
 void binning(benchmark::State& state) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel);
-  for (auto _ : state) evidence.setPoints(f.scan.origin, f.preprocessor.hits(), f.pool);
+  for (auto _ : state) evidence.setPoints(f.scan.origin, f.preprocessor.hitGroups(), f.pool);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.hits.points.size()));
 }
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
   PointEvidence evidence(f.geometry, f.config.kernel, false, instruction_set);
-  evidence.setPoints(f.scan.origin, f.preprocessor.hits(), f.pool);
+  evidence.setPoints(f.scan.origin, f.preprocessor.hitGroups(), f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;
   for (auto _ : state) updater.update(map, {&evidence}, f.pool);

@@ -40,7 +40,7 @@ bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.c
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp
     point_kernels.cpp point_kernels_avx2.cpp point_kernels_avx512.cpp point_kernels_generic.cpp
-    soft_point_evidence.cpp tile_grid.cpp
+    tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp

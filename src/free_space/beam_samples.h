@@ -56,7 +56,7 @@ class BeamSamples {
       downsampler_.close(c, worker);
     });
     downsampler_.finish(pool);
-    evidence_.setPoints(beams.origin, downsampler_, pool);
+    evidence_.setPoints(beams.origin, downsampler_.merged(), pool);
     return {&evidence_, evidence_.size()};
   }
 

@@ -195,9 +195,13 @@ const PreprocessedScan& ScanPreprocessor::process(const Scan& scan, const ClassT
   processed_.hits.points.clear();
   processed_.hits.labels.clear();
   if (ordered) hits_.inOrder(pool, processed_.hits);
-  processed_.soft.clear();
+  hit_groups_ = hits_.merged();
+  processed_.hit_count = sizeOf(hits_.merged());
+  soft_.clear();
   if (!scan.soft.empty())
-    mergeSoftLabels(scan, used_, config_.downsample_resolution, processed_.hits, processed_.soft);
+    soft_ = mergeSoftLabels(scan, used_, config_.downsample_resolution, processed_.hits);
+  if (!soft_.empty()) hit_groups_.clear();
+  for (const MergedPoints& group : soft_) hit_groups_.push_back(&group);
   processed_.beams.origin = scan.origin;
   processed_.beams.ends.clear();
   if (beams) {

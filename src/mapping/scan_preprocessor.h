@@ -15,9 +15,9 @@ namespace bki_mapping {
 
 /// A scan after filtering and down-sampling.
 struct PreprocessedScan {
-  LabelledPoints hits;
-  SoftLabels soft;  ///< of the hits; empty if each hit has a single class
-  Beams beams;      ///< one to each hit, then those cut at max_range
+  LabelledPoints hits;  ///< empty where neither beams nor soft labels need their order
+  std::size_t hit_count = 0;
+  Beams beams;  ///< one to each hit, then those cut at max_range
   PointCounts counts;
 };
 
@@ -31,14 +31,14 @@ class ScanPreprocessor {
         hits_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()),
         cut_(config.downsample_resolution, GridGeometry(config.resolution).blockSize()) {}
 
-  /// Filters and down-samples a scan. @param beams whether to make beams, too. Without beams and soft labels,
-  /// which both need the hits in the order of the scan, `hits` stays empty; read hits() instead.
-  /// @return the result, valid until the next call.
+  /// Filters and down-samples a scan. @param beams whether to make beams, too. @return the result, valid
+  /// until the next call.
   /// @throws std::invalid_argument if the scan has not one label for each point.
   const PreprocessedScan& process(const Scan& scan, const ClassTable& classes, ThreadPool& pool,
                                   bool beams = true);
-  /// The hits of the last scan, in groups of points that are close together.
-  const Downsampler& hits() const { return hits_; }
+
+  /// The hits of the last scan; where some have several classes, each once for each of them.
+  const PointGroups& hitGroups() const { return hit_groups_; }
 
  private:
   /// The outputs of one chunk of points.
@@ -65,6 +65,8 @@ class ScanPreprocessor {
   std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels
   std::vector<PointCounts> counts_;           ///< of each chunk
   Downsampler hits_, cut_;
+  std::vector<MergedPoints> soft_;  ///< the hits by class, if some have several
+  PointGroups hit_groups_;
   LabelledPoints cut_points_;
   PreprocessedScan processed_;
 };

@@ -17,7 +17,6 @@
 #include "free_space/registry.h"
 #include "mapping/scan_preprocessor.h"
 #include "points/point_evidence.h"
-#include "points/soft_point_evidence.h"
 #include "update/map_updater.h"
 
 namespace bki_mapping {
@@ -115,7 +114,6 @@ ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::
 struct SemanticMapper::Pipeline {
   ScanPreprocessor preprocessor;
   PointEvidence hits;
-  SoftPointEvidence soft_hits;
   LazyBeamField beams;
   std::unique_ptr<FreeSpaceModel> free_space;
   Occlusion occlusion;
@@ -124,7 +122,6 @@ struct SemanticMapper::Pipeline {
   Pipeline(const MapperConfig& config, const GridGeometry& geometry)
       : preprocessor(config),
         hits(geometry, config.kernel, config.free_space.hits_before_misses),
-        soft_hits(geometry, config.kernel, config.free_space.hits_before_misses),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
@@ -211,19 +208,14 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   const PreprocessedScan& processed =
       p.preprocessor.process(scan, *classes_, *pool_, p.free_space->needsBeams() || occludes);
   stats.counts = processed.counts;
-  stats.hits = p.preprocessor.hits().size();
+  stats.hits = processed.hit_count;
   stats.observe_ms = watch.lap();
 
-  const bool soft = !processed.soft.empty();
-  if (soft) {
-    p.soft_hits.setPoints(scan.origin, processed.hits, processed.soft);
-  } else {
-    p.hits.setPoints(scan.origin, p.preprocessor.hits(), *pool_);
-  }
+  p.hits.setPoints(scan.origin, p.preprocessor.hitGroups(), *pool_);
   p.beams.setBeams(processed.beams);
   const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
   ScanEvidence evidence;
-  evidence.hits = soft ? static_cast<Evidence*>(&p.soft_hits) : &p.hits;
+  evidence.hits = &p.hits;
   evidence.free = free.evidence;
   if (occludes) {
     const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;

@@ -22,6 +22,17 @@ void addShare(const ClassShare& share, std::vector<ClassShare>& sums) {
   }
 }
 
+/// Hits of a group.
+constexpr std::size_t kGroupHits = 4096;
+
+void append(const Eigen::Vector3f& point, ClassId label, float weight, MergedPoints& group) {
+  group.x.push_back(point.x());
+  group.y.push_back(point.y());
+  group.z.push_back(point.z());
+  group.labels.push_back(label);
+  group.weights.push_back(weight);
+}
+
 void addPoint(const SoftLabels& soft, const UsedPoint& used, CellShares& cell) {
   ++cell.points;
   const ClassShare* const begin = soft.begin(used.offset);
@@ -32,8 +43,8 @@ void addPoint(const SoftLabels& soft, const UsedPoint& used, CellShares& cell) {
 
 }  // namespace
 
-void mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used, double cell,
-                     const LabelledPoints& hits, SoftLabels& soft) {
+std::vector<MergedPoints> mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used,
+                                          double cell, const LabelledPoints& hits) {
   const GridGeometry grid(cell > 0.0 ? cell : 1.0);
   IndexNumbering cells;  // numbered in the same order as the down-sampler's
   std::vector<CellShares> shares(hits.points.size());
@@ -45,12 +56,17 @@ void mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>
       if (hits.labels[hit] == point.id) addPoint(scan.soft, point, shares[hit]);
     }
   }
-  soft.clear();
-  if (std::all_of(shares.begin(), shares.end(), [](const auto& c) { return c.sums.size() == 1; })) return;
-  for (const CellShares& c : shares) {
-    soft.startPoint();
-    for (const ClassShare& s : c.sums) soft.add({s.id, s.share / static_cast<float>(c.points)});
+  std::vector<MergedPoints> groups;
+  if (std::all_of(shares.begin(), shares.end(), [](const auto& c) { return c.sums.size() == 1; }))
+    return groups;
+  for (std::size_t h = 0; h < shares.size(); ++h) {
+    if (h % kGroupHits == 0) groups.emplace_back();
+    const CellShares& c = shares[h];
+    for (const ClassShare& s : c.sums) {
+      append(hits.points[h], s.id, s.share / static_cast<float>(c.points), groups.back());
+    }
   }
+  return groups;
 }
 
 }  // namespace bki_mapping

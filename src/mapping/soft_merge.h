@@ -5,6 +5,7 @@
 
 #include "bki_mapping/core/scan.h"
 #include "points/downsample.h"
+#include "points/merged_points.h"
 
 namespace bki_mapping {
 
@@ -18,8 +19,9 @@ struct UsedPoint {
 /// class as their likeliest. So shares of 0 and 1 give the same map as hard labels.
 /// @param used points that became hits, by chunk, in the order of the scan.
 /// @param cell edge of the down-sampling cells [m]; 0: off. @param hits after down-sampling.
-/// @param[out] soft the shares; empty if each hit has a single class.
-void mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used, double cell,
-                     const LabelledPoints& hits, SoftLabels& soft);
+/// @return each hit once for each of its classes, weighted by the share; empty if each hit has a single
+/// class.
+std::vector<MergedPoints> mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used,
+                                          double cell, const LabelledPoints& hits);
 
 }  // namespace bki_mapping

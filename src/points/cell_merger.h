@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "parallel/thread_pool.h"
+#include "points/merged_points.h"
 #include "points/tile_grid.h"
 
 namespace bki_mapping {
@@ -13,20 +14,6 @@ struct alignas(16) TilePoint {
   float x, y, z;       ///< relative to the sensor [m]
   std::uint16_t cell;  ///< offset of its cell in the tile
   ClassId label;
-};
-
-/// Points and their classes, as one array for each coordinate.
-struct MergedPoints {
-  std::vector<float> x, y, z;  ///< relative to the sensor [m]
-  std::vector<ClassId> labels;
-
-  std::size_t size() const { return labels.size(); }
-  void resize(std::size_t size) {
-    x.resize(size);
-    y.resize(size);
-    z.resize(size);
-    labels.resize(size);
-  }
 };
 
 /// Sums the points of each cell, one tile at a time. Keeps its memory from tile to tile; one for each thread.

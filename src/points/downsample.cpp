@@ -189,8 +189,8 @@ void Downsampler::finish(ThreadPool& pool) {
   pool.forEach(used_groups_, [&](std::size_t g, std::size_t worker) {
     merge(static_cast<std::uint32_t>(g), mergers_[worker]);
   });
-  size_ = 0;
-  for (std::size_t g = 0; g < used_groups_; ++g) size_ += groups_[g].merged.size();
+  merged_.clear();
+  for (std::size_t g = 0; g < used_groups_; ++g) merged_.push_back(&groups_[g].merged);
 }
 
 void Downsampler::write(const Chunk& chunk, LabelledPoints& output) const {

@@ -79,12 +79,10 @@ class Downsampler {
 
   /// Merges the points. Call after all chunks are closed.
   void finish(ThreadPool& pool);
-  std::size_t size() const { return size_; }  ///< number of merged points
 
-  /// The merged points come in groups of points that are close together. The groups do not depend on the
-  /// number of workers.
-  std::size_t groups() const { return used_groups_; }
-  const MergedPoints& merged(std::size_t group) const { return groups_[group].merged; }
+  /// The merged points, in groups of points that are close together. The groups do not depend on the number
+  /// of workers.
+  const PointGroups& merged() const { return merged_; }
 
   /// Writes the merged points in the order of their cells' first points.
   void inOrder(ThreadPool& pool, LabelledPoints& output);
@@ -122,13 +120,14 @@ class Downsampler {
   GridGeometry cells_;
   int edge_;  ///< of a tile [cells]
   std::optional<TileGrid> grid_;
-  std::size_t used_ = 0, used_groups_ = 0, size_ = 0;
+  std::size_t used_ = 0, used_groups_ = 0;
   std::vector<Chunk> chunks_;
   std::vector<Input> inputs_;        ///< one for each worker
   std::vector<CellMerger> mergers_;  ///< one for each worker
   OrderedQueue queue_;               ///< of closed chunks, whose runs are collected in order
   RunsByIndex<Run> tiles_;
   std::vector<Group> groups_;
+  PointGroups merged_;
 };
 
 }  // namespace bki_mapping

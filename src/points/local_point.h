@@ -20,6 +20,7 @@ struct PointRun {
   const LocalPoint* points;
   std::size_t count;
   std::uint64_t classes = 0;  ///< of the points, by classBit(); not set where all points of a scan are of one
+  const float* weights = nullptr;  ///< of the points; null if all are 1
 
   /// The bit of a class; large ids share the last one.
   static constexpr std::uint32_t kSharedBit = 63;

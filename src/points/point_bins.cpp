@@ -46,6 +46,7 @@ template <typename Scratch, typename Group>
   point.z = scratch.places.inside[2][i] - offset[2];
   point.label = scratch.labels[i];
   point.voxel = static_cast<std::uint16_t>(voxel);
+  if (scratch.weights != nullptr) scratch.weight[scratch.size] = scratch.weights[i];
   scratch.block[scratch.size++] = block;
 }
 
@@ -87,10 +88,7 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
       zs(containing.z, scratch.places.inside[2][i], reach);
   // A long kernel may reach hundreds of blocks.
   const std::size_t needed = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
-  if (scratch.points.size() < needed) {
-    scratch.block.resize(needed);
-    scratch.points.resize(needed);
-  }
+  reserve(needed, scratch);
   bool reaches_containing = false;
   for (const AxisBlock& bz : zs) {
     for (const AxisBlock& by : ys) {
@@ -113,12 +111,16 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
   }
 }
 
-void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) const {
-  const std::size_t needed = scratch.size + kNeighbours.size() * count;
-  if (scratch.points.size() < needed) {
-    scratch.points.resize(2 * needed);
-    scratch.block.resize(2 * needed);
+void PointBins::reserve(std::size_t points, Scratch& scratch) const {
+  if (scratch.points.size() < points) {
+    scratch.points.resize(2 * points);
+    scratch.block.resize(2 * points);
   }
+  if (weighted_ && scratch.weight.size() < points) scratch.weight.resize(2 * points);
+}
+
+void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) const {
+  reserve(scratch.size + kNeighbours.size() * count, scratch);
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
       append(group.blocks.insert(scratch.places.tileOf(i)), i, kNeighbours[kContaining].voxels,
@@ -134,11 +136,14 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) cons
 
 void PointBins::sortGroup(const Scratch& scratch, Group& group) const {
   group.points.resize(scratch.size);
+  group.weights.resize(weighted_ ? scratch.size : 0);
   group.classes.assign(group.blocks.size(), 0);
   groupBy(group.blocks.size(), group.begin.data(), [&](auto&& positionOf) {
     for (std::size_t i = 0; i < scratch.size; ++i) {
       const std::uint32_t block = scratch.block[i];
-      group.points[positionOf(block)] = scratch.points[i];
+      const std::uint32_t position = positionOf(block);
+      group.points[position] = scratch.points[i];
+      if (weighted_) group.weights[position] = scratch.weight[i];
       group.classes[block] |= PointRun::classBit(scratch.points[i].label);
     }
   });
@@ -156,6 +161,7 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
     const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
     kernels_.place_points(grid, span, count, scratch.places);
     scratch.labels = points.labels.data() + begin;
+    scratch.weights = weighted_ ? points.weights.data() + begin : nullptr;
     binBatch(count, scratch, group);
   }
   sortGroup(scratch, group);
@@ -168,8 +174,9 @@ void PointBins::collectRuns(const Group& group) {
   one_class_ &= !group.has_other_class && group.first_class == groups_[0].first_class;
   const std::vector<GridIndex>& indices = group.blocks.members();
   for (std::size_t b = 0; b < indices.size(); ++b) {
-    blocks_.add(indices[b], {group.points.data() + group.begin[b], group.begin[b + 1] - group.begin[b],
-                             group.classes[b]});
+    const std::uint32_t begin = group.begin[b];
+    blocks_.add(indices[b], {group.points.data() + begin, group.begin[b + 1] - begin, group.classes[b],
+                             weighted_ ? group.weights.data() + begin : nullptr});
   }
 }
 
@@ -185,23 +192,26 @@ void PointBins::start(std::size_t groups, const ThreadPool& pool) {
   for (Scratch& scratch : scratch_) {
     scratch.points.resize(points);
     scratch.block.resize(points);
+    if (weighted_) scratch.weight.resize(points);
   }
 }
 
-void PointBins::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool keep_containing,
+void PointBins::setPoints(const Eigen::Vector3d& origin, const PointGroups& points, bool keep_containing,
                           ThreadPool& pool) {
   keep_containing_ = keep_containing;
+  weighted_ = std::any_of(points.begin(), points.end(),
+                          [](const MergedPoints* group) { return !group->weights.empty(); });
   // An estimate of the mean number of blocks that the kernel reaches.
   const double blocks_per_point =
       kernel_.type == KernelType::kCounting
           ? 1.0
           : std::pow(2.0 * static_cast<double>(kernel_.reach) / kBlockEdge + 1.0, 3.0);
-  const double binned = static_cast<double>(points.size()) * blocks_per_point;
+  const double binned = static_cast<double>(sizeOf(points)) * blocks_per_point;
   if (binned > kMostBinned) throw TooMuchWork(TooMuchWork::What::kBlocks, binned);
   const TileGrid grid(geometry_, origin, kBlockEdge);
-  start(points.groups(), pool);
-  pool.forEach(points.groups(), [&](std::size_t g, std::size_t worker) {
-    binGroup(grid, points.merged(g), scratch_[worker], groups_[g]);
+  start(points.size(), pool);
+  pool.forEach(points.size(), [&](std::size_t g, std::size_t worker) {
+    binGroup(grid, *points[g], scratch_[worker], groups_[g]);
     queue_.finish(g, [this](std::size_t next) { collectRuns(groups_[next]); });
   });
   blocks_.sort();

@@ -9,8 +9,8 @@
 #include "parallel/ordered_queue.h"
 #include "parallel/runs_by_index.h"
 #include "parallel/thread_pool.h"
-#include "points/downsample.h"
 #include "points/local_point.h"
+#include "points/merged_points.h"
 #include "points/point_kernels.h"
 
 namespace bki_mapping {
@@ -21,11 +21,11 @@ class PointBins {
  public:
   PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels);
 
-  /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
+  /// Replaces the points. @param points relative to the origin. @param origin in the map frame [m].
   /// @param keep_containing whether to store a point in its containing block even if it reaches no voxel
   /// centre there. @throws TooMuchWork if storing the points in every block that they reach would take too
   /// much memory.
-  void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, bool keep_containing,
+  void setPoints(const Eigen::Vector3d& origin, const PointGroups& points, bool keep_containing,
                  ThreadPool& pool);
 
   /// Exactly the blocks that points reach and, with `keep_containing`, those that contain points.
@@ -37,24 +37,29 @@ class PointBins {
   const PointRun* end(std::size_t block) const { return blocks_.end(block); }
   /// Whether all points have the same class.
   bool oneClass() const { return one_class_; }
+  /// Whether points have weights.
+  bool weighted() const { return weighted_; }
 
  private:
   /// Working memory of one thread.
   struct alignas(kThreadsApart) Scratch {
     TilePlaces places;
     const ClassId* labels = nullptr;  ///< of the batch
+    const float* weights = nullptr;   ///< of the batch; null if all are 1
     GridIndex containing;             ///< containing block of the last point
     /// Position in Group::blocks of that block and its neighbours, or kNoPosition.
     std::array<std::uint32_t, 27> neighbours;
     std::vector<LocalPoint> points;    ///< of the group, unsorted
+    std::vector<float> weight;         ///< of each point, if they have weights
     std::vector<std::uint32_t> block;  ///< of each point: position in Group::blocks
-    std::size_t size = 0;              ///< elements in use of the last two arrays
+    std::size_t size = 0;              ///< elements in use of the last three arrays
   };
-  /// The points of one group of the down-sampler, by block.
+  /// The points of one of the PointGroups, by block.
   struct alignas(kThreadsApart) Group {
     IndexNumbering blocks;
     std::vector<std::uint32_t> begin;  ///< of each block's points; one element more than blocks
     std::vector<LocalPoint> points;
+    std::vector<float> weights;          ///< of the points, if they have any
     std::vector<std::uint64_t> classes;  ///< of each block's points, as in PointRun::classes
     ClassId first_class;                 ///< of the first point
     bool has_other_class;
@@ -62,6 +67,8 @@ class PointBins {
 
   void start(std::size_t groups, const ThreadPool& pool);
   void binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch, Group& group) const;
+  /// Makes room for so many points.
+  void reserve(std::size_t points, Scratch& scratch) const;
   void binBatch(std::size_t count, Scratch& scratch, Group& group) const;
   void binToNeighbours(std::size_t count, Scratch& scratch, Group& group) const;
   void binToAll(std::size_t i, Scratch& scratch, Group& group) const;
@@ -71,7 +78,7 @@ class PointBins {
   GridGeometry geometry_;
   VoxelKernel kernel_;
   const PointKernels& kernels_;
-  bool keep_containing_ = false, one_class_ = false;
+  bool keep_containing_ = false, one_class_ = false, weighted_ = false;
   std::vector<Scratch> scratch_;  ///< one for each worker
   std::vector<Group> groups_;
   OrderedQueue queue_;  ///< of finished groups, whose runs are collected in order

@@ -13,8 +13,8 @@ PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& k
       bins_(geometry, kernel_, kernels_),
       reports_voxels_(reports_voxels) {}
 
-void PointEvidence::setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool) {
-  size_ = points.size();
+void PointEvidence::setPoints(const Eigen::Vector3d& origin, const PointGroups& points, ThreadPool& pool) {
+  size_ = sizeOf(points);
   bins_.setPoints(origin, points, reports_voxels_, pool);
 }
 
@@ -50,7 +50,10 @@ void PointEvidence::reserve(std::size_t workers) {
     most = std::max(most, count);
   }
   workspaces_.resize(workers);
-  for (Workspace& each : workspaces_) each.points.resize(most);
+  for (Workspace& each : workspaces_) {
+    each.points.resize(most);
+    if (bins_.weighted()) each.weights.resize(most);
+  }
 }
 
 void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const {
@@ -61,7 +64,9 @@ void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t co
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);
   for (const PointRun* run = runs; run != runs + count; ++run) {
-    for (std::size_t i = 0; i < run->count; ++i) plane.values[run->points[i].voxel] += 1.0f;
+    for (std::size_t i = 0; i < run->count; ++i) {
+      plane.values[run->points[i].voxel] += run->weights == nullptr ? 1.0f : run->weights[i];
+    }
   }
 }
 
@@ -80,7 +85,9 @@ std::size_t PointEvidence::sortByClass(std::size_t block, Workspace& workspace, 
   groupBy(last + 1, begin.data(), [&](auto&& positionOf) {
     for (const PointRun* run = runs; run != runs_end; ++run) {
       for (std::size_t i = 0; i < run->count; ++i) {
-        workspace.points[positionOf(run->points[i].label)] = run->points[i];
+        const std::uint32_t position = positionOf(run->points[i].label);
+        workspace.points[position] = run->points[i];
+        if (run->weights != nullptr) workspace.weights[position] = run->weights[i];
       }
     }
   });
@@ -103,7 +110,8 @@ void PointEvidence::sumBlock(std::size_t block, Workspace& workspace, BlockSums&
   const std::size_t count = sortByClass(block, workspace, begin);
   for (std::size_t i = 0; i < count;) {
     const auto label = static_cast<ClassId>(workspace.points[i].label);
-    const PointRun run{workspace.points.data() + i, begin[label + 1] - i, 0};
+    const PointRun run{workspace.points.data() + i, begin[label + 1] - i, 0,
+                       bins_.weighted() ? workspace.weights.data() + i : nullptr};
     sumClass(label, &run, 1, sums);
     i = begin[label + 1];
   }

@@ -9,9 +9,9 @@
 
 namespace bki_mapping {
 
-/// Adds k(|x - c|) to the class of each point x at every voxel centre c within the support radius; with the
-/// counting kernel, 1 at the voxel that contains the point. Equations (3) and (4) of docs/method.md. Keeps
-/// its memory from scan to scan.
+/// Adds k(|x - c|), times the weight of the point, to the class of each point x at every voxel centre c
+/// within the support radius; with the counting kernel, the weight alone at the voxel that contains the
+/// point. Equations (3) and (4) of docs/method.md. Keeps its memory from scan to scan.
 class PointEvidence : public Evidence {
  public:
   /// @param reports_voxels whether to report the voxels that contain a point (BlockSums::occupied).
@@ -20,9 +20,9 @@ class PointEvidence : public Evidence {
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels = false,
                 const std::string& instruction_set = "");
 
-  /// Replaces the points. @param points merged, relative to the origin. @param origin in the map frame [m].
+  /// Replaces the points. @param points relative to the origin. @param origin in the map frame [m].
   /// @throws TooMuchWork as PointBins.
-  void setPoints(const Eigen::Vector3d& origin, const Downsampler& points, ThreadPool& pool);
+  void setPoints(const Eigen::Vector3d& origin, const PointGroups& points, ThreadPool& pool);
   std::size_t size() const { return size_; }  ///< number of points
 
   /// Exactly the blocks that have a voxel centre within reach of a point and, if voxels are reported, those
@@ -38,6 +38,7 @@ class PointEvidence : public Evidence {
   /// Working memory of one thread: the points of a block, sorted by class.
   struct alignas(kThreadsApart) Workspace {
     std::vector<LocalPoint> points;
+    std::vector<float> weights;  ///< of the points, if they have any
   };
   /// The position of the first point of each class.
   using ClassBegins = std::array<std::uint32_t, kMaxClasses + 3>;

@@ -41,7 +41,13 @@ class HaloAdder {
     for (std::size_t p = 0; p < run.count; p += kAtOnce) {
       const int count = static_cast<int>(std::min<std::size_t>(run.count - p, kAtOnce));
       findCells(run.points + p, count);
-      addAround(count);
+      if (run.weights == nullptr) {
+        addAround<false>(count);
+      } else {
+        for (int n = 0; n < count; ++n)
+          inside_[kFields * n + kWeight] = run.weights[p + static_cast<std::size_t>(n)];
+        addAround<true>(count);
+      }
     }
   }
   /// The layers that the added points touch; at least one point must have been added.
@@ -56,7 +62,8 @@ class HaloAdder {
 
  private:
   static constexpr int kAtOnce = 32, kCorners = 8;
-  static constexpr int kFields = 4;  ///< of a point: x, y, z, and one that is ignored here
+  /// Of a point: x, y, z, and one that inside_ has for its weight.
+  static constexpr int kFields = 4, kWeight = 3;
   static_assert(sizeof(LocalPoint) == kFields * sizeof(float) &&
                 offsetof(LocalPoint, z) == 2 * sizeof(float));
 
@@ -79,14 +86,15 @@ class HaloAdder {
       StoreU(c - ConvertTo<FloatVec>(cell), inside_ + kFields * p);
     }
   }
-  /// A coordinate of points in their cells, each in the lanes of its corners.
-  [[gnu::always_inline]] static FloatVec inside(const float* from, int axis, [[maybe_unused]] IntVec point) {
+  /// A field of inside_, that of each point in the lanes of its corners.
+  [[gnu::always_inline]] static FloatVec inside(const float* from, int field, [[maybe_unused]] IntVec point) {
     if constexpr (kLanes <= kCorners) {
-      return Set(from[axis]);
+      return Set(from[field]);
     } else {
-      return TableLookupLanes(LoadU(from), point + axis);
+      return TableLookupLanes(LoadU(from), point + field);
     }
   }
+  template <bool kWeighted>
   void addAround(int count) {
     constexpr int kPoints = std::max(kLanes / kCorners, 1), kVecs = std::max(kCorners / kLanes, 1);
     // In registers: the compiler must assume that adding to the halo changes members.
@@ -101,7 +109,8 @@ class HaloAdder {
                      z = inside(from, 2, point) - above;
       for (int vec = 0; vec < kVecs; ++vec) {
         const FloatVec dz = z - static_cast<float>(vec);
-        const FloatVec values = kernel(VecKernel::squared(dx * dx + dy * dy + dz * dz, scale));
+        FloatVec values = kernel(VecKernel::squared(dx * dx + dy * dy + dz * dz, scale));
+        if constexpr (kWeighted) values *= inside(from, kWeight, point);
         for (int four = 0; four < kLanes / 4; ++four) {
           const int n = p + four / 2;
           if (n == count) break;
@@ -154,6 +163,7 @@ Block::Layers sumOfNearestEight(const PointRun* runs, std::size_t count, float i
 }
 
 /// For a kernel of any reach. Lanes are the voxels of a row, or of adjacent rows where a vector is longer.
+template <bool kWeighted>
 void addPointsToRows(const PointRun& run, float reach, float inverse_reach2, float* sums) {
   constexpr int kRows = kLanes > kBlockEdge ? kLanes / kBlockEdge : 1, kStep = kRows * kBlockEdge;
   const auto first = [reach](float c) { return c > reach ? static_cast<int>(c - reach) : 0; };
@@ -176,7 +186,9 @@ void addPointsToRows(const PointRun& run, float reach, float inverse_reach2, flo
         float* const rows = sums + kBlockEdge * (j + kBlockEdge * k);
         for (int i = 0; i < kStep; i += kLanes) {
           const FloatVec dx = in_row + (static_cast<float>(i) - point.x);
-          AddU(kernel(VecKernel::squared(dx * dx + yz2, scale)), rows + i);
+          FloatVec values = kernel(VecKernel::squared(dx * dx + yz2, scale));
+          if constexpr (kWeighted) values *= run.weights[p];
+          AddU(values, rows + i);
         }
       }
     }
@@ -187,7 +199,10 @@ Block::Layers sumPoints(const PointRun* runs, std::size_t count, float reach, fl
   const float inverse_reach2 = 1.0f / (reach * reach);
   if (reach <= 1.0f) return sumOfNearestEight(runs, count, inverse_reach2, scale, sums);
   for (int v = 0; v < kBlockVoxels; ++v) sums[v] = 0.0f;
-  for (std::size_t r = 0; r < count; ++r) addPointsToRows(runs[r], reach, inverse_reach2, sums);
+  for (const PointRun* run = runs; run != runs + count; ++run) {
+    const auto add = run->weights == nullptr ? addPointsToRows<false> : addPointsToRows<true>;
+    add(*run, reach, inverse_reach2, sums);
+  }
   for (int v = 0; v < kBlockVoxels; ++v) sums[v] = notNegative(scale * sums[v]);
   return {};
 }

@@ -238,35 +238,65 @@ TEST(InstructionSets, ManyBeamsAllAroundEqualBruteForceOnEach) {
   }
 }
 
-TEST(InstructionSets, PointsEqualBruteForceOnEach) {
+/// A scene's points as evidence; with soft labels once for each class, weighted by its share.
+MergedPoints pointsOf(const Scan& scan) {
+  MergedPoints points;
+  const auto add = [&](const Eigen::Vector3f& point, ClassId label) {
+    points.x.push_back(point.x());
+    points.y.push_back(point.y());
+    points.z.push_back(point.z());
+    points.labels.push_back(label);
+  };
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.soft.empty()) {
+      add(scan.points[i], static_cast<ClassId>(scan.labels[i] / 10));
+      continue;
+    }
+    for (const ClassShare* share = scan.soft.begin(i); share != scan.soft.end(i); ++share) {
+      add(scan.points[i], share->id);
+      points.weights.push_back(share->share);
+    }
+  }
+  return points;
+}
+
+void expectPointsEqualBruteForce(const reference::Scene& scene) {
   ThreadPool pool(2);
+  const MergedPoints points = pointsOf(scene.scan);
   for (const std::string& set : instructionSets()) {
-    for (const reference::Scene& scene : reference::nastyScenes(300)) {
-      for (const double length : {0.2, 0.3, 0.5, 1.0}) {  // below, at and above a voxel
-        MapperConfig config;
-        config.downsample_resolution = 0.0;
-        config.kernel.length = length;
-        const GridGeometry geometry(config.resolution);
-        Downsampler points(0.0, geometry.blockSize(), set);  // merges nothing
-        points.start(scene.scan.origin, 1, pool, false);
-        Downsampler::Input& input = points.open(0, 0);
-        for (std::size_t i = 0; i < scene.scan.points.size(); ++i) {
-          input.add(scene.scan.points[i], static_cast<ClassId>(scene.scan.labels[i] / 10));
-        }
-        points.close(0, 0);
-        points.finish(pool);
-        PointEvidence evidence(geometry, config.kernel, false, set);
-        evidence.setPoints(scene.scan.origin, points, pool);
-        SemanticMap map(geometry, config.prior, 4);
-        MapUpdater().update(map, {&evidence}, pool);
-        ASSERT_GT(map.size(), 0u);
-        const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
-        for (ClassId id = 0; id < 4; ++id) {
-          EXPECT_EQ(faultsOf(map, brute, id, config), 0u)
-              << set << ", " << scene.name << ", length " << length;
-        }
+    for (const double length : {0.2, 0.3, 0.5, 1.0}) {  // below, at and above a voxel
+      MapperConfig config;
+      config.downsample_resolution = 0.0;
+      config.kernel.length = length;
+      PointEvidence evidence(GridGeometry(config.resolution), config.kernel, false, set);
+      evidence.setPoints(scene.scan.origin, {&points}, pool);
+      SemanticMap map(GridGeometry(config.resolution), config.prior, 4);
+      MapUpdater().update(map, {&evidence}, pool);
+      ASSERT_GT(map.size(), 0u);
+      const reference::ScanReference brute(scene.scan, *reference::smallTable(), config);
+      for (ClassId id = 0; id < 4; ++id) {
+        EXPECT_EQ(faultsOf(map, brute, id, config), 0u) << set << ", " << scene.name << ", length " << length;
       }
     }
+  }
+}
+
+TEST(InstructionSets, PointsEqualBruteForceOnEach) {
+  for (const reference::Scene& scene : reference::nastyScenes(300)) expectPointsEqualBruteForce(scene);
+}
+
+TEST(InstructionSets, WeightedPointsEqualBruteForceOnEach) {
+  for (reference::Scene scene : reference::nastyScenes(300)) {
+    scene.scan.labels_are_ids = true;
+    for (std::size_t i = 0; i < scene.scan.points.size(); ++i) {
+      const auto share = static_cast<float>(i % 97 + 1) / 100.0f;
+      scene.scan.labels[i] = share > 0.5f ? 1 : 3;
+      scene.scan.soft.startPoint();
+      scene.scan.soft.add({1, share});
+      scene.scan.soft.add({3, 1.0f - share});
+    }
+    scene.name += ", soft labels";
+    expectPointsEqualBruteForce(scene);
   }
 }
 
