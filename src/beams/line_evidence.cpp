@@ -5,19 +5,31 @@
 namespace bki_mapping {
 namespace {
 
-/// Equation (7) of docs/method.md, for the counting kernel; for the sparse one, VecWeight in
-/// raster/slices_inl.h.
-float weightAt(BeamWeight weight, float rho) {
-  if (!(rho > 0.0f && rho < 1.0f)) return 0.0f;
-  switch (weight) {
-    case BeamWeight::kLinear:
-      return rho;
-    case BeamWeight::kBilinear:
-      return std::min(rho, 1.0f - rho);
-    default:
-      return 1.0f;
+/// Adds the weights of beams to the voxels that they cross, some at a time.
+class CrossingSums {
+ public:
+  CrossingSums(BeamWeight weight, const LineKernels& kernels, float* sums)
+      : weight_(weight), kernels_(kernels), sums_(sums) {}
+
+  void add(int voxel, float rho) {
+    voxels_[count_] = voxel;
+    rho_[count_] = rho;
+    if (++count_ == kWeighed) flush();
   }
-}
+  void flush() {
+    kernels_.weigh(weight_, rho_);
+    for (std::size_t n = 0; n < count_; ++n) sums_[voxels_[n]] += rho_[n];
+    count_ = 0;
+  }
+
+ private:
+  BeamWeight weight_;
+  const LineKernels& kernels_;
+  float* sums_;
+  std::size_t count_ = 0;
+  int voxels_[kWeighed];
+  float rho_[kWeighed] = {};  // all of them are weighed
+};
 
 /// Scales sums. @return whether any sum is above 0. The loop has no branch, so that compilers vectorise it.
 bool scaleSums(float scale, float* sums) {
@@ -65,8 +77,10 @@ double LineEvidence::cost(const BlockGroup& group) const {
 
 void LineEvidence::countCrossings(const BlockIndex& index, NearBeams& near, float* sums) const {
   std::fill_n(sums, kBlockVoxels, 0.0f);
+  CrossingSums crossings(weight_, kernels_, sums);
   field_->forEachVoxelNear(index, 0.0, near,
-                           [&](int offset, float rho, float) { sums[offset] += weightAt(weight_, rho); });
+                           [&](int offset, float rho, float) { crossings.add(offset, rho); });
+  crossings.flush();
 }
 
 void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks,

@@ -11,6 +11,9 @@
 
 namespace bki_mapping {
 
+/// How many weights are computed at once.
+constexpr std::size_t kWeighed = 64;
+
 /// The loops for one instruction set. line_kernels_inl.h says how they work.
 struct LineKernels {
   const char* instruction_set;
@@ -24,6 +27,8 @@ struct LineKernels {
   /// @param beams set up by the same instruction set. @param sums with memory for all of them.
   void (*trace_beams)(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
                       const BeamBox& box, BeamWeight weight, GroupSums& sums);
+  /// Replaces kWeighed projections rho by the weights there, as in trace_beams.
+  void (*weigh)(BeamWeight weight, float* rho);
   float kernel_scale;  ///< lines measure distances in lengths of the kernel / sqrt(kernel_scale)
 };
 

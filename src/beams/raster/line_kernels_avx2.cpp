@@ -10,7 +10,7 @@
 namespace bki_mapping {
 
 const LineKernels& lineKernelsAvx2() {
-  static const LineKernels kernels = {"avx2", setUpLines, traceBeams, VecKernel::kScale};
+  static const LineKernels kernels = {"avx2", setUpLines, traceBeams, weigh, VecKernel::kScale};
   return kernels;
 }
 

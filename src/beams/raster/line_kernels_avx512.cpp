@@ -10,7 +10,7 @@
 namespace bki_mapping {
 
 const LineKernels& lineKernelsAvx512() {
-  static const LineKernels kernels = {"avx512", setUpLines, traceBeams, VecKernel::kScale};
+  static const LineKernels kernels = {"avx512", setUpLines, traceBeams, weigh, VecKernel::kScale};
   return kernels;
 }
 

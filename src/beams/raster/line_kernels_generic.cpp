@@ -8,7 +8,7 @@
 namespace bki_mapping {
 
 const LineKernels& lineKernelsGeneric() {
-  static const LineKernels kernels = {"generic", setUpLines, traceBeams, VecKernel::kScale};
+  static const LineKernels kernels = {"generic", setUpLines, traceBeams, weigh, VecKernel::kScale};
   return kernels;
 }
 

@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "beams/raster/line_setup_inl.h"
 #include "beams/raster/narrow_kernel_inl.h"
@@ -94,16 +95,35 @@ void traceWeightedBeams(const LineSetupArrays& beams, const BeamRange* ranges, s
   addBeams<kWeight>(beams, box, sums);
 }
 
-void traceBeams(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count, const BeamBox& box,
-                BeamWeight weight, GroupSums& sums) {
+template <BeamWeight kWeight>
+void weighWith(float* rho) {
+  static_assert(kWeighed % kLanes == 0);
+  for (std::size_t n = 0; n < kWeighed; n += kLanes) {
+    StoreU(VecWeight<kWeight>::at(LoadU(rho + n) - VecWeight<kWeight>::kMiddle), rho + n);
+  }
+}
+
+/// Calls a function with a weight as std::integral_constant.
+template <typename Call>
+void withWeight(BeamWeight weight, Call&& call) {
   switch (weight) {
     case BeamWeight::kUniform:
-      return traceWeightedBeams<BeamWeight::kUniform>(beams, ranges, count, box, sums);
+      return call(std::integral_constant<BeamWeight, BeamWeight::kUniform>());
     case BeamWeight::kLinear:
-      return traceWeightedBeams<BeamWeight::kLinear>(beams, ranges, count, box, sums);
+      return call(std::integral_constant<BeamWeight, BeamWeight::kLinear>());
     case BeamWeight::kBilinear:
-      return traceWeightedBeams<BeamWeight::kBilinear>(beams, ranges, count, box, sums);
+      return call(std::integral_constant<BeamWeight, BeamWeight::kBilinear>());
   }
+}
+
+void traceBeams(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count, const BeamBox& box,
+                BeamWeight weight, GroupSums& sums) {
+  withWeight(weight,
+             [&](auto w) { traceWeightedBeams<decltype(w)::value>(beams, ranges, count, box, sums); });
+}
+
+void weigh(BeamWeight weight, float* rho) {
+  withWeight(weight, [&](auto w) { weighWith<decltype(w)::value>(rho); });
 }
 
 }  // namespace
