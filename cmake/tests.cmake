@@ -115,7 +115,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/two_mappers.test)
   # Found by rostest where catkin puts executables; loads the nodelet into its own process.
   add_executable(soak_test test/ros/soak_test.cpp)
-  target_link_libraries(soak_test PRIVATE bki_mapping_ros GTest::gtest ${catkin_LIBRARIES})
+  target_link_libraries(soak_test PRIVATE bki_mapping_ros bki_mapping_simulation GTest::gtest ${catkin_LIBRARIES})
   bki_mapping_warnings(soak_test)
   add_dependencies(soak_test bki_mapping_nodelets)
   add_rostest(test/ros/soak.test)

@@ -33,7 +33,7 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
 std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map) const {
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
   for (const Voxel& voxel : voxels_) {
-    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
     if (voxel.ground_points + voxel.standing_points + voxel.other_points > 0) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
     } else if (voxel.early_moving_points > 0 && !voxel.hit_late) {
@@ -46,7 +46,7 @@ std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const Se
 DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
   DynamicsQuality quality;
   for (const Voxel& voxel : voxels_) {
-    const bool occupied = judgeVoxel(map, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
     quality.other_points += voxel.other_points;

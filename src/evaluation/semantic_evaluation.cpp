@@ -123,7 +123,7 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
   quality.input = input_;
   std::vector<Ranked> ranked;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
-    const VoxelView view = judgeVoxel(map, voxels_[n]);
+    const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
     Ranked voxel{static_cast<double>(view.variance), 0, 0};
     for (const auto& [truth, points] : points_[n]) {
       quality.map.add(truth, view.label, points);
@@ -141,7 +141,7 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
 std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map) const {
   std::vector<VoxelIndex> wrong;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
-    const VoxelView view = judgeVoxel(map, voxels_[n]);
+    const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
     if (view.state == VoxelState::kOccupied && points_[n].count(view.label) == 0) wrong.push_back(voxels_[n]);
   }
   return wrong;

@@ -108,7 +108,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
   for (const Seen& voxel : voxels_) {
     const std::size_t bin = distanceBin(voxel.index);
     const ClassId truth = classAt(voxel.index, time);
-    const VoxelView view = judgeVoxel(map, voxel.index);
+    const VoxelView view = viewWithoutEntropy(map, voxel.index);
     quality.voxels.add(truth, view.label);
     if (view.evidence > 0.0f) {
       quality.occupancy.add(static_cast<double>(view.occupancy), 1, truth == kFreeClass ? 0 : 1);

@@ -71,7 +71,7 @@ std::set<VoxelState> parseStates(const std::string& list) {
 void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::set<VoxelState>& states,
                   const BlockIndex& index, const Block& block, std::vector<VoxelRecord>& voxels) {
   for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    if (states.count(judgeVoxel(map, block, offset).state) == 0) continue;
+    if (states.count(viewWithoutEntropy(map, block, offset).state) == 0) continue;
     const VoxelView view = viewVoxel(map, block, offset);
     const VoxelIndex voxel = GridGeometry::voxelOf(index, offset);
     const Eigen::Vector3f centre = map.geometry().voxelCentre(voxel).cast<float>();

@@ -57,11 +57,11 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
 
 }  // namespace
 
-std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
-                                             const std::vector<GridIndex>& changed) {
-  std::set<Place> stacks;
+std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
+                                                  const std::vector<GridIndex>& changed) {
+  std::set<StackIndex> stacks;
   for (const GridIndex& index : changed) {
-    const Place stack(index.x, index.y);
+    const StackIndex stack(index.x, index.y);
     stacks.insert(stack);
     if (map.find({index})) {
       blocks_[stack].insert(index.z);
@@ -70,7 +70,7 @@ std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const Class
     }
   }
   Cells cells;
-  for (const Place& stack : stacks) {
+  for (const StackIndex& stack : stacks) {
     const auto blocks = blocks_.find(stack);
     if (blocks->second.empty()) {
       blocks_.erase(blocks);
@@ -83,7 +83,7 @@ std::set<ColumnMap::Place> ColumnMap::update(const SemanticMap& map, const Class
       for (const std::int32_t z : blocks->second) {
         const Block& block = *map.find({{stack.first, stack.second, z}});
         for (int k = 0; k < kBlockEdge; ++k) {
-          const VoxelView view = judgeVoxel(map, block, c + kBlockEdge * kBlockEdge * k);
+          const VoxelView view = viewWithoutEntropy(map, block, c + kBlockEdge * kBlockEdge * k);
           if (view.state != VoxelState::kUnknown) {
             cells.push_back({z * kBlockEdge + k, view.state, view.label});
           }

@@ -12,7 +12,7 @@ double plogp(double p) {
 
 }  // namespace
 
-VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset) {
+VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset) {
   VoxelView view;
   double total = 0.0;
   float best = 0.0f, free = 0.0f;
@@ -44,7 +44,7 @@ VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset) {
 }
 
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
-  VoxelView view = judgeVoxel(map, block, offset);
+  VoxelView view = viewWithoutEntropy(map, block, offset);
   const auto& classes = block.classes();
   double total = 0.0;
   for (std::size_t i = 0; i < classes.size(); ++i) total += block.plane(i)[offset];
@@ -58,9 +58,9 @@ VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
   return view;
 }
 
-VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel) {
+VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel) {
   const Block* block = map.find(GridGeometry::blockOf(voxel));
-  return block ? judgeVoxel(map, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
+  return block ? viewWithoutEntropy(map, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
 }
 
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {

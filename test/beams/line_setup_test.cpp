@@ -37,8 +37,8 @@ struct Basis {
     const Eigen::Vector3d main = Eigen::Vector3d::Unit(slicing.axis),
                           beside = Eigen::Vector3d::Unit(kSideAxis[slicing.axis]);
     height = Eigen::Vector3d::Unit(kHeightAxis[slicing.axis]);
-    side = slicing.skew == 0 ? beside : Eigen::Vector3d(main - 2.0 * slicing.skew * beside);
-    across = slicing.skew == 0 ? main : Eigen::Vector3d(2.0 * main + slicing.skew * beside);
+    side = slicing.shear == 0 ? beside : Eigen::Vector3d(main - 2.0 * slicing.shear * beside);
+    across = slicing.shear == 0 ? main : Eigen::Vector3d(2.0 * main + slicing.shear * beside);
   }
 };
 
@@ -51,24 +51,24 @@ void expectSetupsAgreeWithGeometry(const LineKernels& kernels) {
   for (const double reach : {0.4, 1.0, 1.5, 4.0}) {  // [voxels]
     LineSetups setups;
     setups.set({{}, ends}, kResolution, reach * kResolution, kernels, pool);
-    int skews = 0, straights = 0;
+    int sheared = 0, straights = 0;
     for (std::size_t b = 0; b < ends.size(); ++b) {
       const LineSetup line = setups.arrays().lines[b];
       const BeamSlicing slicing = BeamSlicing::of(line.slicing);
       ASSERT_EQ(slicing.number(), line.slicing);
-      EXPECT_EQ(static_cast<float>(slicing.skew), setups.arrays().skew[b]);
-      (slicing.skew == 0 ? straights : skews) += 1;
+      EXPECT_EQ(static_cast<float>(slicing.shear), setups.arrays().shear[b]);
+      (slicing.shear == 0 ? straights : sheared) += 1;
       const Basis basis(slicing);
       const Eigen::Vector3d end = ends[b].cast<double>() / kResolution, u = end.normalized();
       // On the beam in slice 1, as the setup has it.
       Eigen::Vector3d at = u / u.dot(basis.across);
       EXPECT_NEAR(line.rho_slice, at.dot(u) / end.norm(), 1e-6);
       Eigen::Vector3d position = line.slope_height * basis.height;
-      if (slicing.skew == 0) {
+      if (slicing.shear == 0) {
         position += basis.across + line.slope_side * basis.side;
       } else {
         position +=
-            slicing.skew * Eigen::Vector3d::Unit(kSideAxis[slicing.axis]) + line.slope_side * basis.side;
+            slicing.shear * Eigen::Vector3d::Unit(kSideAxis[slicing.axis]) + line.slope_side * basis.side;
       }
       EXPECT_LT((position - at).norm(), 1e-6);
       for (int n = 0; n < 10; ++n) {
@@ -84,7 +84,7 @@ void expectSetupsAgreeWithGeometry(const LineKernels& kernels) {
         }
       }
     }
-    EXPECT_EQ(skews > 0, reach <= 1.0) << reach;
+    EXPECT_EQ(sheared > 0, reach <= 1.0) << reach;
     EXPECT_EQ(straights > 0, reach > 1.0) << reach;
   }
 }

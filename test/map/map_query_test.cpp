@@ -24,7 +24,7 @@ SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offs
 VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
   const SemanticMap map = mapWith(evidence, 77);
   const VoxelView view = viewVoxel(map, *map.find({{0, 0, 0}}), 77);
-  const VoxelView judged = judgeVoxel(map, *map.find({{0, 0, 0}}), 77);
+  const VoxelView judged = viewWithoutEntropy(map, *map.find({{0, 0, 0}}), 77);
   EXPECT_EQ(judged.state, view.state);
   EXPECT_EQ(judged.label, view.label);
   EXPECT_EQ(judged.probability, view.probability);

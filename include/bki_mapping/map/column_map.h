@@ -51,7 +51,7 @@ struct ColumnView {
 /// The columns of a map, updated block by block. Columns are stored by stack, a vertical column of blocks.
 class ColumnMap {
  public:
-  using Place = std::pair<std::int32_t, std::int32_t>;  ///< x and y of a stack [blocks]
+  using StackIndex = std::pair<std::int32_t, std::int32_t>;  ///< x and y of a stack [blocks]
   /// The 8 x 8 columns of voxels of a stack, x fastest.
   using Columns = std::array<ColumnView, kBlockEdge * kBlockEdge>;
 
@@ -65,15 +65,15 @@ class ColumnMap {
 
   /// Recomputes the stacks that contain the given blocks. @param changed blocks that have changed, or were
   /// created or erased. @return those stacks; stacks without blocks are no longer in columns().
-  std::set<Place> update(const SemanticMap& map, const ClassTable& classes,
-                         const std::vector<GridIndex>& changed);
+  std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes,
+                              const std::vector<GridIndex>& changed);
 
-  const std::map<Place, Columns>& columns() const { return columns_; }
+  const std::map<StackIndex, Columns>& columns() const { return columns_; }
 
  private:
   ColumnRules rules_;
-  std::map<Place, std::set<std::int32_t>> blocks_;  ///< z of the blocks in each stack
-  std::map<Place, Columns> columns_;
+  std::map<StackIndex, std::set<std::int32_t>> blocks_;  ///< z of the blocks in each stack
+  std::map<StackIndex, Columns> columns_;
 };
 
 }  // namespace bki_mapping

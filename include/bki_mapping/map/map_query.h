@@ -30,9 +30,9 @@ struct VoxelView {
 /// The state and posterior of a voxel. @param offset of the voxel in its block.
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
 /// The same with entropy 0, which is much faster: the logarithms take most of the time.
-VoxelView judgeVoxel(const SemanticMap& map, const Block& block, int offset);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset);
 /// The same for a voxel by index; unknown if the map has no block there.
-VoxelView judgeVoxel(const SemanticMap& map, const VoxelIndex& voxel);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel);
 /// viewVoxel for the voxel that contains a point. @param point in the map frame [m].
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
 

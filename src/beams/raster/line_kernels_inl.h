@@ -6,7 +6,7 @@
 ///    pass through the group's box, and in which slices (BeamPass).
 /// 3. slices_inl.h: the box in slices of each kind, and the line's position in its middle slice.
 /// 4. For each pass, by how far the kernel reaches from the line (in findLines):
-///      - narrow_kernel_inl.h, where skew (sheared) slices have the reach within one column: always where the
+///      - narrow_kernel_inl.h, where sheared slices have the reach within one column: always where the
 ///        kernel is as long as a voxel or shorter, as by default. Two voxels of a column hold it, or four
 ///        where the line is steep along the column (half_height > 1). Lanes are slices.
 ///      - wide_kernel_inl.h, in straight slices, for longer kernels. Lanes are the voxels of a slice.
@@ -67,7 +67,7 @@ void addBeams(const LineSetupArrays& beams, const BeamBox& box, GroupSums& sums)
     float*& array = arrays[slices.row_axis];
     if (!array) array = sums.open(slices.row_axis);
     const LineInBox beam = slices.at<kWeight>(line);
-    if (slices.skew != 0) {
+    if (slices.shear != 0) {
       const int count = pass.last - pass.first + 1;
       if (line.half_height <= 1.0f) {
         narrow.add(beam, pass.first, count, slices.middle, array, slices.strides);

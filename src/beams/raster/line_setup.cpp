@@ -10,7 +10,7 @@ void LineSetups::set(const Beams& beams, double resolution, double length, const
                      ThreadPool& pool) {
   const std::size_t count = beams.ends.size(), padded = count + kBeamPadding;
   axis_.resize(padded, 0);
-  for (auto* each : {&slope_side_, &slope_height_, &end_, &skew_}) each->resize(padded, 0.0f);
+  for (auto* each : {&slope_side_, &slope_height_, &end_, &shear_}) each->resize(padded, 0.0f);
   lines_.resize(count);
   const auto reach = static_cast<float>(length / resolution);
   const Chunks chunks(count);
@@ -18,7 +18,7 @@ void LineSetups::set(const Beams& beams, double resolution, double length, const
     const std::size_t begin = chunks.begin(c);
     kernels.set_up_lines(beams.ends.data() + begin, chunks.end(c) - begin, resolution, reach,
                          {axis_.data() + begin, slope_side_.data() + begin, slope_height_.data() + begin,
-                          end_.data() + begin, skew_.data() + begin, lines_.data() + begin});
+                          end_.data() + begin, shear_.data() + begin, lines_.data() + begin});
   });
 }
 

@@ -38,14 +38,14 @@ struct LineSetupArrays {
   const std::int32_t* axis;                ///< main axes
   const float *slope_side, *slope_height;  ///< along the side and height axes, by step along the main axis
   const float* end;                        ///< of the beam along its main axis, from the sensor [voxels]
-  const float* skew;                       ///< of the slices
+  const float* shear;                      ///< of the slices
   const LineSetup* lines;
 };
 
 /// The same, to be written.
 struct LineSetupTargets {
   std::int32_t* axis;
-  float *slope_side, *slope_height, *end, *skew;
+  float *slope_side, *slope_height, *end, *shear;
   LineSetup* lines;
 };
 
@@ -60,12 +60,13 @@ class LineSetups {
            ThreadPool& pool);
 
   LineSetupArrays arrays() const {
-    return {axis_.data(), slope_side_.data(), slope_height_.data(), end_.data(), skew_.data(), lines_.data()};
+    return {axis_.data(), slope_side_.data(), slope_height_.data(),
+            end_.data(),  shear_.data(),      lines_.data()};
   }
 
  private:
   std::vector<std::int32_t> axis_;
-  std::vector<float> slope_side_, slope_height_, end_, skew_;
+  std::vector<float> slope_side_, slope_height_, end_, shear_;
   std::vector<LineSetup> lines_;
 };
 

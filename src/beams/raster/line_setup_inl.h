@@ -48,30 +48,32 @@ void takeCourses(const Eigen::Vector3f* beams, std::size_t count, double resolut
   }
 }
 
-/// In skew slices, where one column of each and four voxels of that hold the kernel; else in straight ones.
+/// In sheared slices, where one column of each and four voxels of that hold the kernel; else in straight
+/// ones.
 /// @param reach of the kernel [voxels].
 ///
 /// Let v lead from a slice's column to the next, n stand across slices (v = (0, 1), n = (1, 0) in straight
-/// ones, v = (1, -2 skew), n = (2, skew) in skew ones, along the main and side axes), h along columns, u be
-/// the unit direction. A position p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b +
-/// C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Within d =
-/// 1 are positions up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size
+/// ones, v = (1, -2 shear), n = (2, shear) in sheared ones, along the main and side axes), h along columns, u
+/// be the unit direction. A position p = a v + b h is off the line by d^2 = |p|^2 - (u p)^2 = A a^2 + 2 B a b
+/// + C b^2, whose determinant is A C - B^2 = (u n)^2; its factors by Cholesky, a first, are e and g. Within d
+/// = 1 are positions up to |a| = sqrt(C) / (u n) and |b| = sqrt(A) / (u n). Slopes are multiplied by the size
 /// of a box, and therefore in double precision.
 void findLines(std::size_t count, float reach, LineBatch& batch) {
   const float counts = reach * static_cast<float>(kReachThatCounts), counts2 = counts * counts;
   const float by_reach = VecKernel::unit() / reach;
   for (std::size_t n = 0; n < count; ++n) {
     const auto s = static_cast<float>(batch.slope_side[n]), t = static_cast<float>(batch.slope_height[n]);
-    const float side = 1.0f + s * s, skew_slices = 2.0f + std::abs(s), squared = skew_slices * skew_slices;
-    // Squares of how far the kernel reaches in skew slices, times (2 + |s|)^2. Where a is up to 0.5, b is
+    const float side = 1.0f + s * s, sheared_slices = 2.0f + std::abs(s),
+                squared = sheared_slices * sheared_slices;
+    // Squares of how far the kernel reaches in sheared slices, times (2 + |s|)^2. Where a is up to 0.5, b is
     // below 2.
     const float a2 = counts2 * side, b2 = counts2 * (squared + 5.0f * t * t);
-    const bool is_skew = a2 <= 0.25f * squared;
-    batch.slicing[n] = BeamSlicing{batch.axis[n], !is_skew ? 0 : s < 0.0f ? -1 : 1}.number();
+    const bool is_sheared = a2 <= 0.25f * squared;
+    batch.slicing[n] = BeamSlicing{batch.axis[n], !is_sheared ? 0 : s < 0.0f ? -1 : 1}.number();
 
     // Slices by step along the main axis.
-    const double by_slice = is_skew ? 1.0 / (2.0 + std::abs(batch.slope_side[n])) : 1.0;
-    const double slope_side = is_skew ? by_slice : batch.slope_side[n],
+    const double by_slice = is_sheared ? 1.0 / (2.0 + std::abs(batch.slope_side[n])) : 1.0;
+    const double slope_side = is_sheared ? by_slice : batch.slope_side[n],
                  slope_height = batch.slope_height[n] * by_slice;
     batch.by_slice_side[n] = slope_side;
     batch.by_slice_height[n] = slope_height;
@@ -82,18 +84,18 @@ void findLines(std::size_t count, float reach, LineBatch& batch) {
     batch.step_side[n] = steps(slope_side);
     batch.step_height[n] = steps(slope_height);
 
-    const float uu = 1.0f / (side + t * t);                         // u along the main axis, squared
-    const float v_along = is_skew ? 1.0f - 2.0f * std::abs(s) : s;  // u v is that times u
-    const float across = is_skew ? squared : 1.0f;                  // (u n)^2 is that times u^2
-    const float a = (is_skew ? 5.0f : 1.0f) - uu * v_along * v_along, by_a = 1.0f / a;
+    const float uu = 1.0f / (side + t * t);                            // u along the main axis, squared
+    const float v_along = is_sheared ? 1.0f - 2.0f * std::abs(s) : s;  // u v is that times u
+    const float across = is_sheared ? squared : 1.0f;                  // (u n)^2 is that times u^2
+    const float a = (is_sheared ? 5.0f : 1.0f) - uu * v_along * v_along, by_a = 1.0f / a;
     const float e_side = std::sqrt(a) * by_reach, rho = batch.rho[n] * uu;
     batch.e_side[n] = e_side;
     batch.e_height[n] = -uu * v_along * t * by_a * e_side;
     batch.g_height[n] = std::sqrt(uu * across * by_a) * by_reach;
     batch.rho_side[n] = v_along * rho;
     batch.rho_height[n] = t * rho;
-    batch.half_side[n] = is_skew ? 0.5f : counts * std::sqrt(side);
-    batch.half_height[n] = is_skew ? std::sqrt(b2 / squared) : counts * std::sqrt(1.0f + t * t);
+    batch.half_side[n] = is_sheared ? 0.5f : counts * std::sqrt(side);
+    batch.half_height[n] = is_sheared ? std::sqrt(b2 / squared) : counts * std::sqrt(1.0f + t * t);
   }
 }
 
@@ -133,7 +135,7 @@ void setUpLines(const Eigen::Vector3f* beams, std::size_t count, double resoluti
       to.slope_side[begin + n] = static_cast<float>(batch.slope_side[n]);
       to.slope_height[begin + n] = static_cast<float>(batch.slope_height[n]);
       to.end[begin + n] = batch.end[n] * per_metre;
-      to.skew[begin + n] = static_cast<float>(BeamSlicing::of(batch.slicing[n]).skew);
+      to.shear[begin + n] = static_cast<float>(BeamSlicing::of(batch.slicing[n]).shear);
     }
     for (std::size_t n = 0; n < some; n += kLanes) {
       writeLines(batch, n, std::min<std::size_t>(some - n, kLanes), to.lines + begin + n);

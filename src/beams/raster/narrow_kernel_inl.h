@@ -1,4 +1,4 @@
-/// @file Narrow kernels: beams added to one column of each skew slice, to the two voxels between which the
+/// @file Narrow kernels: beams added to one column of each sheared slice, to the two voxels between which the
 /// line passes, or to four. Part of line_kernels_inl.h.
 #pragma once
 

@@ -84,18 +84,18 @@ class BoxSearch {
     if (!AnyTrue(found)) return to;
     first = Max(first, from);
     last = Min(last, until);
-    const FloatVec skew = LoadU(beams.skew + b);
-    turnSkew(skew, side, first, last);
-    return emit({Iota() + static_cast<std::int32_t>(b), first, last, slicing(axis, skew)}, found, to);
+    const FloatVec shear = LoadU(beams.shear + b);
+    turnSheared(shear, side, first, last);
+    return emit({Iota() + static_cast<std::int32_t>(b), first, last, slicing(axis, shear)}, found, to);
   }
 
  private:
   static constexpr auto kHalf = static_cast<float>(BeamBox::kHalf);
 
   /// As BeamSlicing numbers them.
-  static IntVec slicing(IntVec axis, FloatVec skew) {
+  static IntVec slicing(IntVec axis, FloatVec shear) {
     static_assert(BeamSlicing{0, 1}.number() == 3 && BeamSlicing{0, -1}.number() == 6);
-    return axis + IfThenElse(skew == 0.0f, IntVec{}, IfThenElse(skew > 0.0f, Set(3), Set(6)));
+    return axis + IfThenElse(shear == 0.0f, IntVec{}, IfThenElse(shear > 0.0f, Set(3), Set(6)));
   }
   /// Writes the passes found, all kLanes: one that is not found is overwritten by the next, without a branch.
   /// @param fields of BeamPass, in their order.
@@ -125,15 +125,16 @@ class BoxSearch {
     return {slope, at, reach_ * (1.0f + 0.5f * slope * slope) + slack_, 1.0f / size,
             IfThenElse(slope < 0.0f, -at, at)};
   }
-  /// Converts straight slices to the skew slices that hold the same reached voxels, for beams in skew slices.
-  void turnSkew(FloatVec skew, const Across& side, IntVec& first, IntVec& last) const {
-    // A column is up to half a voxel along the main axis from the line's position in its skew slice.
+  /// Converts straight slices to the sheared slices that hold the same reached voxels, for beams in sheared
+  /// slices.
+  void turnSheared(FloatVec shear, const Across& side, IntVec& first, IntVec& last) const {
+    // A column is up to half a voxel along the main axis from the line's position in its sheared slice.
     constexpr float kOffset = 64.0f;  // keeps numbers positive: conversion truncates
     const FloatVec by_voxel = 2.0f + Abs(side.slope);
-    const FloatVec slice = skew * (side.at + kHalf) + (2.0f * kHalf + kOffset);  // at the box's centre
+    const FloatVec slice = shear * (side.at + kHalf) + (2.0f * kHalf + kOffset);  // at the box's centre
     const FloatVec low = (ConvertTo<FloatVec>(first) - (kHalf + 0.5f)) * by_voxel + slice,
                    high = (ConvertTo<FloatVec>(last) - (kHalf - 0.5f)) * by_voxel + slice;
-    const Mask straight = skew == 0.0f;
+    const Mask straight = shear == 0.0f;
     first = IfThenElse(straight, first,
                        ConvertTo<IntVec>(low + 1.0f - slack_) - static_cast<std::int32_t>(kOffset));
     last = IfThenElse(straight, last, ConvertTo<IntVec>(high + slack_) - static_cast<std::int32_t>(kOffset));

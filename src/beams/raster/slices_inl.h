@@ -14,7 +14,8 @@ namespace {
 
 /// The slice of a box in which a line's position is computed. Other slices are reached from it in steps, so
 /// that what a beam adds to a voxel does not depend on the slice where its pass begins.
-constexpr int kMiddleSlice = kGroupVoxels / 2, kMiddleSkewSlice[3] = {15, 0, 46};  ///< -1 and 1: by skew + 1
+constexpr int kMiddleSlice = kGroupVoxels / 2,
+              kMiddleShearedSlice[3] = {15, 0, 46};  ///< -1 and 1: by shear + 1
 
 /// Weights along beams, Equation (7) of docs/method.md: 0 unless 0 < rho < 1. @param rho minus kMiddle, so
 /// that the bilinear weight is one MinAbs and one difference.
@@ -56,22 +57,22 @@ struct alignas(64) BoxSlices {
   int middle;                  ///< the middle slice, from the box's first
   SliceStrides strides;
   int row_axis;  ///< of the sums
-  int axis, skew;
+  int axis, shear;
 
-  BoxSlices(const BeamBox& box, BeamSlicing slicing) : axis(slicing.axis), skew(slicing.skew) {
+  BoxSlices(const BeamBox& box, BeamSlicing slicing) : axis(slicing.axis), shear(slicing.shear) {
     const int side_axis = kSideAxis[axis], height_axis = kHeightAxis[axis];
     const double main = box.first[axis], beside = box.first[side_axis];
-    first = skew == 0 ? main : 2.0 * main + skew * beside;
-    side = skew == 0 ? beside : main;
+    first = shear == 0 ? main : 2.0 * main + shear * beside;
+    side = shear == 0 ? beside : main;
     height = box.first[height_axis];
-    row_axis = skew == 0 ? side_axis : height_axis;
-    middle = skew == 0 ? kMiddleSlice : kMiddleSkewSlice[skew + 1];
+    row_axis = shear == 0 ? side_axis : height_axis;
+    middle = shear == 0 ? kMiddleSlice : kMiddleShearedSlice[shear + 1];
     middle_first = first + middle;
     const auto stride = [&](int of) { return GroupSums::stride(row_axis, of); };
     strides = {stride(axis), stride(side_axis), stride(height_axis)};
-    if (skew != 0) {
-      strides.slice = skew * stride(side_axis);
-      strides.side = stride(axis) - 2 * skew * stride(side_axis);
+    if (shear != 0) {
+      strides.slice = shear * stride(side_axis);
+      strides.side = stride(axis) - 2 * shear * stride(side_axis);
     }
   }
 
@@ -97,8 +98,8 @@ struct alignas(64) BoxSlices {
     const auto away = [&](int slice) {
       const double at = sideOf(line, slice);
       if (beside(heightOf(line, slice), static_cast<double>(line.half_height))) return true;
-      if (skew == 0) return beside(at, static_cast<double>(line.half_side));
-      return beside(at, 0.5) || beside(skew * (slice - 2.0 * at), 2.0);
+      if (shear == 0) return beside(at, static_cast<double>(line.half_side));
+      return beside(at, 0.5) || beside(shear * (slice - 2.0 * at), 2.0);
     };
     while (pass.first <= pass.last && away(pass.first)) ++pass.first;
     while (pass.first <= pass.last && away(pass.last)) --pass.last;

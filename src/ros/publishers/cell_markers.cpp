@@ -171,7 +171,7 @@ class CellMarkers : public MapPublisher {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = map.find(index);
       for (int offset = 0; block && offset < kBlockVoxels; ++offset) {
-        const VoxelView view = judgeVoxel(map, *block, offset);
+        const VoxelView view = viewWithoutEntropy(map, *block, offset);
         if (view.state != state_) continue;
         const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
         if (!snapshot.heightInView(centre.z())) continue;

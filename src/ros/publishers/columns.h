@@ -18,21 +18,21 @@ struct CellRectangle {
   std::int32_t x = 0, y = 0;            ///< first column and row
   std::uint32_t width = 0, height = 0;  ///< [cells]
 
-  bool contains(const ColumnMap::Place& place) const {
-    const std::int64_t left = std::int64_t{place.first} * kBlockEdge - x,
-                       below = std::int64_t{place.second} * kBlockEdge - y;
+  bool contains(const ColumnMap::StackIndex& stack) const {
+    const std::int64_t left = std::int64_t{stack.first} * kBlockEdge - x,
+                       below = std::int64_t{stack.second} * kBlockEdge - y;
     return left >= 0 && below >= 0 && left < width && below < height;
   }
 
-  /// The bounding rectangle of the columns of blocks placeOf(*i), for i from `begin` to `end`.
-  template <typename Iterator, typename PlaceOf>
-  static CellRectangle around(Iterator begin, Iterator end, PlaceOf&& placeOf) {
+  /// The bounding rectangle of the stacks stackOf(*i), for i from `begin` to `end`.
+  template <typename Iterator, typename StackOf>
+  static CellRectangle around(Iterator begin, Iterator end, StackOf&& stackOf) {
     if (begin == end) return {};
-    ColumnMap::Place low = placeOf(*begin), high = low;
+    ColumnMap::StackIndex low = stackOf(*begin), high = low;
     for (; begin != end; ++begin) {
-      const ColumnMap::Place place = placeOf(*begin);
-      low = {std::min(low.first, place.first), std::min(low.second, place.second)};
-      high = {std::max(high.first, place.first), std::max(high.second, place.second)};
+      const ColumnMap::StackIndex stack = stackOf(*begin);
+      low = {std::min(low.first, stack.first), std::min(low.second, stack.second)};
+      high = {std::max(high.first, stack.first), std::max(high.second, stack.second)};
     }
     return {low.first * kBlockEdge, low.second * kBlockEdge,
             static_cast<std::uint32_t>(high.first - low.first + 1) * kBlockEdge,
@@ -53,9 +53,9 @@ class ColumnPublisher : public MapPublisher {
     return {config.occupancy_min_z, config.occupancy_max_z, config.occupancy_height};
   }
 
-  /// Updates the columns. @return the updated columns of blocks. @param all set to whether these are all of
+  /// Updates the columns. @return the updated stacks. @param all set to whether these are all of
   /// them.
-  std::set<ColumnMap::Place> look(const MapSnapshot& snapshot, bool& all) {
+  std::set<ColumnMap::StackIndex> look(const MapSnapshot& snapshot, bool& all) {
     const SemanticMap& map = snapshot.mapper.map();
     all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
     if (!all) return columns_.update(map, snapshot.mapper.classes(), changed.blocks());
@@ -102,8 +102,8 @@ class ColumnPublisher : public MapPublisher {
     return CellRectangle::around(columns_.columns().begin(), columns_.columns().end(),
                                  [](const auto& entry) { return entry.first; });
   }
-  static CellRectangle around(const std::set<ColumnMap::Place>& places) {
-    return CellRectangle::around(places.begin(), places.end(), [](const auto& column) { return column; });
+  static CellRectangle around(const std::set<ColumnMap::StackIndex>& stacks) {
+    return CellRectangle::around(stacks.begin(), stacks.end(), [](const auto& column) { return column; });
   }
 
  private:

@@ -26,10 +26,10 @@ class Elevation : public ColumnPublisher {
 
   void publishNew(const MapSnapshot& snapshot) override {
     bool all = false;
-    const std::set<ColumnMap::Place> places = look(snapshot, all);
+    const std::set<ColumnMap::StackIndex> stacks = look(snapshot, all);
     // Columns that were erased and new ones elsewhere may span a rectangle that does not fit.
-    all = all || missed_ || !fits(around(places), kBytesACell);
-    const CellRectangle rectangle = all ? everything() : around(places);
+    all = all || missed_ || !fits(around(stacks), kBytesACell);
+    const CellRectangle rectangle = all ? everything() : around(stacks);
     missed_ = !fits(rectangle, kBytesACell);
     if (missed_) return warnOfSize(rectangle);
     ++sequence_;

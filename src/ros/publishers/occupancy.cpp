@@ -13,7 +13,7 @@ OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const 
   message.y = index.y;
   message.z = index.z;
   for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    const VoxelView view = judgeVoxel(map, block, offset);
+    const VoxelView view = viewWithoutEntropy(map, block, offset);
     const auto v = static_cast<std::size_t>(offset);
     message.state[v] = static_cast<std::uint8_t>(view.state);
     message.label[v] = view.label;

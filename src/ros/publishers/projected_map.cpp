@@ -30,16 +30,16 @@ class ProjectedMap : public ColumnPublisher {
  private:
   void publishNew(const MapSnapshot& snapshot) override {
     bool all = false;
-    const std::set<ColumnMap::Place> places = look(snapshot, all);
+    const std::set<ColumnMap::StackIndex> stacks = look(snapshot, all);
     const bool inside =
-        std::all_of(places.begin(), places.end(), [&](const auto& p) { return grid_.contains(p); });
+        std::all_of(stacks.begin(), stacks.end(), [&](const auto& p) { return grid_.contains(p); });
     const bool anew = all || !inside || !fits(grid_, 1);
     if (anew) layOut(snapshot);
     if (!fits(grid_, 1)) return warnOfSize(grid_);
     if (anew || snapshot.config.full_projected_map) {
       publisher_.publish(whole(snapshot));
-    } else if (!places.empty()) {
-      updates_.publish(update(snapshot, around(places)));
+    } else if (!stacks.empty()) {
+      updates_.publish(update(snapshot, around(stacks)));
     }
   }
 
