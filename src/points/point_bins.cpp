@@ -35,7 +35,7 @@ constexpr double kMostBinned = 1 << 26;
 /// Appends point i of the batch to a block. @param block position in group.blocks. @param offset of the block
 /// from the point's containing block [voxels]. @param voxel offset of the point's voxel, or
 /// LocalPoint::kOutside.
-template <typename Scratch, typename Group>
+template <bool kWeighted, typename Scratch, typename Group>
 [[gnu::always_inline]] inline void append(std::uint32_t block, std::size_t i, const float* offset,
                                           std::int32_t voxel, Scratch& scratch, Group& group) {
   if (block + 1 == group.begin.size()) group.begin.push_back(0);
@@ -46,7 +46,7 @@ template <typename Scratch, typename Group>
   point.z = scratch.places.inside[2][i] - offset[2];
   point.label = scratch.labels[i];
   point.voxel = static_cast<std::uint16_t>(voxel);
-  if (scratch.weights != nullptr) scratch.weight[scratch.size] = scratch.weights[i];
+  if constexpr (kWeighted) scratch.weight[scratch.size] = scratch.weights[i];
   scratch.block[scratch.size++] = block;
 }
 
@@ -58,6 +58,7 @@ PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, co
 }
 
 /// For kernels that always reach the containing block, and at most its neighbours.
+template <bool kWeighted>
 void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& group) const {
   for (std::size_t i = 0; i < count; ++i) {
     const GridIndex containing = scratch.places.tileOf(i);
@@ -73,13 +74,14 @@ void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& grou
         block = group.blocks.insert({containing.x + offset.blocks[0], containing.y + offset.blocks[1],
                                      containing.z + offset.blocks[2]});
       }
-      append(block, i, offset.voxels, bit == kContaining ? scratch.places.cell[i] : LocalPoint::kOutside,
-             scratch, group);
+      append<kWeighted>(block, i, offset.voxels,
+                        bit == kContaining ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
     }
   }
 }
 
 /// For kernels of any length.
+template <bool kWeighted>
 void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
   const GridIndex containing = scratch.places.tileOf(i);
   const double reach = kernel_.reach;
@@ -98,16 +100,17 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
         const float offset[3] = {static_cast<float>(kBlockEdge * (block.x - containing.x)),
                                  static_cast<float>(kBlockEdge * (block.y - containing.y)),
                                  static_cast<float>(kBlockEdge * (block.z - containing.z))};
-        append(group.blocks.insert(block), i, offset,
-               block == containing ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
+        append<kWeighted>(group.blocks.insert(block), i, offset,
+                          block == containing ? scratch.places.cell[i] : LocalPoint::kOutside, scratch,
+                          group);
         reaches_containing |= block == containing;
       }
     }
   }
   // A kernel shorter than half a voxel's diagonal may reach no centre.
   if (keep_containing_ && !reaches_containing) {
-    append(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels, scratch.places.cell[i],
-           scratch, group);
+    append<kWeighted>(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels,
+                      scratch.places.cell[i], scratch, group);
   }
 }
 
@@ -119,18 +122,19 @@ void PointBins::reserve(std::size_t points, Scratch& scratch) const {
   if (weighted_ && scratch.weight.size() < points) scratch.weight.resize(2 * points);
 }
 
+template <bool kWeighted>
 void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) const {
   reserve(scratch.size + kNeighbours.size() * count, scratch);
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
-      append(group.blocks.insert(scratch.places.tileOf(i)), i, kNeighbours[kContaining].voxels,
-             scratch.places.cell[i], scratch, group);
+      append<kWeighted>(group.blocks.insert(scratch.places.tileOf(i)), i, kNeighbours[kContaining].voxels,
+                        scratch.places.cell[i], scratch, group);
     }
   } else if (kernel_.reach >= kVoxelHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
     kernels_.reach_blocks(count, kernel_.reach, scratch.places);
-    binToNeighbours(count, scratch, group);
+    binToNeighbours<kWeighted>(count, scratch, group);
   } else {
-    for (std::size_t i = 0; i < count; ++i) binToAll(i, scratch, group);
+    for (std::size_t i = 0; i < count; ++i) binToAll<kWeighted>(i, scratch, group);
   }
 }
 
@@ -161,8 +165,12 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
     const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
     kernels_.place_points(grid, span, count, scratch.places);
     scratch.labels = points.labels.data() + begin;
-    scratch.weights = weighted_ ? points.weights.data() + begin : nullptr;
-    binBatch(count, scratch, group);
+    if (weighted_) {
+      scratch.weights = points.weights.data() + begin;
+      binBatch<true>(count, scratch, group);
+    } else {
+      binBatch<false>(count, scratch, group);
+    }
   }
   sortGroup(scratch, group);
   group.first_class = size > 0 ? points.labels[0] : ClassId{0};

@@ -45,7 +45,7 @@ class PointBins {
   struct alignas(kThreadsApart) Scratch {
     TilePlaces places;
     const ClassId* labels = nullptr;  ///< of the batch
-    const float* weights = nullptr;   ///< of the batch; null if all are 1
+    const float* weights = nullptr;   ///< of the batch, if its points have weights
     GridIndex containing;             ///< containing block of the last point
     /// Position in Group::blocks of that block and its neighbours, or kNoPosition.
     std::array<std::uint32_t, 27> neighbours;
@@ -69,8 +69,11 @@ class PointBins {
   void binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch, Group& group) const;
   /// Makes room for so many points.
   void reserve(std::size_t points, Scratch& scratch) const;
+  template <bool kWeighted>
   void binBatch(std::size_t count, Scratch& scratch, Group& group) const;
+  template <bool kWeighted>
   void binToNeighbours(std::size_t count, Scratch& scratch, Group& group) const;
+  template <bool kWeighted>
   void binToAll(std::size_t i, Scratch& scratch, Group& group) const;
   void sortGroup(const Scratch& scratch, Group& group) const;
   void collectRuns(const Group& group);

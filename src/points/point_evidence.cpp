@@ -5,6 +5,12 @@
 #include "parallel/group_by.h"
 
 namespace bki_mapping {
+namespace {
+
+/// How far ahead points are prefetched [blocks].
+constexpr std::size_t kAhead = 2;
+
+}  // namespace
 
 PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels,
                              const std::string& instruction_set)
@@ -128,7 +134,7 @@ void PointEvidence::prefetch(std::size_t block) const {
 void PointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t worker,
                                SumSink& sink) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (b + 1 < blocks.size()) prefetch(blocks[b + 1].position);
+    if (b + kAhead < blocks.size()) prefetch(blocks[b + kAhead].position);
     sumBlock(blocks[b].position, workspaces_[worker], sink.open(b));
     sink.close();
   }

@@ -96,7 +96,8 @@ class HaloAdder {
   }
   template <bool kWeighted>
   void addAround(int count) {
-    constexpr int kPoints = std::max(kLanes / kCorners, 1), kVecs = std::max(kCorners / kLanes, 1);
+    constexpr int kPoints = std::max(kLanes / kCorners, 1), kVecs = std::max(kCorners / kLanes, 1),
+                  kLayers = 2 / kVecs;  // of a point in a vector
     // In registers: the compiler must assume that adding to the halo changes members.
     const VecKernel kernel = kernel_;
     const FloatVec right = right_, behind = behind_, above = above_;
@@ -111,13 +112,12 @@ class HaloAdder {
         const FloatVec dz = z - static_cast<float>(vec);
         FloatVec values = kernel(VecKernel::squared(dx * dx + dy * dy + dz * dz, scale));
         if constexpr (kWeighted) values *= inside(from, kWeight, point);
-        for (int four = 0; four < kLanes / 4; ++four) {
-          const int n = p + four / 2;
-          if (n == count) break;
-          const std::int32_t* const cell = cell_ + kFields * n;
-          const int layer = cell[2] + (kVecs > 1 ? vec : four % 2);
-          float* const first = halo + cell[0] + kHaloEdge * (cell[1] + kHaloEdge * layer);
-          AddPairs(ExtractLanes<4>(values, four), first, first + kHaloEdge);
+        for (int n = 0; n < kPoints && p + n < count; ++n) {
+          const std::int32_t* const cell = cell_ + kFields * (p + n);
+          float* first = halo + cell[0] + kHaloEdge * (cell[1] + kHaloEdge * (cell[2] + vec));
+          for (int layer = 0; layer < kLayers; ++layer, first += kHaloEdge * kHaloEdge) {
+            AddPairs(ExtractLanes<4>(values, kLayers * n + layer), first, first + kHaloEdge);
+          }
         }
       }
     }

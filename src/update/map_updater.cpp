@@ -98,7 +98,9 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     const std::size_t position = groups_[g].position;
     constexpr std::ptrdiff_t kAhead = 4;  // jobs; long enough to hide the latency of memory
     for (const std::uint32_t* job = group_jobs_.begin(position); job != group_jobs_.end(position); ++job) {
-      if (group_jobs_.end(position) - job > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
+      const std::ptrdiff_t left = group_jobs_.end(position) - job;
+      if (left > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
+      if (left > kAhead / 2) __builtin_prefetch(jobs_[job[kAhead / 2]].block->classes().data());
       BlockJob& each = jobs_[*job];
       classes = std::max(classes, reservePlanes(each, *job));
       of_group += static_cast<std::ptrdiff_t>(each.block->bytes() - each.bytes_before);

@@ -25,8 +25,9 @@ class alignas(kThreadsApart) SumSink {
 
   /// For the evidence: returns the empty sums of its i-th block, to be filled.
   BlockSums& open(std::size_t i) {
-    // Prefetch the next block's planes while this block's sums are computed.
-    if (i + 1 < targets_->size()) (*targets_)[i + 1]->prefetch();
+    // Prefetch planes while the sums of the blocks before are computed.
+    constexpr std::size_t kAhead = 2;
+    if (i + kAhead < targets_->size()) (*targets_)[i + kAhead]->prefetch();
     current_ = i;
     sums_.clear();
     return sums_;
