@@ -36,7 +36,11 @@ bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Thr
 bki_mapping_core_room(map SOURCES column_map.cpp map_query.cpp semantic_map.cpp LINK bki_mapping_core)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
-bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.cpp LINK bki_mapping_parallel bki_mapping_map)
+bki_mapping_core_room(update SOURCES
+    map_updater.cpp
+    sum_kernels.cpp sum_kernels_avx2.cpp sum_kernels_avx512.cpp sum_kernels_generic.cpp
+    sum_sink.cpp update_rules.cpp
+  LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp
     point_kernels.cpp point_kernels_avx2.cpp point_kernels_avx512.cpp point_kernels_generic.cpp

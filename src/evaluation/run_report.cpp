@@ -59,6 +59,7 @@ Json scanJson(const ScanReport& scan) {
           {"free_samples_or_beams", s.free_count},
           {"blocks", s.blocks},
           {"evidence_not_finite", s.not_finite},
+          {"evidence_saturated", s.saturated},
           {"total_ms", s.totalMs()},
           {"observe_ms", s.observe_ms},
           {"evidence_ms", s.evidence_ms},
@@ -69,10 +70,11 @@ Json scanJson(const ScanReport& scan) {
 /// Why points were left out of the map, and how many; "" if all are in it.
 std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig& config) {
   PointCounts sum;
-  std::size_t refused = 0;
+  std::size_t refused = 0, saturated = 0;
   for (const ScanReport& scan : scans) {
     sum += scan.stats.counts;
     refused += scan.stats.not_finite;
+    saturated += scan.stats.saturated;
   }
   const std::string reach = numberText(config.sensor_model.reach()) + " m";
   const std::pair<std::size_t, std::string> reasons[] = {
@@ -92,7 +94,13 @@ std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig
   if (!text.empty()) text = "left out of " + std::to_string(sum.points) + " points: " + text;
   if (refused > 0) {
     text += (text.empty() ? "" : "\n") + std::to_string(refused) +
-            " voxels took no more evidence, which would not have stayed finite; lower kernel/scale";
+            " sums of voxels were not finite, and were left out; lower kernel/scale";
+  }
+  if (saturated > 0) {
+    text += (text.empty() ? "" : "\n") + std::to_string(saturated) +
+            " sums of voxels went beyond the greatest evidence, 32768, and were cut there; lower "
+            "kernel/scale, or set "
+            "scan_limit";
   }
   return text;
 }

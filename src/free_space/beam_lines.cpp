@@ -7,15 +7,18 @@ namespace {
 /// Mode `line`: whole beams, looked up by direction.
 class BeamLines : public FreeSpaceModel {
  public:
-  explicit BeamLines(const FreeSpaceConfig& config) : evidence_(config.weight, config.extent) {}
+  explicit BeamLines(const FreeSpaceConfig& config)
+      : evidence_(config.weight, config.extent), depends_on_map_(config.extent == FreeSpaceExtent::kMapped) {}
 
   FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t, ThreadPool& pool) override {
     evidence_.setField(beams.field(pool), pool);
     return {&evidence_, beams.beams().ends.size()};
   }
+  bool dependsOnMap() const override { return depends_on_map_; }
 
  private:
   LineEvidence evidence_;
+  bool depends_on_map_;
 };
 
 }  // namespace

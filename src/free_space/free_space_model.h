@@ -28,6 +28,8 @@ class FreeSpaceModel {
   virtual bool needsBeams() const { return true; }
   /// @param beams of one scan. @param stamp of the scan [ns], a key of the random samples.
   virtual FreeSpaceEvidence observe(LazyBeamField& beams, std::uint64_t stamp, ThreadPool& pool) = 0;
+  /// Whether that evidence depends on the blocks that the map has, and so on the order of scans.
+  virtual bool dependsOnMap() const { return false; }
 };
 
 }  // namespace bki_mapping

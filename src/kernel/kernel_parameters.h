@@ -19,9 +19,11 @@ inline std::vector<NamedParameter<KernelConfig>> kernelParameters() {
           "Support radius l of the sparse kernel: a point adds evidence to voxels whose centres are "
           "closer than this. Set 0 to use the resolution."),
       realParameter(
-          "scale", &C::scale, NumberRange::above(0.0).upTo(kMostEvidence), "", Changes::kAtStart,
+          "scale", &C::scale, NumberRange::atLeast(0.001).upTo(1000.0), "", Changes::kAtStart,
           "Value sigma0 of the sparse kernel at distance 0: the evidence that a hit adds at its own "
-          "position. Only its ratio to prior and to the limits of a scan matters."),
+          "position. Only its ratio to prior and to the limits of a scan matters, and that it is far from "
+          "both ends of "
+          "the range of evidence, 1.5e-5 to 32768."),
   };
 }
 

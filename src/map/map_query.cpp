@@ -18,7 +18,7 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int off
   float best = 0.0f, free = 0.0f;
   const auto& classes = block.classes();
   for (std::size_t i = 0; i < classes.size(); ++i) {
-    const float e = block.plane(i)[offset];
+    const float e = evidenceOf(block.plane(i)[offset]);
     total += e;
     if (classes[i] == kFreeClass) {
       free = e;
@@ -47,11 +47,12 @@ VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
   VoxelView view = viewWithoutEntropy(map, block, offset);
   const auto& classes = block.classes();
   double total = 0.0;
-  for (std::size_t i = 0; i < classes.size(); ++i) total += block.plane(i)[offset];
+  for (std::size_t i = 0; i < classes.size(); ++i)
+    total += static_cast<double>(evidenceOf(block.plane(i)[offset]));
   const double sum = total + map.priorSum();
   double entropy = 0.0;
   for (std::size_t i = 0; i < classes.size(); ++i) {
-    entropy -= plogp((map.prior() + block.plane(i)[offset]) / sum);
+    entropy -= plogp((map.prior() + static_cast<double>(evidenceOf(block.plane(i)[offset]))) / sum);
   }
   entropy -= static_cast<double>(map.classCount() + 1 - classes.size()) * plogp(map.prior() / sum);
   view.entropy = static_cast<float>(entropy);

@@ -2,8 +2,11 @@
 // *_config.h.
 #include "bki_mapping/mapping/parameters.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "bki_mapping/map/block.h"
 #include "core/sensor_model_parameters.h"
 #include "free_space/free_space_parameters.h"
 #include "kernel/kernel_parameters.h"
@@ -88,6 +91,13 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
                        numberText(std::round(1e3 * half_diagonal) / 1e3) +
                        " m: hits that reach no voxel's centre are lost; leave kernel/length 0, or make "
                        "resolution finer");
+  }
+  for (const auto& [name, limit] :
+       {std::pair("hits", config.scan_limit.hits), std::pair("free", config.scan_limit.free)}) {
+    if (limit == 0.0 || unitsOf(std::min(limit, 1.0)) > 0) continue;
+    warnings.push_back(
+        "scan_limit/" + std::string(name) + " " + numberText(limit) +
+        " is below the smallest evidence, 1.5e-5: the scans add none; raise it, or set 0 for no limit");
   }
   return warnings;
 }

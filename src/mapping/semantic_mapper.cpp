@@ -169,11 +169,31 @@ void SemanticMapper::recover() noexcept {
   returnMemory();
 }
 
+SemanticMapper::Pipeline& SemanticMapper::pipeline() {
+  if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry());
+  return *pipeline_;
+}
+
 const std::vector<GridIndex>& SemanticMapper::touchedBlocks() const {
   return pipeline_ ? pipeline_->updater.touched() : no_blocks_;
 }
 
 ScanStats SemanticMapper::integrate(const Scan& scan) {
+  return addOrWithdraw(scan, false);
+}
+
+ScanStats SemanticMapper::withdraw(const Scan& scan) {
+  const bool mapped = pipeline().free_space->dependsOnMap();
+  if (mapped || config_.occlusion != OcclusionExtent::kNone) {
+    throw std::logic_error(std::string("scans cannot be withdrawn with ") +
+                           (mapped ? "free_space/extent: mapped" : "occlusion marks") +
+                           ", which depend on the order of scans; set " +
+                           (mapped ? "free_space/extent: observed" : "occlusion: none"));
+  }
+  return addOrWithdraw(scan, true);
+}
+
+ScanStats SemanticMapper::addOrWithdraw(const Scan& scan, bool withdraws) {
   if (!map_.geometry().contains(scan.origin)) {
     throw std::invalid_argument(
         "the sensor's origin is not finite or too far from the map's origin; check the sensor's pose");
@@ -187,7 +207,7 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
             "computer has, or use a coarser resolution");
   };
   try {
-    return add(scan);
+    return add(scan, withdraws);
   } catch (const TooMuchWork& work) {
     recover();
     throw refusalOf(work, config_, mapBytes());
@@ -198,10 +218,10 @@ ScanStats SemanticMapper::integrate(const Scan& scan) {
   }
 }
 
-/// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map.
-ScanStats SemanticMapper::add(const Scan& scan) {
-  if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry());
-  Pipeline& p = *pipeline_;
+/// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or takes it
+/// back.
+ScanStats SemanticMapper::add(const Scan& scan, bool withdraws) {
+  Pipeline& p = pipeline();
   ScanStats stats;
   Stopwatch watch;
   const bool occludes = config_.occlusion != OcclusionExtent::kNone;
@@ -215,6 +235,7 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   p.beams.setBeams(processed.beams);
   const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
   ScanEvidence evidence;
+  evidence.withdraws = withdraws;
   evidence.hits = &p.hits;
   evidence.free = free.evidence;
   if (occludes) {
@@ -231,7 +252,9 @@ ScanStats SemanticMapper::add(const Scan& scan) {
   const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, rulesOf(config_),
                                                  limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
-  stats.not_finite = update.not_finite;
+  stats.not_finite = update.sums.not_finite;
+  stats.saturated = update.sums.saturated;
+  stats.negative = update.sums.negative;
   block_bytes_ += static_cast<std::size_t>(update.bytes);  // may be negative; the sum is right modulo 2^64
   stats.collect_ms = update.collect_ms;
   stats.update_ms = update.update_ms;

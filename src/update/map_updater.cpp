@@ -86,7 +86,7 @@ std::size_t MapUpdater::reservePlanes(BlockJob& job, std::size_t position) {
 }
 
 void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
-                         ThreadPool& pool) {
+                         bool withdraws, ThreadPool& pool) {
   for (std::size_t t = 0; t < task_count_; ++t) tasks_[t].work->reserve(pool.count());
   std::atomic<std::ptrdiff_t> bytes{index_bytes};
   std::atomic<std::size_t> most_classes{0};
@@ -113,7 +113,7 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
   });
   workers_.resize(pool.count());
   for (Worker& worker : workers_) {
-    worker.sink.reserve(rules, most_classes);
+    worker.sink.reserve(rules, most_classes, withdraws);
     worker.blocks.reserve(kGroupBlocks);
     worker.slots.reserve(kGroupBlocks);
     worker.targets.reserve(kGroupBlocks);
@@ -183,7 +183,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
     setTasks(scan);
     collectJobs(map, limits, pool);
     groupJobs();
-    reserve(rules, limits, indexBytes() - index_before, pool);
+    reserve(rules, limits, indexBytes() - index_before, scan.withdraws, pool);
   } catch (...) {
     rollBack(map);
     throw;
@@ -202,7 +202,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
-  for (const Worker& worker : workers_) stats.not_finite += worker.sink.notFinite();
+  for (const Worker& worker : workers_) stats.sums += worker.sink.counts();
   stats.update_ms = watch.lap();
   return stats;
 }

@@ -6,6 +6,7 @@
 
 #include "parallel/runs_by_index.h"
 #include "update/evidence.h"
+#include "update/sum_kernels.h"
 
 namespace bki_mapping {
 
@@ -14,14 +15,15 @@ struct ScanEvidence {
   Evidence* hits = nullptr;
   Evidence* free = nullptr;        ///< of free space
   BlockPass* occlusion = nullptr;  ///< sets its marks after the sums are added
+  bool withdraws = false;          ///< takes back what adding the same evidence has added
 };
 
 struct MapUpdateStats {
-  std::size_t blocks = 0;      ///< that the scan may have touched
-  std::ptrdiff_t bytes = 0;    ///< growth of the memory of the map's blocks
-  std::size_t not_finite = 0;  ///< sums refused because the evidence would not have stayed finite
-  double collect_ms = 0.0;     ///< listing and allocating the blocks
-  double update_ms = 0.0;      ///< adding to them
+  std::size_t blocks = 0;    ///< that the scan may have touched
+  std::ptrdiff_t bytes = 0;  ///< growth of the memory of the map's blocks
+  SumCounts sums;
+  double collect_ms = 0.0;  ///< listing and allocating the blocks
+  double update_ms = 0.0;   ///< adding to them
 };
 
 /// Limits of one update.
@@ -93,7 +95,7 @@ class MapUpdater {
   /// Allocates all planes and all working memory that the jobs can need.
   /// @param index_bytes growth of the map's index in this update.
   void reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
-               ThreadPool& pool);
+               bool withdraws, ThreadPool& pool);
   /// Reserves the planes of a job's block. @param position of the job in jobs_.
   /// @return the number of classes to which this scan may add in the block.
   std::size_t reservePlanes(BlockJob& job, std::size_t position);

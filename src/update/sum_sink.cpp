@@ -1,12 +1,11 @@
 #include "update/sum_sink.h"
 
-#include <algorithm>
-
 namespace bki_mapping {
 
-void SumSink::reserve(const UpdateRules& rules, std::size_t classes) {
+void SumSink::reserve(const UpdateRules& rules, std::size_t classes, bool withdraws) {
   rules_ = rules;
-  not_finite_ = 0;
+  withdraws_ = withdraws;
+  counts_ = {};
   sums_.reserve(classes);
 }
 
@@ -28,13 +27,10 @@ void SumSink::close() {
   } else {
     applyToFree(rules_, is_protected, sums_);
   }
-  for (const BlockSums::Plane& plane : sums_) {
-    // A rule can leave a plane of zeros, which must not enter the map: a hit that protects its voxel may
-    // reach no voxel centre, and all voxels that a beam reaches may be protected.
-    const bool all_zero =
-        rules_.protectsVoxels() && std::all_of(std::begin(plane.values), std::end(plane.values),
-                                               [](float value) { return value == 0.0f; });
-    if (!all_zero) not_finite_ += (*targets_)[current_]->add(plane.label, plane.values, plane.layers);
+  const auto add = withdraws_ ? kernels_.withdraw : kernels_.add;
+  for (const BlockSums::Plane& sums : sums_) {
+    (*targets_)[current_]->change(
+        sums.label, [&](EvidenceUnits* plane) { return add(sums.values, sums.layers, plane, counts_); });
   }
 }
 

@@ -6,16 +6,18 @@
 
 #include "parallel/thread_pool.h"
 #include "update/block_group.h"
+#include "update/sum_kernels.h"
 #include "update/update_rules.h"
 
 namespace bki_mapping {
 
-/// Takes the sums of the blocks of one group, applies the rules, and adds the result to the map's blocks:
-/// first the hits of all blocks, then their free space. One for each thread.
+/// Takes the sums of the blocks of one group, applies the rules, and adds the result, rounded to units, to
+/// the map's blocks, or takes it back: first the hits of all blocks, then their free space. One for each
+/// thread.
 class alignas(kThreadsApart) SumSink {
  public:
   /// Call before an update. @param classes most classes for a block; their memory is allocated here.
-  void reserve(const UpdateRules& rules, std::size_t classes);
+  void reserve(const UpdateRules& rules, std::size_t classes, bool withdraws);
   /// Call before each group.
   void startGroup();
   enum class Kind { kHits, kFree };
@@ -35,18 +37,19 @@ class alignas(kThreadsApart) SumSink {
   /// For the evidence: applies the rules to the sums, and adds them to the block.
   void close();
 
-  /// Sums refused since reserve() because the evidence would not have stayed finite.
-  std::size_t notFinite() const { return not_finite_; }
+  const SumCounts& counts() const { return counts_; }  ///< since reserve()
 
  private:
+  const SumKernels& kernels_ = sumKernelsFor("");
   UpdateRules rules_;
+  bool withdraws_ = false;
   Kind kind_ = Kind::kHits;
   const std::vector<int>* slots_ = nullptr;
   const std::vector<Block*>* targets_ = nullptr;
   std::size_t current_ = 0;
   BlockSums sums_;
   std::array<VoxelMask, kGroupBlocks> protected_;  ///< voxels that take no evidence for `free`, by slot
-  std::size_t not_finite_ = 0;
+  SumCounts counts_;
 };
 
 }  // namespace bki_mapping

@@ -21,12 +21,12 @@ std::size_t faultsOf(const SemanticMap& map, const reference::ScanReference& bru
                      const MapperConfig& config, double room = 0.0) {
   std::size_t faults = 0;
   for (const auto& entry : map.entries()) {
-    const float* plane = entry.block->evidence(id);
+    const EvidenceUnits* plane = entry.block->evidence(id);
     for (int v = 0; v < kBlockVoxels; ++v) {
       const reference::Value truth = brute.evidence(GridGeometry::voxelOf(entry.index, v), id);
       const double tolerance = truth.tolerance(config.kernel.scale) + room;
-      const float got = plane ? plane[v] : 0.0f;
-      faults += std::abs(got - truth.sum) > tolerance || got < 0.0f;
+      const EvidenceUnits got = plane ? plane[v] : 0;
+      faults += std::abs(static_cast<double>(evidenceOf(got)) - truth.sum) > tolerance || got < 0;
     }
   }
   return faults;
@@ -164,7 +164,7 @@ TEST(InstructionSets, BeamsWithoutLengthReachNothing) {
     for (const auto& entry : without->entries()) {
       const Block* same = with->find(entry.index);
       ASSERT_NE(same, nullptr) << set;
-      const float *sums = entry.block->evidence(kFreeClass), *others = same->evidence(kFreeClass);
+      const EvidenceUnits *sums = entry.block->evidence(kFreeClass), *others = same->evidence(kFreeClass);
       EXPECT_TRUE(std::equal(sums, sums + kBlockVoxels, others)) << set;
     }
   }
@@ -185,8 +185,8 @@ TEST(InstructionSets, NoSumOfABeamIsBelowZero) {
       SemanticMap map(geometry, config.prior, 4);
       MapUpdater().update(map, {nullptr, &evidence}, pool);
       for (const auto& entry : map.entries()) {
-        const float* plane = entry.block->evidence(kFreeClass);
-        ASSERT_GE(*std::min_element(plane, plane + kBlockVoxels), 0.0f) << set << ", beam " << n;
+        const EvidenceUnits* plane = entry.block->evidence(kFreeClass);
+        ASSERT_GE(*std::min_element(plane, plane + kBlockVoxels), 0) << set << ", beam " << n;
       }
     }
   }

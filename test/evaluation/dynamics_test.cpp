@@ -23,9 +23,9 @@ Scan scanOf(const std::vector<std::pair<Eigen::Vector3f, std::uint32_t>>& points
 SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
   SemanticMap map(GridGeometry(1.0), 0.001, 4);
   for (const Eigen::Vector3d& point : occupied) {
-    float plane[kBlockVoxels] = {};
+    EvidenceUnits plane[kBlockVoxels] = {};
     const VoxelIndex voxel = map.geometry().voxelAt(point);
-    plane[GridGeometry::offsetInBlock(voxel)] = 1.0f;
+    plane[GridGeometry::offsetInBlock(voxel)] = unitsOf(1.0);
     map.getOrAllocate(GridGeometry::blockOf(voxel)).add(1, plane);
   }
   return map;

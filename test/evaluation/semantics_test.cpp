@@ -29,9 +29,9 @@ TEST(Confusion, KnowsIntersectionsAndUnions) {
 
 /// Adds evidence for a class to the voxel of a point. Voxels of 1 m, prior 0.
 void add(SemanticMap& map, const Eigen::Vector3d& point, ClassId id, float evidence) {
-  float plane[kBlockVoxels] = {};
+  EvidenceUnits plane[kBlockVoxels] = {};
   const VoxelIndex voxel = map.geometry().voxelAt(point);
-  plane[GridGeometry::offsetInBlock(voxel)] = evidence;
+  plane[GridGeometry::offsetInBlock(voxel)] = unitsOf(static_cast<double>(evidence));
   map.getOrAllocate(GridGeometry::blockOf(voxel)).add(id, plane);
 }
 

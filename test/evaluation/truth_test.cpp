@@ -40,8 +40,8 @@ class Truth : public testing::Test {
     throw std::invalid_argument(name);
   }
   void add(SemanticMap& map, const VoxelIndex& index, ClassId id) const {
-    float plane[kBlockVoxels] = {};
-    plane[GridGeometry::offsetInBlock(index)] = 1.0f;
+    EvidenceUnits plane[kBlockVoxels] = {};
+    plane[GridGeometry::offsetInBlock(index)] = unitsOf(1.0);
     map.getOrAllocate(GridGeometry::blockOf(index)).add(id, plane);
   }
   SemanticMap emptyMap() const {

@@ -27,8 +27,8 @@ class Columns : public testing::Test {
   Columns() : map_(GridGeometry(0.5), 0.001, 3) {}
 
   void add(const VoxelIndex& voxel, ClassId id) {
-    std::vector<float> plane(kBlockVoxels, 0.0f);
-    plane[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] = 1.0f;
+    std::vector<EvidenceUnits> plane(kBlockVoxels, 0);
+    plane[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] = unitsOf(1.0);
     map_.getOrAllocate(GridGeometry::blockOf(voxel)).add(id, plane.data());
   }
   void occlude(const VoxelIndex& voxel) {

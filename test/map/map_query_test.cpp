@@ -14,8 +14,8 @@ constexpr double kPrior = 0.001;
 SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offset) {
   SemanticMap map(GridGeometry(1.0), kPrior, 3);
   for (const auto& [label, value] : evidence) {
-    float plane[kBlockVoxels] = {};
-    plane[offset] = value;
+    EvidenceUnits plane[kBlockVoxels] = {};
+    plane[offset] = unitsOf(static_cast<double>(value));
     map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(label), plane);
   }
   return map;
@@ -36,14 +36,14 @@ VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
 }
 
 TEST(MapQuery, OccupiedVoxel) {
-  const VoxelView view = viewOf({{2, 0.6f}, {kFreeClass, 0.2f}});
-  const double sum = 0.8 + 4 * kPrior, p = (0.6 + kPrior) / sum, f = (0.2 + kPrior) / sum, o = kPrior / sum;
+  const VoxelView view = viewOf({{2, 0.75f}, {kFreeClass, 0.25f}});
+  const double sum = 1.0 + 4 * kPrior, p = (0.75 + kPrior) / sum, f = (0.25 + kPrior) / sum, o = kPrior / sum;
   EXPECT_EQ(view.state, VoxelState::kOccupied);
   EXPECT_EQ(view.label, 2);
   EXPECT_NEAR(view.probability, p, 1e-6);
   EXPECT_NEAR(view.variance, p * (1 - p) / (sum + 1), 1e-6);
   EXPECT_NEAR(view.entropy, -p * std::log(p) - f * std::log(f) - 2 * o * std::log(o), 1e-6);
-  EXPECT_NEAR(view.evidence, 0.8, 1e-6);
+  EXPECT_NEAR(view.evidence, 1.0, 1e-6);
   EXPECT_NEAR(view.occupancy, 1 - f, 1e-6);
 }
 
@@ -56,15 +56,15 @@ TEST(MapQuery, FreeVoxelAndTies) {
 }
 
 TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
-  SemanticMap map = mapWith({{1, 0.4f}, {2, 0.3f}, {kFreeClass, 0.5f}}, 77);
+  SemanticMap map = mapWith({{1, 0.375f}, {2, 0.25f}, {kFreeClass, 0.5f}}, 77);
   const auto view = [&map] { return viewVoxel(map, *map.find({{0, 0, 0}}), 77); };
-  const double sum = 1.2 + 4 * kPrior;
+  const double sum = 1.125 + 4 * kPrior;
   EXPECT_EQ(view().state, VoxelState::kFree);
   EXPECT_NEAR(view().probability, (0.5 + kPrior) / sum, 1e-6);
   map.setFreeGain(1, 0.1);
   EXPECT_EQ(view().state, VoxelState::kOccupied);
   EXPECT_EQ(view().label, 1);
-  EXPECT_NEAR(view().probability, (0.4 + kPrior) / sum, 1e-6);
+  EXPECT_NEAR(view().probability, (0.375 + kPrior) / sum, 1e-6);
   EXPECT_NEAR(view().occupancy, 1.0 - (0.5 + kPrior) / sum, 1e-6);
   map.setFreeGain(1, 1.0);
   map.setFreeGain(2, 0.1);  // not the class with the most evidence
@@ -115,8 +115,8 @@ TEST(MapQuery, OccludedOnlyWithoutEvidence) {
 
 TEST(MapQuery, VisitsKnownVoxelsInSortedOrder) {
   SemanticMap map(GridGeometry(1.0), kPrior, 3);
-  float plane[kBlockVoxels] = {};
-  plane[3] = 1.0f;
+  EvidenceUnits plane[kBlockVoxels] = {};
+  plane[3] = unitsOf(1.0);
   for (const int x : {4, -2, 0}) map.getOrAllocate({{x, 0, 0}}).add(0, plane);
   std::vector<int> seen;
   forEachKnownVoxel(map, [&](const VoxelIndex& v, const VoxelView&) { seen.push_back(v.x); });

@@ -18,7 +18,7 @@ BlockIndex randomBlock(std::mt19937& random) {
 TEST(SemanticMap, EqualsAPlainMapWhateverComesAndGoes) {
   std::mt19937 random(5);
   SemanticMap map(GridGeometry(0.3), 0.001, 3);
-  std::map<GridIndex, float> truth;
+  std::map<GridIndex, EvidenceUnits> truth;
   const auto valueAt = [](const Block& block) { return block.evidence(1)[7]; };
   for (int step = 0; step < 20000; ++step) {
     const BlockIndex index = randomBlock(random);
@@ -26,8 +26,8 @@ TEST(SemanticMap, EqualsAPlainMapWhateverComesAndGoes) {
       map.erase(index);
       truth.erase(index);
     } else {
-      float plane[kBlockVoxels] = {};
-      plane[7] = static_cast<float>(step % 100);
+      EvidenceUnits plane[kBlockVoxels] = {};
+      plane[7] = step % 100 + 1;
       map.getOrAllocate(index).add(1, plane);
       truth[index] += plane[7];
     }
@@ -49,7 +49,7 @@ TEST(SemanticMap, AWindowThatMovesOnTakesNoMoreMemory) {
   SemanticMap map(GridGeometry(0.3), 0.001, 3);
   std::size_t at_start = 0;
   for (int x = 0; x < 100000; ++x) {
-    float plane[kBlockVoxels] = {1.0f};
+    EvidenceUnits plane[kBlockVoxels] = {1};
     map.getOrAllocate({{x, x / 7, 0}}).add(1, plane);
     map.erase({{x - 50, (x - 50) / 7, 0}});
     if (x == 1000) at_start = map.bytes();

@@ -125,7 +125,7 @@ std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
     std::string& text = content[entry.index];
     for (std::size_t c = 0; c < entry.block->classes().size(); ++c) {
       text += static_cast<char>(entry.block->classes()[c]);
-      text.append(reinterpret_cast<const char*>(entry.block->plane(c)), kBlockVoxels * sizeof(float));
+      text.append(reinterpret_cast<const char*>(entry.block->plane(c)), kBlockVoxels * sizeof(EvidenceUnits));
     }
     text += entry.block->occlusion().to_string();
   }

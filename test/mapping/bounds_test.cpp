@@ -294,25 +294,6 @@ TEST(Kernel, LimitsOfItsLengthDoNotHoldForCounting) {
   EXPECT_GT(mapper.map().size(), 0u);
 }
 
-TEST(Block, TakesNothingThatIsNotFinite) {
-  Block block;
-  float values[kBlockVoxels] = {};
-  values[3] = 1.0f;
-  values[4] = 3e38f;
-  EXPECT_EQ(block.add(1, values), 0u);
-  values[3] = std::numeric_limits<float>::quiet_NaN();
-  values[5] = kInfinity;
-  values[6] = -kInfinity;
-  values[7] = 2.0f;
-  EXPECT_EQ(block.add(1, values), 4u) << "NaN, twice infinity, and a sum that overflows";
-  const float* plane = block.evidence(1);
-  EXPECT_EQ(plane[3], 1.0f);
-  EXPECT_EQ(plane[4], 3e38f);
-  EXPECT_EQ(plane[5], 0.0f);
-  EXPECT_EQ(plane[6], 0.0f);
-  EXPECT_EQ(plane[7], 2.0f);
-}
-
 TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
   Scan scan;
   scan.labels_are_ids = true;

@@ -31,8 +31,8 @@ std::pair<VoxelIndex, VoxelIndex> bounds(const Scan& scan, const GridGeometry& g
 
 float evidenceAt(const SemanticMap& map, const VoxelIndex& voxel, ClassId label) {
   const Block* block = map.find(GridGeometry::blockOf(voxel));
-  const float* plane = block ? block->evidence(label) : nullptr;
-  return plane ? plane[GridGeometry::offsetInBlock(voxel)] : 0.0f;
+  const EvidenceUnits* plane = block ? block->evidence(label) : nullptr;
+  return plane ? evidenceOf(plane[GridGeometry::offsetInBlock(voxel)]) : 0.0f;
 }
 
 void expectEqualsBruteForce(const Scan& scan, const MapperConfig& config, const std::string& what) {

@@ -1,8 +1,10 @@
 // Laws of the map that need no reference: of threads, order, sums, shifts, and of what a mode may change.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <random>
 #include <set>
 #include <tuple>
 
@@ -45,12 +47,12 @@ MapperConfig configOf(const std::string& mode, int threads = 2) {
 /// Calls check(label, evidence in a, evidence in b, index, offset) for all evidence in a; no plane means 0.
 template <typename Check>
 void compare(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift, Check&& check) {
-  static const std::vector<float> kNothing(kBlockVoxels, 0.0f);
+  static const std::vector<EvidenceUnits> kNothing(kBlockVoxels, 0);
   for (const auto& entry : a.entries()) {
     const Block* other =
         b.find({{entry.index.x + shift.x, entry.index.y + shift.y, entry.index.z + shift.z}});
     for (const ClassId label : entry.block->classes()) {
-      const float* theirs = other ? other->evidence(label) : nullptr;
+      const EvidenceUnits* theirs = other ? other->evidence(label) : nullptr;
       if (!theirs) theirs = kNothing.data();
       for (int v = 0; v < kBlockVoxels; ++v) check(label, entry.block->evidence(label)[v], theirs[v]);
     }
@@ -60,8 +62,8 @@ void compare(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift
 void expectNear(const SemanticMap& a, const SemanticMap& b, const BlockIndex& shift,
                 const std::string& what) {
   std::size_t faults = 0;
-  const auto check = [&](ClassId, float x, float y) {
-    faults += std::abs(x - y) > 1e-5f + 1e-4f * std::abs(x);
+  const auto check = [&](ClassId, EvidenceUnits x, EvidenceUnits y) {
+    faults += std::abs(x - y) > 1 + std::abs(x) / 10000;
   };
   compare(a, b, shift, check);
   compare(b, a, {{-shift.x, -shift.y, -shift.z}}, check);
@@ -81,7 +83,8 @@ TEST(Laws, ThreadCountChangesNoBit) {
         ASSERT_EQ(entry.block->classes(), other->classes()) << mode;
         EXPECT_EQ(entry.block->occlusion(), other->occlusion()) << mode;
         for (std::size_t p = 0; p < other->classes().size(); ++p) {
-          EXPECT_EQ(std::memcmp(entry.block->plane(p), other->plane(p), kBlockVoxels * sizeof(float)), 0)
+          EXPECT_EQ(std::memcmp(entry.block->plane(p), other->plane(p), kBlockVoxels * sizeof(EvidenceUnits)),
+                    0)
               << mode << " with " << threads << " threads";
         }
       }
@@ -89,15 +92,135 @@ TEST(Laws, ThreadCountChangesNoBit) {
   }
 }
 
-TEST(Laws, ScansAddInAnyOrder) {
+/// Settings under which the map is a sum: it depends on no order.
+std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
+  std::vector<std::pair<std::string, MapperConfig>> configs;
   for (const std::string& mode : kModes) {
-    std::vector<Scan> scans = someScans();
-    const SemanticMap forth = mapOf(scans, configOf(mode));
-    const SemanticMap back = mapOf({scans.rbegin(), scans.rend()}, configOf(mode));
-    expectNear(forth, back, {}, mode + ", order");
-    SemanticMap sum = mapOf({scans.begin(), scans.begin() + 3}, configOf(mode));
-    sum.add(mapOf({scans.begin() + 3, scans.end()}, configOf(mode)));
-    expectNear(forth, sum, {}, mode + ", sum of two maps");
+    MapperConfig config = configOf(mode);
+    config.occlusion = OcclusionExtent::kNone;
+    configs.emplace_back(mode, config);
+    config.kernel.type = KernelType::kCounting;
+    configs.emplace_back(mode + ", counting", config);
+    config.kernel.type = KernelType::kSparse;
+    config.free_space.hits_before_misses = true;
+    config.free_space.evidence_before_misses = true;
+    config.scan_limit.hits = 0.05;
+    config.scan_limit.free = 0.03;
+    config.free_gain.persistence = 3.0;
+    configs.emplace_back(mode + ", with rules and limits", config);
+  }
+  return configs;
+}
+
+/// The same scans, each point with two classes.
+std::vector<Scan> withSoftLabels(std::vector<Scan> scans) {
+  for (Scan& scan : scans) {
+    scan.labels_are_ids = true;
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const float share = static_cast<float>(i % 7 + 1) / 8.0f;
+      scan.labels[i] = share > 0.5f ? 1 : 2;
+      scan.soft.startPoint();
+      scan.soft.add({1, share});
+      scan.soft.add({2, 1.0f - share});
+    }
+  }
+  return scans;
+}
+
+/// The same blocks with the same planes, to the bit.
+void expectSame(const SemanticMap& a, const SemanticMap& b, const std::string& what) {
+  ASSERT_GT(a.size(), 0u) << what;
+  ASSERT_EQ(a.size(), b.size()) << what;
+  for (const auto& entry : a.entries()) {
+    const Block* other = b.find(entry.index);
+    ASSERT_NE(other, nullptr) << what;
+    ASSERT_EQ(entry.block->classes(), other->classes()) << what;
+    for (std::size_t p = 0; p < other->classes().size(); ++p) {
+      ASSERT_EQ(0, std::memcmp(entry.block->plane(p), other->plane(p), kBlockVoxels * sizeof(EvidenceUnits)))
+          << what;
+    }
+  }
+}
+
+TEST(Laws, OrderAndMergingChangeNoBit) {
+  std::mt19937 random(3);
+  for (const auto& [name, config] : additiveConfigs()) {
+    for (const bool soft : {false, true}) {
+      std::vector<Scan> scans = soft ? withSoftLabels(someScans()) : someScans();
+      const std::string what = name + (soft ? ", soft labels" : "");
+      const SemanticMap forth = mapOf(scans, config);
+      std::shuffle(scans.begin(), scans.end(), random);
+      expectSame(forth, mapOf(scans, config), what + ", order");
+      const auto middle = scans.begin() + 3;
+      SemanticMap sum = mapOf({middle, scans.end()}, config);
+      sum.add(mapOf({scans.begin(), middle}, config));
+      expectSame(forth, sum, what + ", sum of two maps");
+    }
+  }
+}
+
+TEST(Laws, WithdrawnScansLeaveNoTrace) {
+  std::mt19937 random(4);
+  for (const auto& [name, config] : additiveConfigs()) {
+    for (const bool soft : {false, true}) {
+      const std::vector<Scan> scans = soft ? withSoftLabels(someScans()) : someScans();
+      const std::string what = name + (soft ? ", soft labels" : "");
+      SemanticMapper mapper(config, reference::smallTable());
+      std::vector<std::size_t> present;  // scans in the map, which may be there twice
+      for (int step = 0; step < 30; ++step) {
+        const bool add = present.empty() || random() % 5 < 3;
+        const std::size_t n = random() % (add ? scans.size() : present.size());
+        const ScanStats stats = add ? mapper.integrate(scans[n]) : mapper.withdraw(scans[present[n]]);
+        EXPECT_EQ(stats.saturated + stats.negative, 0u) << what;
+        if (add) {
+          present.push_back(n);
+        } else {
+          present.erase(present.begin() + static_cast<std::ptrdiff_t>(n));
+        }
+        ASSERT_EQ(mapper.mapBytes(), mapper.map().bytes()) << what;
+      }
+      std::vector<Scan> left;
+      for (const std::size_t n : present) left.push_back(scans[n]);
+      expectSame(mapOf(left, config), mapper.map(), what);
+      for (const Scan& scan : left) mapper.withdraw(scan);
+      EXPECT_EQ(mapper.map().size(), 0u) << what;
+    }
+  }
+}
+
+TEST(Laws, WithdrawingWhatIsNotThereIsCountedAndReadsAsNothing) {
+  MapperConfig config = configOf("line");
+  config.occlusion = OcclusionExtent::kNone;
+  const std::vector<Scan> scans = someScans();
+  SemanticMapper mapper(config, reference::smallTable());
+  EXPECT_GT(mapper.withdraw(scans[0]).negative, 0u);
+  for (const auto& entry : mapper.map().entries()) {
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      ASSERT_EQ(viewVoxel(mapper.map(), *entry.block, v).state, VoxelState::kUnknown);
+    }
+  }
+  mapper.integrate(scans[0]);
+  EXPECT_EQ(mapper.map().size(), 0u) << "the sum of a scan and its withdrawal";
+}
+
+TEST(Laws, NothingIsWithdrawnWhereOrderMatters) {
+  const Scan scan = someScans().front();
+  for (const bool occlusion : {false, true}) {
+    MapperConfig config = configOf("line");
+    config.occlusion = occlusion ? OcclusionExtent::kMapped : OcclusionExtent::kNone;
+    config.free_space.extent = occlusion ? FreeSpaceExtent::kObserved : FreeSpaceExtent::kMapped;
+    SemanticMapper mapper(config, reference::smallTable());
+    mapper.integrate(scan);
+    const SemanticMap before = mapOf({scan}, config);
+    try {
+      mapper.withdraw(scan);
+      ADD_FAILURE() << "withdrawn";
+    } catch (const std::logic_error& error) {
+      const std::string why = error.what();
+      EXPECT_NE(why.find(occlusion ? "occlusion" : "free_space/extent"), std::string::npos) << why;
+      EXPECT_NE(why.find("; set "), std::string::npos) << why;
+    }
+    expectSame(before, mapper.map(), "refused");
   }
 }
 
@@ -117,15 +240,16 @@ TEST(Laws, AModeChangesOnlyFree) {
   for (const std::string& mode : kModes) {
     const SemanticMap other = mapOf(someScans(), configOf(mode));
     std::size_t changed = 0;
-    float free = 0.0f;
-    compare(other, none, {}, [&](ClassId label, float x, float y) {
+    std::int64_t free = 0;
+    compare(other, none, {}, [&](ClassId label, EvidenceUnits x, EvidenceUnits y) {
       changed += label != kFreeClass && x != y;
       if (label == kFreeClass) free += x;
     });
-    compare(none, other, {},
-            [&](ClassId label, float x, float y) { changed += label != kFreeClass && x != y; });
+    compare(none, other, {}, [&](ClassId label, EvidenceUnits x, EvidenceUnits y) {
+      changed += label != kFreeClass && x != y;
+    });
     EXPECT_EQ(changed, 0u) << mode;
-    EXPECT_EQ(free > 0.0f, mode != "none") << mode;
+    EXPECT_EQ(free > 0, mode != "none") << mode;
   }
 }
 
@@ -145,7 +269,9 @@ TEST(Laws, ModesDiffer) {
   for (std::size_t i = 0; i < maps.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       double difference = 0.0;
-      compare(maps[i], maps[j], {}, [&](ClassId, float x, float y) { difference += std::abs(x - y); });
+      compare(maps[i], maps[j], {}, [&](ClassId, EvidenceUnits x, EvidenceUnits y) {
+        difference += std::abs(evidenceOf(x) - evidenceOf(y));
+      });
       EXPECT_GT(difference, 1e-3) << i << " and " << j;
     }
   }
@@ -157,7 +283,7 @@ TEST(Laws, ExtentsAgreeWhereBothClear) {
   const std::vector<Scan> scan = {someScans().front()};
   const SemanticMap all = mapOf(scan, observed), some = mapOf(scan, mapped);
   EXPECT_LT(some.size(), all.size());
-  compare(some, all, {}, [](ClassId, float x, float y) { ASSERT_EQ(x, y); });
+  compare(some, all, {}, [](ClassId, EvidenceUnits x, EvidenceUnits y) { ASSERT_EQ(x, y); });
 }
 
 TEST(Laws, EveryBlockKnowsSomething) {
@@ -174,8 +300,8 @@ TEST(Laws, ProbabilitiesSumToOne) {
       const VoxelView view = viewVoxel(map, *entry.block, v);
       double sum = 0.0;
       for (const int label : {0, 1, 2, 3, 255}) {
-        const float* plane = entry.block->evidence(static_cast<ClassId>(label));
-        sum += (map.prior() + (plane ? plane[v] : 0.0f)) / (map.priorSum() + view.evidence);
+        const EvidenceUnits* plane = entry.block->evidence(static_cast<ClassId>(label));
+        sum += (map.prior() + (plane ? evidenceOf(plane[v]) : 0.0f)) / (map.priorSum() + view.evidence);
       }
       ASSERT_NEAR(sum, 1.0, 1e-5);
     }
@@ -217,7 +343,7 @@ TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
   }
   std::size_t differences = 0;
   compare(made.map(), changed.map(), {{0, 0, 0}},
-          [&](ClassId, float x, float y) { differences += std::memcmp(&x, &y, sizeof(x)) != 0; });
+          [&](ClassId, EvidenceUnits x, EvidenceUnits y) { differences += x != y; });
   EXPECT_EQ(differences, 0u);
   EXPECT_EQ(made.map().size(), changed.map().size());
 
@@ -249,7 +375,8 @@ TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
         ASSERT_TRUE(old) << mode;
         ASSERT_EQ(old->classes(), entry.block->classes()) << mode;
         for (std::size_t c = 0; c < old->classes().size(); ++c) {
-          ASSERT_EQ(0, std::memcmp(old->plane(c), entry.block->plane(c), kBlockVoxels * sizeof(float)));
+          ASSERT_EQ(0,
+                    std::memcmp(old->plane(c), entry.block->plane(c), kBlockVoxels * sizeof(EvidenceUnits)));
         }
       }
       before.clear();

@@ -9,6 +9,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/core/scan.h"
+#include "bki_mapping/map/block.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::reference {
@@ -21,7 +22,11 @@ struct Value {
 
   /// Greatest error of the sum in single precision. The term in `beams` covers voxels that many beams barely
   /// reach: the sum is small, but each beam contributes rounding errors in proportion to the kernel's scale.
-  double tolerance(double scale) const { return 2e-5 * scale + 2e-7 * scale * beams + 2e-5 * sum + slack; }
+  /// Half a unit is for rounding the sum.
+  double tolerance(double scale) const {
+    return 2e-5 * scale + 2e-7 * scale * beams + 2e-5 * sum + slack +
+           0.5 * static_cast<double>(kEvidenceUnit);
+  }
 };
 
 struct Point {

@@ -17,7 +17,9 @@ if QEMU is None or platform.machine() != 'x86_64':
     print('SKIPPED: needs qemu-x86_64 (package qemu-user), and a machine that is x86-64 itself', file=sys.stderr)
     sys.exit(77)
 BIN = os.environ['BKI_MAPPING_BIN']
-ROUNDING = 50 * 2e-6 * 0.1
+SCANS = 2
+UNIT = 2.0 ** -16  # of evidence; each scan's sum is rounded to it
+ROUNDING = 50 * 2e-6 * 0.1 + SCANS * UNIT
 
 
 def emulated(processor, *command):
@@ -61,8 +63,8 @@ class Nehalem(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.drive = os.path.join(cls.folder.name, 'drive')
-        subprocess.run([os.path.join(BIN, 'simulate_drive'), '--output', cls.drive, '--scans', '2', '--beams', '16',
-                        '--columns', '300'], check=True, capture_output=True)
+        subprocess.run([os.path.join(BIN, 'simulate_drive'), '--output', cls.drive, '--scans', str(SCANS), '--beams',
+                        '16', '--columns', '300'], check=True, capture_output=True)
 
     @classmethod
     def tearDownClass(cls):
@@ -92,8 +94,8 @@ class Nehalem(unittest.TestCase):
 
     def compare(self, native, nehalem):
         """Instruction sets round differently: kernel values are right to 1e-6 of their scale of 0.1 on each, and up to
-        some 50 of them add up in a voxel. A voxel of which hardly anything is known may be lost by that, and the
-        state may change where two are as probable."""
+        some 50 of them add up in a voxel, whose sum may then be rounded to the next unit. A voxel of which hardly
+        anything is known may be lost by that, and the state may change where two are as probable."""
         for one, other in ((native, nehalem), (nehalem, native)):
             lost = [voxel for at, voxel in one.items() if at not in other and voxel['evidence'] > ROUNDING]
             self.assertEqual(lost, [])

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -11,30 +13,51 @@
 
 namespace bki_mapping {
 
-/// The evidence of 512 voxels: one plane of floats for each class that the block has seen. A class without a
-/// plane has no evidence in the block: its concentrations equal the prior.
+/// Evidence in fixed point: whole numbers of kEvidenceUnit. A scan's sum for a voxel and a class is rounded
+/// to the nearest unit once, and then added as an integer. So the sum of scans has no rounding of its own: it
+/// is the same to the bit in any order, and a scan can be taken back. docs/method.md gives the reasons for
+/// the size of the unit.
+using EvidenceUnits = std::int32_t;
+constexpr float kEvidenceUnit = 0x1.0p-16f;
+/// Evidence stops here, at 32,768, instead of overflowing.
+constexpr EvidenceUnits kMostUnits = std::numeric_limits<EvidenceUnits>::max();
+
+/// Evidence as a number. Negative evidence, which only withdrawing what was never added leaves, counts as
+/// none.
+inline float evidenceOf(EvidenceUnits units) {
+  return kEvidenceUnit * static_cast<float>(std::max(units, 0));
+}
+
+/// The nearest number of units. @param evidence within the range.
+inline EvidenceUnits unitsOf(double evidence) {
+  return static_cast<EvidenceUnits>(std::lround(evidence / static_cast<double>(kEvidenceUnit)));
+}
+
+/// The evidence of 512 voxels: one plane for each class of which a voxel has evidence. A class without a
+/// plane has no evidence in the block: its concentrations equal the prior. Equal evidence means equal blocks,
+/// however it came together.
 class Block {
  public:
   using Occlusion = std::bitset<kBlockVoxels>;
 
-  /// The classes with a plane, in the order in which they were first seen; may include kFreeClass.
+  /// The classes with a plane, by rising id; may include kFreeClass.
   const std::vector<ClassId>& classes() const { return classes_; }
 
   /// The plane of a class: the evidence at each voxel, by GridGeometry::offsetInBlock.
   /// @return nullptr if the block has no plane for the class.
-  const float* evidence(ClassId id) const {
-    const auto found = std::find(classes_.begin(), classes_.end(), id);
-    return found == classes_.end() ? nullptr : plane(static_cast<std::size_t>(found - classes_.begin()));
+  const EvidenceUnits* evidence(ClassId id) const {
+    const std::size_t position = positionOf(id);
+    return has(id, position) ? plane(position) : nullptr;
   }
   /// The plane of the class at a position in classes().
-  const float* plane(std::size_t position) const { return planes_.data() + position * kBlockVoxels; }
+  const EvidenceUnits* plane(std::size_t position) const { return planes_.data() + position * kBlockVoxels; }
 
   /// A range of layers of voxels along z: `begin` to `end` - 1.
   struct Layers {
     int begin = 0, end = kBlockEdge;
   };
 
-  /// Allocates memory for the planes of further classes, so that adding to them does not.
+  /// Allocates memory for the planes of further classes, so that changing them does not.
   void reserve(std::size_t further_classes) {
     if (further_classes == 0) return;
     classes_.reserve(classes_.size() + further_classes);
@@ -47,35 +70,48 @@ class Block {
     if (classes_.capacity() > classes_.size()) classes_.shrink_to_fit();
   }
 
-  /// Adds one value for each voxel to the plane of a class, which is created if missing. Every change to a
-  /// plane goes through here, so that evidence stays finite: a voxel whose sum is not finite keeps its value.
-  /// @param values 512 of them. @param layers those that may hold values other than 0.
-  /// @return the number of voxels that kept their value.
-  std::size_t add(ClassId id, const float* values, Layers layers) {
-    const auto found = std::find(classes_.begin(), classes_.end(), id);
-    const auto position = static_cast<std::size_t>(found - classes_.begin());
-    if (position == classes_.size()) {
+  /// Changes the plane of a class, which is created if missing, and removed if nothing is left in it.
+  /// @param change called as change(plane); returns false if it left nothing where it wrote.
+  template <typename Change>
+  void change(ClassId id, Change&& change) {
+    const std::size_t position = positionOf(id), begin = position * kBlockVoxels;
+    const auto at = [](auto& vector, std::size_t n) {
+      return vector.begin() + static_cast<std::ptrdiff_t>(n);
+    };
+    if (!has(id, position)) {
       reserve(1);
-      classes_.push_back(id);
-      planes_.resize(planes_.size() + kBlockVoxels, 0.0f);
+      classes_.insert(at(classes_, position), id);
+      planes_.insert(at(planes_, begin), kBlockVoxels, 0);
     }
-    float* plane = planes_.data() + position * kBlockVoxels;
-    std::uint32_t refused = 0;
-    for (int v = layers.begin * kLayerVoxels; v < layers.end * kLayerVoxels; ++v) {
-      const float sum = plane[v] + values[v];
-      const bool finite = std::abs(sum) <= std::numeric_limits<float>::max();
-      plane[v] = finite ? sum : plane[v];
-      refused += finite ? 0u : 1u;
-    }
-    return refused;
+    if (change(planes_.data() + begin)) return;
+    const auto first = at(planes_, begin), last = first + kBlockVoxels;
+    if (std::any_of(first, last, [](EvidenceUnits units) { return units != 0; })) return;
+    classes_.erase(at(classes_, position));
+    planes_.erase(first, last);
   }
-  std::size_t add(ClassId id, const float* values) { return add(id, values, Layers()); }
+
+  /// Adds a plane of another block. @return the number of voxels whose evidence stopped at the end of its
+  /// range.
+  std::size_t add(ClassId id, const EvidenceUnits* units) {
+    std::size_t saturated = 0;
+    change(id, [&](EvidenceUnits* plane) {
+      EvidenceUnits any = 0;
+      for (int v = 0; v < kBlockVoxels; ++v) {
+        const std::int64_t sum = std::int64_t{plane[v]} + units[v], most = kMostUnits;
+        plane[v] = static_cast<EvidenceUnits>(std::clamp(sum, -most, most));
+        saturated += plane[v] != sum;
+        any |= plane[v];
+      }
+      return any != 0;
+    });
+    return saturated;
+  }
 
   /// Prefetches the first cache lines of the planes for writing; the hardware prefetcher then follows.
   void prefetch() const {
-    constexpr int kFloatsPerLine = 64 / sizeof(float), kLines = 8;
+    constexpr int kUnitsPerLine = 64 / sizeof(EvidenceUnits), kLines = 8;
     for (std::size_t p = 0; p < classes_.size(); ++p) {
-      for (int line = 0; line < kLines; ++line) __builtin_prefetch(plane(p) + kFloatsPerLine * line, 1);
+      for (int line = 0; line < kLines; ++line) __builtin_prefetch(plane(p) + kUnitsPerLine * line, 1);
     }
   }
 
@@ -88,14 +124,21 @@ class Block {
 
   /// Memory of the block, including this object [bytes].
   std::size_t bytes() const {
-    return sizeof(*this) + planes_.capacity() * sizeof(float) + classes_.capacity() * sizeof(ClassId);
+    return sizeof(*this) + planes_.capacity() * sizeof(EvidenceUnits) + classes_.capacity() * sizeof(ClassId);
   }
 
  private:
-  static constexpr int kLayerVoxels = kBlockEdge * kBlockEdge;
+  /// The position of a class in classes_, or where it would be inserted.
+  std::size_t positionOf(ClassId id) const {
+    return static_cast<std::size_t>(std::lower_bound(classes_.begin(), classes_.end(), id) -
+                                    classes_.begin());
+  }
+  bool has(ClassId id, std::size_t position) const {
+    return position < classes_.size() && classes_[position] == id;
+  }
 
   std::vector<ClassId> classes_;
-  std::vector<float> planes_;
+  std::vector<EvidenceUnits> planes_;
   Occlusion occlusion_;
 };
 

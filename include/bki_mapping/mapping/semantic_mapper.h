@@ -29,6 +29,13 @@ class SemanticMapper {
   /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
   ScanStats integrate(const Scan& scan);
 
+  /// Takes back a scan that was integrated with the present settings: the map is then the same to the bit as
+  /// if the scan had never been there, whatever came after it, unless evidence had stopped at the end of its
+  /// range (ScanStats::saturated). A scan that was not in the map leaves negative evidence, which reads as
+  /// none (ScanStats::negative). @throws as integrate(), and std::logic_error with free_space/extent `mapped`
+  /// or occlusion marks, which depend on the order of scans.
+  ScanStats withdraw(const Scan& scan);
+
   /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
   /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start
   /// (Changes::kAtStart); the settings are then unchanged.
@@ -50,7 +57,7 @@ class SemanticMapper {
     return erased;
   }
 
-  /// The blocks that the last integrate() may have changed, created or erased, each once.
+  /// The blocks that the last integrate() or withdraw() may have changed, created or erased, each once.
   const std::vector<GridIndex>& touchedBlocks() const;
   /// Memory of the map and its index [bytes]. Equals map().bytes(), but does not visit every block.
   std::size_t mapBytes() const { return block_bytes_ + map_.indexBytes(); }
@@ -62,8 +69,10 @@ class SemanticMapper {
  private:
   /// The stages that a scan passes; holds all working memory.
   struct Pipeline;
+  Pipeline& pipeline();
 
-  ScanStats add(const Scan& scan);
+  ScanStats addOrWithdraw(const Scan& scan, bool withdraws);
+  ScanStats add(const Scan& scan, bool withdraws);
   /// Cleans up after a failure: recounts the map's bytes, and frees the working memory, which may be large.
   void recover() noexcept;
   void setGains();

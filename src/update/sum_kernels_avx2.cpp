@@ -1,0 +1,16 @@
+#include "update/sum_kernels.h"
+
+#include "simd/vec_avx2.h"
+
+#include "update/sum_kernels_inl.h"
+
+#include "simd/end_region.h"
+
+namespace bki_mapping {
+
+const SumKernels& sumKernelsAvx2() {
+  static const SumKernels kernels = {"avx2", addSums<false>, addSums<true>};
+  return kernels;
+}
+
+}  // namespace bki_mapping
