@@ -55,16 +55,24 @@ source_system_ros() {
   fi
 }
 
+# Says at each tenth how far a build is, whose output it reads. No awk: mawk holds back for minutes what it reads.
+say_progress() {
+  local line next=10
+  while read -r line; do
+    if [[ $line =~ ^\[\ *([0-9]+)% ]] && [ "${BASH_REMATCH[1]}" -ge "$next" ]; then
+      echo "    ${BASH_REMATCH[1]} %"
+      next=$((BASH_REMATCH[1] / 10 * 10 + 10))
+    fi
+  done
+}
+
 # Builds and says how far it is. $1: build folder; then targets, or none for all.
 build_targets() {
   local folder=$1 targets=()
   shift
   if [ $# -gt 0 ]; then targets=(--target "$@"); fi
-  cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | awk -v next_step=10 '
-    /^\[ *[0-9]+%\]/ {
-      percent = $0; sub(/^\[ */, "", percent); percent += 0
-      if (percent >= next_step) { printf "    %d %%\n", percent; fflush(); next_step = percent - percent % 10 + 10 }
-    }' || { grep -E -A 12 '(error|warning):' "$folder/build.log" | head -60; tail -20 "$folder/build.log"; return 1; } >&2
+  cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | say_progress ||
+    { grep -E -A 12 '(error|warning):' "$folder/build.log" | head -60; tail -20 "$folder/build.log"; return 1; } >&2
 }
 
 # The packages of a build tree. $1: build folder.
