@@ -30,9 +30,11 @@ what_was_skipped() {
 
 # Installs with apt what is missing.
 install_dependencies() {
-  local list=$root/scripts/dependencies.debian.txt missing=() package
+  local list=$root/scripts/dependencies.debian.txt beside= missing=() package
   if [ -d /opt/ros/noetic ]; then list=$root/scripts/dependencies.noetic.txt; fi
-  for package in $(grep -v '^#' "$list"); do
+  # Debian 13's rviz shows its icons only with this package, on which it does not depend.
+  if grep -q '^VERSION_CODENAME=trixie' /etc/os-release; then beside=qt6-svg-plugins; fi
+  for package in $(grep -v '^#' "$list") $beside; do
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
   done
   if [ ${#missing[@]} -eq 0 ]; then
