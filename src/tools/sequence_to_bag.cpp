@@ -1,6 +1,7 @@
 // Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.
 #include <rosbag/bag.h>
 
+#include <cstdlib>
 #include <iostream>
 #include <memory>
 
@@ -63,9 +64,12 @@ int writeBag(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("sequence_to_bag", [&] {
+  const int status = tools::run("sequence_to_bag", [&] {
     const auto given = tools::parse(
         argc, argv, "Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.", options());
     return given ? writeBag(*given) : 0;
   });
+  // At a usual exit class_loader 2.8 would complain of the plugin that a leaked bag still holds.
+  if (status != 0) std::quick_exit(status);
+  return status;
 }
