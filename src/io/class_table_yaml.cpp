@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -63,6 +65,17 @@ std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::
   return static_cast<std::uint8_t>(value);
 }
 
+/// Read as a signed number: to yaml-cpp 0.6, -1 is a large unsigned one.
+std::uint32_t labelOf(const std::string& file, const YAML::Node& node, const std::string& owner) {
+  constexpr auto kLargest = std::numeric_limits<std::uint32_t>::max();
+  const auto value = node.as<std::int64_t>();
+  if (value < 0 || value > kLargest) {
+    fail(file, "raw label " + std::to_string(value) + " of class '" + owner + "' is not in 0 to " +
+                   std::to_string(kLargest));
+  }
+  return static_cast<std::uint32_t>(value);
+}
+
 /// @param owner what the keys belong to, for the message.
 void checkKeys(const std::string& file, const YAML::Node& map, const std::string& owner,
                const std::vector<std::string>& known) {
@@ -101,7 +114,7 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
   } else if (!node["raw"].IsSequence()) {
     fail(file, "raw of class '" + c.name + "' must be a list of numbers, or any");
   } else {
-    c.raw = node["raw"].as<std::vector<std::uint32_t>>();
+    for (const YAML::Node& each : node["raw"]) c.raw.push_back(labelOf(file, each, c.name));
   }
   const YAML::Node flags = node["flags"];
   if (flags && !flags.IsSequence()) {

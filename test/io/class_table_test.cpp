@@ -127,7 +127,11 @@ TEST(ClassTable, NamesEveryFault) {
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: ~, color: [1, 2, 3]}\n"), "class 2 is empty");
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: 9}\n"),
                "raw of class 'b' must be a list of numbers, or any");
-  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [-1]}\n"), "bad conversion");
+  for (const char* raw : {"-1", "4294967296"}) {
+    EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [" + raw + "]}\n"),
+                 std::string("raw label ") + raw + " of class 'b' is not in 0 to 4294967295");
+  }
+  EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [x]}\n"), "bad conversion");
   for (const char* gain : {".inf", ".nan", "-.inf", "-1", "0"}) {
     EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], free_gain: " + gain + "}\n"),
                  "free_gain of class 'b' must be a number > 0");
