@@ -4,6 +4,7 @@
 The emulator refuses instructions that Nehalem lacks, as the processor does; the first test makes sure of that."""
 import os
 import platform
+import re
 import shutil
 import signal
 import struct
@@ -15,6 +16,10 @@ import unittest
 QEMU = shutil.which('qemu-x86_64')
 if QEMU is None or platform.machine() != 'x86_64':
     print('SKIPPED: needs qemu-x86_64 (package qemu-user), and a machine that is x86-64 itself', file=sys.stderr)
+    sys.exit(77)
+VERSION = re.search(r'version (\d+)\.(\d+)', subprocess.check_output([QEMU, '--version'], text=True))
+if tuple(map(int, VERSION.groups())) < (7, 2):
+    print('SKIPPED: needs QEMU 7.2 or later; earlier ones do not refuse AVX', file=sys.stderr)
     sys.exit(77)
 BIN = os.environ['BKI_MAPPING_BIN']
 SCANS = 2
