@@ -40,22 +40,21 @@ po::options_description options() {
 class Player {
  public:
   explicit Player(const tools::FrameNames& names) : names_(names) {
-    cloud_ = node_.advertise<sensor_msgs::PointCloud2>(
-        "cloud_in", 10,
-        [this](const ros::SingleSubscriberPublisher& link) { listeners_.insert(link.getSubscriberName()); });
-    tf_ = node_.advertise<tf2_msgs::TFMessage>("/tf", 100,
+    cloud_ = node_.advertise<sensor_msgs::PointCloud2>("cloud_in", 10, namesOf(cloud_listeners_));
+    tf_ = node_.advertise<tf2_msgs::TFMessage>("/tf", 100, namesOf(tf_listeners_), {}, {},
                                                true);  // latched: a late subscriber gets the last pose
     clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 10);
     status_ = node_.subscribe("mapping/status", 100, &Player::onStatus, this);
   }
 
-  /// Waits until the clouds have a subscriber. @param mapper wait for the mapper, not just for rviz: a mapper
-  /// that misses the first cloud would never acknowledge it.
+  /// Waits until the clouds and the poses have a subscriber. @param mapper wait for the mapper, not just for
+  /// rviz: a mapper that misses the first cloud would never acknowledge it, and one that misses its pose
+  /// would drop it.
   void waitForListener(bool mapper) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kListenerWait);
     const auto missing = [&] {
       return cloud_.getNumSubscribers() == 0 || tf_.getNumSubscribers() == 0 ||
-             (mapper && listeners_.count(mapper_) == 0);
+             (mapper && (cloud_listeners_.count(mapper_) == 0 || tf_listeners_.count(mapper_) == 0));
     };
     while (ros::ok() && missing()) {
       if (ros::WallTime::now() > end) {
@@ -92,6 +91,11 @@ class Player {
   }
 
  private:
+  /// Collects the names of those that subscribe.
+  static ros::SubscriberStatusCallback namesOf(std::set<std::string>& names) {
+    return [&names](const ros::SingleSubscriberPublisher& link) { names.insert(link.getSubscriberName()); };
+  }
+
   void onStatus(const ros::MessageEvent<const MappingStatus>& event) {
     mapper_ = event.getPublisherName();
     acknowledged_ = event.getConstMessage()->header.stamp.toNSec();
@@ -101,8 +105,8 @@ class Player {
   ros::NodeHandle node_;
   ros::Publisher cloud_, tf_, clock_;
   ros::Subscriber status_;
-  std::set<std::string> listeners_;  ///< nodes subscribed to the clouds
-  std::string mapper_;               ///< node that publishes the status; empty: unknown yet
+  std::set<std::string> cloud_listeners_, tf_listeners_;  ///< nodes subscribed to the clouds, to the poses
+  std::string mapper_;  ///< node that publishes the status; empty: unknown yet
   std::uint64_t acknowledged_ = 0;
 };
 
