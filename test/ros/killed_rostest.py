@@ -45,6 +45,7 @@ class Mapper:
         for process in (self.manager, self.loader):
             test.addCleanup(process.kill)
         self.robot.connect()
+        rospy.wait_for_service(f'/{name}/save_map', TIMEOUT)
 
     def map(self):
         stamp = self.robot.scan(POINTS, [CAR] * len(POINTS))
@@ -53,7 +54,6 @@ class Mapper:
             raise AssertionError(status)
 
     def save(self, path):
-        rospy.wait_for_service(f'/{self.name}/save_map', TIMEOUT)
         return rospy.ServiceProxy(f'/{self.name}/save_map', SaveMap)(path, 'occupied,free')
 
     def end(self, number):
@@ -97,6 +97,7 @@ class Killed(unittest.TestCase):
         saver.start()
         self.assertTrue(saved.wait(TIMEOUT))
         first.end(signal.SIGKILL)
+        saver.join(TIMEOUT)
         self.assertTrue(complete(path), 'a file is there whole or not at all')
 
         second = Mapper(self, 'killed_mapping')
@@ -109,7 +110,6 @@ class Killed(unittest.TestCase):
         self.assertTrue(complete(path))
         self.assertEqual(os.listdir(self.folder), ['map.ply'], 'what the killed one left is gone')
         second.end(signal.SIGINT)
-        saver.join(TIMEOUT)
 
     def test_a_folder_that_may_not_be_written(self):
         os.chmod(self.folder, 0o555)
