@@ -7,6 +7,7 @@ import threading
 import time
 import unittest
 
+import rosgraph
 import roslib.packages
 import rospy
 from bki_mapping.msg import MappingStatus, OccupancyMap
@@ -36,6 +37,11 @@ def wait_until(condition, what, timeout=TIMEOUT):
 def program(name, package='bki_mapping'):
     """The path of a program, found as roslaunch finds it (rosrun does not look into a build folder in the package)."""
     return roslib.packages.find_node(package, name)[0]
+
+
+def publishers_of(topic):
+    """The nodes that publish a topic, according to the master: rospy of Debian 11 keeps connections that are gone."""
+    return dict(rosgraph.Master(rospy.get_name()).getSystemState()[0]).get(topic, [])
 
 
 def adds_up(status):

@@ -16,7 +16,7 @@ from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import Listener, Robot, program, wait_until  # noqa: E402
+from harness import Listener, Robot, program, publishers_of, wait_until  # noqa: E402
 
 
 def load(name, **parameters):
@@ -55,7 +55,7 @@ class Lifecycle(unittest.TestCase):
                 nodelet = load(f'mapping_{turn}')
                 status.wait_for(lambda m: m.integrated > 0, f'mapping in turn {turn}')
                 stop(nodelet)
-                wait_until(lambda: status.subscriber.get_num_connections() == 0, 'unloading')
+                wait_until(lambda: not publishers_of(f'/mapping_{turn}/status'), 'unloading')
         finally:
             stopped.set()
             traffic.join()
