@@ -10,6 +10,7 @@
 ///        kernel is as long as a voxel or shorter, as by default. Two voxels of a column hold it, or four
 ///        where the line is steep along the column (half_height > 1). Lanes are slices.
 ///      - wide_kernel_inl.h, in straight slices, for longer kernels. Lanes are the voxels of a slice.
+///    Both multiply the kernel by the weight, beam_weight_inl.h.
 /// 5. GroupSums holds the sums of all beams, in rows along the axis that suits each kind of slice.
 ///
 /// The narrow way exists because it evaluates the kernel only twice for a beam and a slice, whereas a

@@ -1,13 +1,13 @@
-/// @file A box cut into slices, a line in them, and the weight along it; part of line_kernels_inl.h.
+/// @file A box cut into slices, and a line in them; part of line_kernels_inl.h.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 
 #include "beams/raster/beam_box.h"
+#include "beams/raster/beam_weight_inl.h"
 #include "beams/raster/group_sums.h"
 #include "beams/raster/line_setup.h"
-#include "bki_mapping/beams/beam_config.h"
 
 namespace bki_mapping {
 namespace {
@@ -16,22 +16,6 @@ namespace {
 /// that what a beam adds to a voxel does not depend on the slice where its pass begins.
 constexpr int kMiddleSlice = kGroupVoxels / 2,
               kMiddleShearedSlice[3] = {15, 0, 46};  ///< -1 and 1: by shear + 1
-
-/// Weights along beams, Equation (7) of docs/method.md: 0 unless 0 < rho < 1. @param rho minus kMiddle, so
-/// that the bilinear weight is one MinAbs and one difference.
-template <BeamWeight kWeight>
-struct VecWeight {
-  static constexpr float kMiddle = kWeight == BeamWeight::kBilinear ? 0.5f : 0.0f;
-
-  [[gnu::always_inline]] static FloatVec at(FloatVec rho) {
-    if constexpr (kWeight == BeamWeight::kBilinear) {
-      return 0.5f - MinAbs(rho, Set(0.5f));
-    } else {
-      const FloatVec weight = kWeight == BeamWeight::kUniform ? Set(1.0f) : rho;
-      return IfThenElse((rho > 0.0f) & (rho < 1.0f), weight, FloatVec{});
-    }
-  }
-};
 
 [[gnu::always_inline]] inline std::int32_t toFixedPoint(double voxels) {
   return static_cast<std::int32_t>(voxels * kOneVoxel);
