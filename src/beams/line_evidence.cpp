@@ -1,3 +1,5 @@
+// The blocks that beams touch, and the sums of the counting kernel; those of the sparse kernel are in
+// raster/line_kernels_inl.h.
 #include "beams/line_evidence.h"
 
 #include <algorithm>

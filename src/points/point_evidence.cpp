@@ -1,3 +1,5 @@
+// The points of a block by class, and the sums of the counting kernel; those of the sparse kernel are in
+// point_kernels_inl.h.
 #include "points/point_evidence.h"
 
 #include <algorithm>

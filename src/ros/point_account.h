@@ -1,4 +1,5 @@
-/// @file Counts how the points of integrated clouds were used, and assesses whether that is healthy.
+/// @file Adds up how the points of integrated clouds were used, as ScanPreprocessor counts them, and assesses
+/// whether that is healthy.
 #pragma once
 
 #include <bki_mapping/MappingStatus.h>

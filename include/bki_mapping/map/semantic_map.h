@@ -1,4 +1,4 @@
-/// @file The map: a sparse grid of blocks.
+/// @file The map: a sparse grid of blocks. (The state of a voxel: map_query.h.)
 #pragma once
 
 #include <array>

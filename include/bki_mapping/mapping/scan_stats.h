@@ -5,7 +5,8 @@
 
 namespace bki_mapping {
 
-/// What happened to the points of a scan; `points` is the sum of the counts that follow, except the last.
+/// What happened to the points of a scan, as mapping/scan_preprocessor.cpp counts them; `points` is the sum
+/// of the counts that follow, except the last.
 struct PointCounts {
   std::size_t points = 0;
   std::size_t used = 0;           ///< became hits

@@ -1,4 +1,4 @@
-/// @file Limits of what one scan may add to the map.
+/// @file Limits of what one scan may add to the map; update/update_rules.cpp applies those of evidence.
 #pragma once
 
 #include <cstdint>
