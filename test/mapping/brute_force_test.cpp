@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "free_space/registry.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
 
@@ -86,8 +87,8 @@ class EveryScene : public testing::TestWithParam<std::size_t> {
   reference::Scene scene_ = reference::nastyScenes(60)[GetParam()];
 };
 
-TEST_P(EveryScene, SampleModesEqualBruteForce) {
-  for (const std::string mode : {"none", "even", "uniform", "linear"}) {
+TEST_P(EveryScene, EveryModeEqualsBruteForce) {
+  for (const std::string& mode : freeSpaceModes()) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;

@@ -9,6 +9,7 @@
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "free_space/registry.h"
 #include "reference/reference.h"
 
 namespace bki_mapping {
@@ -48,7 +49,7 @@ TEST(RealScan, EveryModeEqualsBruteForce) {
   if (!data) GTEST_SKIP() << "SKIPPED: BKI_MAPPING_TEST_DATA is not set; no law was tested on real scans";
   const Sequence sequence(std::string(data) + "/semantickitti/sequences/04");
   const Scan scan = sequence.read(5).scan();
-  for (const std::string mode : {"none", "even", "uniform", "linear"}) {
+  for (const std::string& mode : freeSpaceModes()) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config;
       config.free_space.mode = mode;
