@@ -4,7 +4,9 @@ import argparse
 import os
 import sys
 import threading
+import time
 
+import rosgraph
 import rospy
 from bki_mapping.msg import MappingStatus
 from bki_mapping.srv import SaveMap
@@ -53,9 +55,12 @@ def main():
     arguments = parser.parse_args()
 
     follower = Follower(arguments.scans)
+    end = time.monotonic() + arguments.timeout
+    while not rosgraph.is_master_online() and time.monotonic() < end:  # rospy would wait as well, but with a warning
+        time.sleep(0.1)
     rospy.init_node('mapping_summary', disable_signals=True)
     rospy.Subscriber('mapping/status', MappingStatus, follower.on_status, queue_size=1000)
-    if not follower.done.wait(arguments.timeout):
+    if not follower.done.wait(end - time.monotonic()):
         received = follower.last.received if follower.last else 0
         sys.exit(f'only {received} of {arguments.scans} clouds came within {arguments.timeout:.0f} s; see ros.log')
     saved = rospy.ServiceProxy('mapping/save_map', SaveMap)(os.path.abspath(arguments.map), '')
