@@ -25,6 +25,13 @@ target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_mapping)
 target_compile_options(bki_mapping_reference PRIVATE -O2)
 bki_mapping_warnings(bki_mapping_reference)
 
+# How long a unit test may take [s].
+if(CMAKE_CROSSCOMPILING_EMULATOR)
+  set(BKI_MAPPING_TEST_SECONDS 3600)
+else()
+  set(BKI_MAPPING_TEST_SECONDS 600)
+endif()
+
 unset(BKI_MAPPING_FIRST_TEST CACHE)
 # bki_mapping_unit_tests(ROOM name...): test/ROOM/NAME_test.cpp, linked with the room and the reference.
 function(bki_mapping_unit_tests room)
@@ -43,7 +50,8 @@ function(bki_mapping_unit_tests room)
     endif()
     add_test(NAME ${name} COMMAND ${name})
     # Where the last line names a skipped test, none failed: GoogleTest lists those after them.
-    set_tests_properties(${name} PROPERTIES TIMEOUT 600 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${BKI_MAPPING_TEST_SECONDS}
+      SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
   endforeach()
 endfunction()
 
