@@ -9,7 +9,6 @@ import unittest
 import xmlrpc.client
 
 import rosgraph
-import rospkg
 import rospy
 import rostest
 from bki_mapping.msg import OccupancyMap
@@ -59,8 +58,6 @@ def map_after(points, labels, *arguments):
         return map_of(status.header.stamp), status
 
 
-@unittest.skipIf(rospkg.RosPack().get_manifest('nodelet').version == '1.10.0',
-                 'nodelet 1.10.0 may lose the callback by which CropBox learns of the mapper')
 class BodyBox(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
