@@ -147,7 +147,7 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
   return selected;
 }
 
-void MapUpdater::addGroup(const Group& group, std::size_t worker) {
+void MapUpdater::addGroup(const Group& group, bool withdraws, std::size_t worker) {
   Worker& own = workers_[worker];
   own.sink.startGroup();
   for (std::size_t t = 0; t < task_count_; ++t) {
@@ -165,6 +165,7 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
        ++j) {
     BlockJob& job = jobs_[*j];
+    if (withdraws) job.block->shrink();
     job.empty = job.block->empty();
     const std::size_t after = job.empty ? 0 : job.block->bytes();
     job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
@@ -192,7 +193,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   stats.collect_ms = watch.lap();
 
   // From here on nothing allocates memory, so that nothing can fail.
-  const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], worker); };
+  const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], scan.withdraws, worker); };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add);
   } else {

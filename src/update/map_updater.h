@@ -101,7 +101,8 @@ class MapUpdater {
   std::size_t reservePlanes(BlockJob& job, std::size_t position);
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
-  void addGroup(const Group& group, std::size_t worker);
+  /// @param withdraws whether memory of planes that are gone is returned.
+  void addGroup(const Group& group, bool withdraws, std::size_t worker);
   /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
 

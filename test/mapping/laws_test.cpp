@@ -188,6 +188,24 @@ TEST(Laws, WithdrawnScansLeaveNoTrace) {
   }
 }
 
+TEST(Laws, WithdrawnScansReturnTheirMemory) {
+  const auto blockBytes = [](const SemanticMap& map) {
+    std::size_t sum = 0;
+    for (const auto& entry : map.entries()) sum += entry.block->bytes();
+    return sum;
+  };
+  MapperConfig config = configOf("line");
+  config.occlusion = OcclusionExtent::kNone;
+  const std::vector<Scan> scans = someScans();
+  SemanticMapper mapper(config, reference::smallTable());
+  mapper.integrate(scans[0]);
+  const std::size_t before = blockBytes(mapper.map());
+  mapper.integrate(scans[1]);
+  EXPECT_GT(blockBytes(mapper.map()), before);
+  mapper.withdraw(scans[1]);
+  EXPECT_LE(blockBytes(mapper.map()), before);
+}
+
 TEST(Laws, WithdrawingWhatIsNotThereIsCountedAndReadsAsNothing) {
   MapperConfig config = configOf("line");
   config.occlusion = OcclusionExtent::kNone;
