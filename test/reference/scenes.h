@@ -50,17 +50,21 @@ inline std::vector<Scene> nastyScenes(int count = 120) {
     return std::uniform_real_distribution<double>(a, b)(r);
   };
   const auto inBox = [=](std::mt19937& r, double edge) {
-    return Eigen::Vector3d(uniform(r, -edge, edge), uniform(r, -edge, edge), uniform(r, -edge, edge));
+    // One after another: compilers differ in the order in which they evaluate arguments.
+    const double z = uniform(r, -edge, edge), y = uniform(r, -edge, edge), x = uniform(r, -edge, edge);
+    return Eigen::Vector3d(x, y, z);
   };
   std::vector<Scene> scenes;
   scenes.push_back(
       makeScene("everywhere", {0.03, -0.07, 0.11}, count, 1, [&](std::mt19937& r) { return inBox(r, 3.0); }));
   scenes.push_back(makeScene("seam", {1.0, 2.0, 0.5}, count, 2, [&](std::mt19937& r) {
-    return Eigen::Vector3d(uniform(r, -4.0, -0.5), uniform(r, -0.3, 0.3), uniform(r, -0.5, 0.5));
+    const double z = uniform(r, -0.5, 0.5), y = uniform(r, -0.3, 0.3), x = uniform(r, -4.0, -0.5);
+    return Eigen::Vector3d(x, y, z);
   }));
   scenes.push_back(makeScene("poles", {-0.4, 0.2, -0.1}, count, 3, [&](std::mt19937& r) {
     const double z = uniform(r, 0.5, 4.0);
-    return Eigen::Vector3d(uniform(r, -0.4, 0.4), uniform(r, -0.4, 0.4), r() % 2 ? z : -z);
+    const double up_or_down = r() % 2 ? z : -z, y = uniform(r, -0.4, 0.4), x = uniform(r, -0.4, 0.4);
+    return Eigen::Vector3d(x, y, up_or_down);
   }));
   scenes.push_back(makeScene("axes", {0.013, 0.027, -0.031}, count / 2, 4, [&](std::mt19937& r) {
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
