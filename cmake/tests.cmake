@@ -144,7 +144,8 @@ if(CATKIN_ENABLE_TESTING)
   bki_mapping_warnings(hostile_test)
   add_dependencies(hostile_test bki_mapping_nodelets)
   add_rostest(test/ros/hostile.test)
-  # They limit memory and times, which another test at the same time would change.
-  set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_soak.test _ctest_${PROJECT_NAME}_rostest_test_ros_hostile.test
-    PROPERTIES RUN_SERIAL TRUE)
+  # They limit times, which another test at the same time would change.
+  foreach(name soak hostile publishing)
+    set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)
+  endforeach()
 endif()
