@@ -127,6 +127,7 @@ void SemanticMap::add(const SemanticMap& other) {
     const auto& classes = entry.block->classes();
     for (std::size_t i = 0; i < classes.size(); ++i) block.add(classes[i], entry.block->plane(i));
     block.setOcclusion(block.occlusion() | entry.block->occlusion());
+    if (block.empty()) erase(entry.index);  // negative evidence may have undone all of it
   }
 }
 

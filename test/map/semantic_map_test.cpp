@@ -45,6 +45,20 @@ TEST(SemanticMap, EqualsAPlainMapWhateverComesAndGoes) {
   }
 }
 
+TEST(SemanticMap, ASumOfNothingHasNoBlocks) {
+  SemanticMap map(GridGeometry(0.3), 0.001, 3), minus(GridGeometry(0.3), 0.001, 3);
+  EvidenceUnits plane[kBlockVoxels] = {};
+  for (const int x : {0, 1}) {
+    plane[7] = 5;
+    map.getOrAllocate({{x, 0, 0}}).add(1, plane);
+  }
+  plane[7] = -5;
+  minus.getOrAllocate({{1, 0, 0}}).add(1, plane);
+  map.add(minus);
+  ASSERT_EQ(map.size(), 1u);
+  EXPECT_NE(map.find({{0, 0, 0}}), nullptr);
+}
+
 TEST(SemanticMap, AWindowThatMovesOnTakesNoMoreMemory) {
   SemanticMap map(GridGeometry(0.3), 0.001, 3);
   std::size_t at_start = 0;
