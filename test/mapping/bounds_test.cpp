@@ -284,6 +284,15 @@ TEST(Kernel, AShortLengthIsWarnedOf) {
   EXPECT_TRUE(settingWarnings(config).empty());
 }
 
+TEST(ScanLimit, BelowTheUnitOfEvidenceIsToldOf) {
+  MapperConfig config;
+  config.scan_limit.hits = 0.2;
+  EXPECT_TRUE(settingWarnings(config).empty());
+  config.scan_limit.free = 1e-6;
+  ASSERT_EQ(settingWarnings(config).size(), 1u);
+  EXPECT_TRUE(has(settingWarnings(config)[0], "scan_limit/free 1e-6 is below")) << settingWarnings(config)[0];
+}
+
 TEST(Kernel, LimitsOfItsLengthDoNotHoldForCounting) {
   MapperConfig config;
   config.kernel.length = 100.0;
