@@ -105,9 +105,9 @@ void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
   if (paused_)
     return drop({cloud, input, now}, DropReason::kPaused, "mapping is paused; call ~resume to go on");
   // Latency counts from the reception: the cloud may have waited in queue_ while a scan was mapped.
-  const double since = std::max(0.0, ros::Time::now().toSec() - event.getReceiptTime().toSec());
-  const auto received =
-      now - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::min(since, 60.0)));
+  const std::chrono::duration<double> since(
+      secondsSince(event.getReceiptTime(), ros::Time::now(), ros::Time::isSimTime()));
+  const auto received = now - std::chrono::duration_cast<Clock::duration>(since);
   const auto most = static_cast<std::size_t>(config_.queue_size);
   if (const auto given_up = waiting_.push({cloud, input, received}, most, config_.queue_policy)) {
     drop(*given_up, DropReason::kQueueFull,

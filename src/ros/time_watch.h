@@ -1,4 +1,4 @@
-/// @file Detects that time jumped back.
+/// @file What times of messages tell: how long one waited, and that time jumped back.
 #pragma once
 
 #include <ros/time.h>
@@ -9,6 +9,13 @@
 namespace bki_mapping::ros_interface {
 
 enum class OnTimeJump { kKeep, kReset };
+
+/// How long a message has waited for its callback [s of wall time], at most a minute. @param simulated
+/// whether both times are of /clock, which does not tell: a replay's first step goes from 0 to its start, and
+/// a replay may be fast. The result is then 0.
+inline double secondsSince(const ros::Time& receipt, const ros::Time& now, bool simulated) {
+  return simulated ? 0.0 : std::clamp(now.toSec() - receipt.toSec(), 0.0, 60.0);
+}
 
 /// Watches /clock and, for players without /clock, the stamps of each input.
 class TimeWatch {

@@ -383,6 +383,14 @@ TEST(LoadAdvice, EstimatesWhatTheDocumentsSay) {
   }
 }
 
+TEST(TimeWatch, WaitsAreMeasuredInWallTime) {
+  EXPECT_DOUBLE_EQ(secondsSince(ros::Time(100.0), ros::Time(100.25), false), 0.25);
+  EXPECT_EQ(secondsSince(ros::Time(100.0), ros::Time(99.0), false), 0.0);  // the system's clock was set
+  EXPECT_EQ(secondsSince(ros::Time(100.0), ros::Time(10000.0), false), 60.0);
+  // A replay's first /clock comes after its first cloud: nobody has waited for a transform for 1000 s.
+  EXPECT_EQ(secondsSince(ros::Time(0.0), ros::Time(1000.0), true), 0.0);
+}
+
 TEST(TimeWatch, NoticesTimeGoingBack) {
   TimeWatch watch;
   EXPECT_FALSE(watch.clockWentBack(ros::Time(10.0)));
