@@ -27,7 +27,7 @@ void SumSink::close() {
   } else {
     applyToFree(rules_, is_protected, sums_);
   }
-  const auto add = withdraws_ ? kernels_.withdraw : kernels_.add;
+  const auto add = withdraws_ ? kernels_->withdraw : kernels_->add;
   for (const BlockSums::Plane& sums : sums_) {
     (*targets_)[current_]->change(
         sums.label, [&](EvidenceUnits* plane) { return add(sums.values, sums.layers, plane, counts_); });

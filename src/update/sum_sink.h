@@ -40,7 +40,7 @@ class alignas(kThreadsApart) SumSink {
   const SumCounts& counts() const { return counts_; }  ///< since reserve()
 
  private:
-  const SumKernels& kernels_ = sumKernelsFor("");
+  const SumKernels* kernels_ = &sumKernelsFor("");
   UpdateRules rules_;
   bool withdraws_ = false;
   Kind kind_ = Kind::kHits;
