@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/stopwatch.h"
 #include "ros/map_publisher.h"
 #include "simulation/lidar.h"
@@ -48,7 +49,9 @@ int measure(const po::variables_map& given) {
   ros::NodeHandle node("~");
   ros::CallbackQueue connections, unread;
   node.setCallbackQueue(&connections);
-  const auto snapshot = [&] { return MapSnapshot{{}, mapper, trajectory, config, sensor}; };
+  const auto snapshot = [&] {
+    return MapSnapshot{{}, mapper.map(), mapper.classes(), trajectory, config, sensor};
+  };
   const auto publishers = makePublishers({node, config, snapshot});
 
   ros::NodeHandle listener("~");

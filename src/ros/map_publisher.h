@@ -13,7 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "parallel/index_numbering.h"
 #include "ros/server_config.h"
 
@@ -22,7 +23,8 @@ namespace bki_mapping::ros_interface {
 /// The state of the server from which messages are built.
 struct MapSnapshot {
   std_msgs::Header header;  ///< map frame, stamp of the last scan
-  const SemanticMapper& mapper;
+  const SemanticMap& map;
+  const ClassTable& classes;
   const std::vector<geometry_msgs::PoseStamped>& trajectory;  ///< sensor poses of integrated scans
   const ServerConfig& config;
   Eigen::Vector3d sensor;  ///< origin of the last scan, map frame [m]
@@ -36,7 +38,7 @@ struct MapSnapshot {
   /// Whether a height is between view_min_z and view_max_z.
   bool heightInView(double z) const { return z >= config.view_min_z && z <= config.view_max_z; }
   bool inView(const BlockIndex& block) const {
-    const GridGeometry& geometry = mapper.map().geometry();
+    const GridGeometry& geometry = map.geometry();
     return inView(geometry.blockCentre(block), geometry.blockSize());
   }
 };

@@ -279,7 +279,7 @@ MappingStatus MappingServer::status() {
 }
 
 MapSnapshot MappingServer::snapshot() const {
-  MapSnapshot snapshot{std_msgs::Header(), *mapper_, trajectory_, config_, sensor_};
+  MapSnapshot snapshot{std_msgs::Header(), mapper_->map(), mapper_->classes(), trajectory_, config_, sensor_};
   snapshot.header.frame_id = config_.frame_id;
   snapshot.header.stamp = map_stamp_;
   return snapshot;

@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "bki_mapping/mapping/semantic_mapper.h"
 #include "ros/live_settings.h"
 #include "ros/mapping_diagnostics.h"
 #include "ros/point_account.h"

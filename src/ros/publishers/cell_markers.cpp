@@ -103,7 +103,7 @@ class CellMarkers : public MapPublisher {
     message.markers.back().header = snapshot.header;
     message.markers.back().action = Marker::DELETEALL;
     message.markers.back().pose.orientation.w = 1.0;
-    for (const auto& entry : snapshot.mapper.map().entries()) regionAt(SemanticMap::regionOf(entry.index));
+    for (const auto& entry : snapshot.map.entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
     for (auto region = regions_.begin(); region != regions_.end(); ++region) {
       region->second.shown.clear();
@@ -132,7 +132,7 @@ class CellMarkers : public MapPublisher {
     for (const GridIndex& index : indices) {
       bool any = false;
       for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge && !any; ++n) {
-        any = snapshot.mapper.map().find({GridGeometry::voxelOf({index}, n)});
+        any = snapshot.map.find({GridGeometry::voxelOf({index}, n)});
       }
       if (any) continue;
       free_ids_.push_back(regions_.at(index).id);
@@ -141,7 +141,7 @@ class CellMarkers : public MapPublisher {
   }
 
   bool inView(const GridIndex& region, const MapSnapshot& snapshot) const {
-    const double edge = kRegionEdge * snapshot.mapper.map().geometry().blockSize();
+    const double edge = kRegionEdge * snapshot.map.geometry().blockSize();
     return snapshot.inView(Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edge, edge);
   }
 
@@ -166,7 +166,7 @@ class CellMarkers : public MapPublisher {
   }
 
   void fill(const GridIndex& region, const MapSnapshot& snapshot, Markers& markers) const {
-    const SemanticMap& map = snapshot.mapper.map();
+    const SemanticMap& map = snapshot.map;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = map.find(index);
@@ -185,20 +185,20 @@ class CellMarkers : public MapPublisher {
         point.z = centre.z();
         marker->second.points.push_back(point);
         marker->second.colors.push_back(
-            rgba(colorOf(view, centre.z(), snapshot.config.color_mode, snapshot.mapper.classes()), alpha_));
+            rgba(colorOf(view, centre.z(), snapshot.config.color_mode, snapshot.classes), alpha_));
       }
     }
   }
 
   Marker emptyMarker(const MapSnapshot& snapshot, ClassId label) const {
-    const SemanticClass* known = snapshot.mapper.classes().find(label);
+    const SemanticClass* known = snapshot.classes.find(label);
     Marker marker;
     marker.header = snapshot.header;
     marker.ns = known ? known->name : "free";
     marker.type = Marker::CUBE_LIST;
     marker.action = Marker::ADD;
     marker.pose.orientation.w = 1.0;
-    const double edge = snapshot.mapper.map().geometry().resolution();
+    const double edge = snapshot.map.geometry().resolution();
     marker.scale.x = marker.scale.y = marker.scale.z = edge;
     marker.color.a = alpha_;
     return marker;

@@ -56,14 +56,14 @@ class ColumnPublisher : public MapPublisher {
   /// Updates the columns. @return the updated stacks. @param all set to whether these are all of
   /// them.
   std::set<ColumnMap::StackIndex> look(const MapSnapshot& snapshot, bool& all) {
-    const SemanticMap& map = snapshot.mapper.map();
+    const SemanticMap& map = snapshot.map;
     all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
-    if (!all) return columns_.update(map, snapshot.mapper.classes(), changed.blocks());
+    if (!all) return columns_.update(map, snapshot.classes, changed.blocks());
     columns_.start(rulesOf(snapshot.config));
     known_ = true;
     std::vector<GridIndex> blocks;
     for (const auto& entry : map.entries()) blocks.push_back(entry.index);
-    return columns_.update(map, snapshot.mapper.classes(), blocks);
+    return columns_.update(map, snapshot.classes, blocks);
   }
 
   /// Calls write(index in the rectangle's arrays, view) for every known column in a rectangle of whole

@@ -42,7 +42,7 @@ class Elevation : public ColumnPublisher {
     message.header = snapshot.header;
     message.sequence = sequence_;
     message.whole = whole;
-    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    message.resolution = static_cast<float>(snapshot.map.geometry().resolution());
     message.x = rectangle.x;
     message.y = rectangle.y;
     message.width = rectangle.width;

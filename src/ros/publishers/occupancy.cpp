@@ -25,9 +25,9 @@ OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const 
 /// Fills in a whole map: an OccupancyMap or an OccupancyUpdate.
 template <typename Message>
 void fillMap(const MapSnapshot& snapshot, Message& message) {
-  const SemanticMap& map = snapshot.mapper.map();
+  const SemanticMap& map = snapshot.map;
   message.block_edge = kBlockEdge;
-  for (const SemanticClass& c : snapshot.mapper.classes().classes()) {
+  for (const SemanticClass& c : snapshot.classes.classes()) {
     ClassInfo info;
     info.id = c.id;
     info.name = c.name;
@@ -52,7 +52,7 @@ class Occupancy : public MapPublisher {
   void publishNew(const MapSnapshot& snapshot) override {
     OccupancyMap message;
     message.header = snapshot.header;
-    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    message.resolution = static_cast<float>(snapshot.map.geometry().resolution());
     fillMap(snapshot, message);
     publisher_.publish(message);
   }
@@ -68,7 +68,7 @@ class OccupancyUpdates : public UpdatePublisher<OccupancyUpdate> {
     fillMap(snapshot, message);
   }
   void fillChanges(const MapSnapshot& snapshot, OccupancyUpdate& message) const override {
-    const SemanticMap& map = snapshot.mapper.map();
+    const SemanticMap& map = snapshot.map;
     message.block_edge = kBlockEdge;
     message.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {

@@ -64,7 +64,7 @@ class ProjectedMap : public ColumnPublisher {
   }
 
   nav_msgs::OccupancyGrid whole(const MapSnapshot& snapshot) const {
-    const double resolution = snapshot.mapper.map().geometry().resolution();
+    const double resolution = snapshot.map.geometry().resolution();
     nav_msgs::OccupancyGrid grid;
     grid.header = snapshot.header;
     grid.info.map_load_time = snapshot.header.stamp;

@@ -46,7 +46,7 @@ class UpdatePublisher : public MapPublisher {
     message.header = snapshot.header;
     message.sequence = sequence_;
     message.whole = whole;
-    message.resolution = static_cast<float>(snapshot.mapper.map().geometry().resolution());
+    message.resolution = static_cast<float>(snapshot.map.geometry().resolution());
     whole ? fillWhole(snapshot, message) : fillChanges(snapshot, message);
     return message;
   }

@@ -17,11 +17,11 @@ class CloudBuilder {
   explicit CloudBuilder(const MapSnapshot& snapshot) : snapshot_(snapshot) {}
 
   void add(const BlockIndex& index, const Block& block) {
-    appendVoxels(snapshot_.mapper.map(), snapshot_.mapper.classes(),
+    appendVoxels(snapshot_.map, snapshot_.classes,
                  {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}, index, block, voxels_);
   }
   void addAll(bool in_view) {
-    for (const auto& [index, block] : sortedBlocks(snapshot_.mapper.map())) {
+    for (const auto& [index, block] : sortedBlocks(snapshot_.map)) {
       if (!in_view || snapshot_.inView(index)) add(index, *block);
     }
     const auto hidden = [&](const VoxelRecord& v) {
@@ -72,7 +72,7 @@ class VoxelCloudUpdates : public UpdatePublisher<VoxelCloudUpdate> {
     message.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {
       message.blocks.push_back(toMessage(index));
-      if (const Block* block = snapshot.mapper.map().find({index})) builder.add({index}, *block);
+      if (const Block* block = snapshot.map.find({index})) builder.add({index}, *block);
     }
     message.cloud = builder.cloud();
   }
