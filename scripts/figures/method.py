@@ -176,7 +176,7 @@ MAIN, SIDE = range(-1, 8), range(-2, 5)  # voxels in the view from above
 
 
 def slice_form(slicing):
-    """A, B, C of Equation (15), and (u n)^2."""
+    """A, B, C of Equation (16), and (u n)^2."""
     v, n, u = np.array(slicing['v'], float), np.array(slicing['n'], float), DIRECTION
     a, b, c = v @ v - (u @ v) ** 2, -(u @ v) * u[2], 1 - u[2] ** 2
     across = (u @ n) ** 2
@@ -236,7 +236,7 @@ def draw_plan(axes, name, slicing):
 def draw_section(axes, slicing):
     """The slice in bold: the ellipse that the kernel cuts out, and the voxel centres in it."""
     a, b, c, across = slice_form(slicing)
-    e_side, e_height, g_height = np.sqrt(a), b / np.sqrt(a), np.sqrt(across / a)  # Equation (16)
+    e_side, e_height, g_height = np.sqrt(a), b / np.sqrt(a), np.sqrt(across / a)  # Equation (17)
     reach, pitch = COUNTS * REACH, np.linalg.norm(slicing['v'])  # voxels from column to column
     turn = np.linspace(0, 2 * np.pi, 361)
     height = reach * np.sin(turn) / g_height

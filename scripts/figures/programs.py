@@ -7,8 +7,8 @@ import time
 import numpy as np
 
 VOXEL = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('red', 'u1'), ('green', 'u1'), ('blue', 'u1'),
-                  ('label', '<u2'), ('state', 'u1'), ('probability', '<f4'), ('variance', '<f4'), ('entropy', '<f4'),
-                  ('evidence', '<f4')])
+                  ('label', '<u2'), ('state', 'u1'), ('probability', '<f4'), ('occupancy', '<f4'),
+                  ('class_probability', '<f4'), ('variance', '<f4'), ('entropy', '<f4'), ('evidence', '<f4')])
 FREE, OCCUPIED = 1, 2  # voxel states in map files
 
 

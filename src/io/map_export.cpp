@@ -18,7 +18,8 @@ const char kPlyProperties[] =
     "property float x\nproperty float y\nproperty float z\n"
     "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     "property ushort label\nproperty uchar state\n"
-    "property float probability\nproperty float variance\nproperty float entropy\nproperty float evidence\n";
+    "property float probability\nproperty float occupancy\nproperty float class_probability\n"
+    "property float variance\nproperty float entropy\nproperty float evidence\n";
 
 std::string plyBytes(const std::vector<VoxelRecord>& voxels, double resolution) {
   std::ostringstream header;
@@ -31,7 +32,10 @@ std::string plyBytes(const std::vector<VoxelRecord>& voxels, double resolution) 
     for (const std::uint8_t c : {v.red, v.green, v.blue}) appendBytes(bytes, c);
     appendBytes(bytes, v.label);
     appendBytes(bytes, v.state);
-    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) appendBytes(bytes, f);
+    for (const float f :
+         {v.probability, v.occupancy, v.class_probability, v.variance, v.entropy, v.evidence}) {
+      appendBytes(bytes, f);
+    }
   }
   return bytes;
 }
@@ -77,8 +81,8 @@ void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::
     const Eigen::Vector3f centre = map.geometry().voxelCentre(voxel).cast<float>();
     const Color color = semanticColor(view, classes);
     voxels.push_back({centre.x(), centre.y(), centre.z(), color[0], color[1], color[2], view.label,
-                      static_cast<std::uint8_t>(view.state), view.probability, view.variance, view.entropy,
-                      view.evidence});
+                      static_cast<std::uint8_t>(view.state), view.probability, view.occupancy,
+                      view.class_probability, view.variance, view.entropy, view.evidence});
   }
 }
 

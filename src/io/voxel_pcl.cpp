@@ -25,8 +25,10 @@ pcl::PCLPointCloud2 toPcl(const std::vector<VoxelRecord>& voxels) {
   for (const char* name : {"x", "y", "z", "rgb"}) addField(name, Field::FLOAT32, 4, cloud);
   addField("label", Field::UINT16, 2, cloud);
   addField("state", Field::UINT8, 1, cloud);
-  for (const char* name : {"probability", "variance", "entropy", "evidence"})
+  for (const char* name :
+       {"probability", "occupancy", "class_probability", "variance", "entropy", "evidence"}) {
     addField(name, Field::FLOAT32, 4, cloud);
+  }
   std::string bytes;
   bytes.reserve(voxels.size() * cloud.point_step);
   for (const VoxelRecord& v : voxels) {
@@ -34,7 +36,10 @@ pcl::PCLPointCloud2 toPcl(const std::vector<VoxelRecord>& voxels) {
     appendBytes(bytes, std::uint32_t{v.red} << 16 | std::uint32_t{v.green} << 8 | v.blue);
     appendBytes(bytes, v.label);
     appendBytes(bytes, v.state);
-    for (const float f : {v.probability, v.variance, v.entropy, v.evidence}) appendBytes(bytes, f);
+    for (const float f :
+         {v.probability, v.occupancy, v.class_probability, v.variance, v.entropy, v.evidence}) {
+      appendBytes(bytes, f);
+    }
   }
   cloud.height = 1;
   cloud.width = static_cast<std::uint32_t>(voxels.size());

@@ -9,8 +9,8 @@
 
 namespace bki_mapping {
 
-/// Fields x y z rgb (float32; rgb packed as PCL does), label (uint16), state (uint8), probability variance
-/// entropy evidence (float32).
+/// Fields x y z rgb (float32; rgb packed as PCL does), label (uint16), state (uint8), probability occupancy
+/// class_probability variance entropy evidence (float32).
 pcl::PCLPointCloud2 toPcl(const std::vector<VoxelRecord>& voxels);
 
 }  // namespace bki_mapping

@@ -6,55 +6,72 @@
 namespace bki_mapping {
 namespace {
 
-double plogp(double p) {
-  return p > 0.0 ? p * std::log(p) : 0.0;
+/// - p log(p), accurate for p near 1, too. @param others sum of the other concentrations.
+double entropyTerm(double alpha, double others) {
+  return alpha / (alpha + others) * std::log1p(others / alpha);
+}
+
+/// Whether a voxel with evidence is occupied: Equation 11 in docs/method.md, decided on whole units.
+bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free) {
+  return best >= static_cast<double>(gain) * free;
 }
 
 }  // namespace
 
 VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset) {
+  // Units are whole numbers, of which doubles hold the sum over all classes exactly.
+  EvidenceUnits best_units = 0, free_units = 0;
+  double units_of_classes = 0.0;
   VoxelView view;
-  double total = 0.0;
-  float best = 0.0f, free = 0.0f;
   const auto& classes = block.classes();
   for (std::size_t i = 0; i < classes.size(); ++i) {
-    const float e = evidenceOf(block.plane(i)[offset]);
-    total += e;
+    const EvidenceUnits units = std::max(block.plane(i)[offset], 0);
     if (classes[i] == kFreeClass) {
-      free = e;
-    } else if (e > best || (e == best && e > 0.0f && classes[i] < view.label)) {
-      best = e;
+      free_units = units;
+      continue;
+    }
+    units_of_classes += units;
+    if (units > best_units) {  // of equal evidence, the first class has the smaller id
+      best_units = units;
       view.label = classes[i];
     }
   }
-  view.evidence = static_cast<float>(total);
-  if (total > 0.0) {
-    view.state = best >= map.freeGain(view.label, best) * free ? VoxelState::kOccupied : VoxelState::kFree;
+  constexpr double kUnit = kEvidenceUnit;
+  const double best = kUnit * best_units, free = kUnit * free_units, of_classes = kUnit * units_of_classes;
+  const float gain = map.freeGain(view.label, static_cast<float>(best));
+  if (best_units > 0 || free_units > 0) {
+    view.state = isOccupied(best_units, gain, free_units) ? VoxelState::kOccupied : VoxelState::kFree;
   } else if (block.occlusion()[static_cast<std::size_t>(offset)]) {
     view.state = VoxelState::kOccluded;
   }
-  if (view.state != VoxelState::kOccupied) view.label = kFreeClass;
+  const bool occupied = view.state == VoxelState::kOccupied;
+  if (!occupied) view.label = kFreeClass;
 
-  const double sum = total + map.priorSum();
-  const double p = (map.prior() + (view.state == VoxelState::kOccupied ? best : free)) / sum;
-  view.probability = static_cast<float>(p);
-  view.variance = static_cast<float>(p * (1.0 - p) / (sum + 1.0));
-  view.occupancy = static_cast<float>(1.0 - (map.prior() + free) / sum);
+  // Equations 10 and 13.
+  const double prior = map.prior(), prior_of_classes = prior * static_cast<double>(map.classCount());
+  const double own = occupied ? best : free, alpha = prior + own;
+  const double others = prior_of_classes + (of_classes + free - own), sum = alpha + others;
+  const double something = prior_of_classes + of_classes;
+  view.evidence = static_cast<float>(of_classes + free);
+  view.probability = static_cast<float>(alpha / sum);
+  view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
+  view.occupancy = static_cast<float>(something / (something + prior + static_cast<double>(gain) * free));
+  view.class_probability = static_cast<float>((prior + best) / something);
   return view;
 }
 
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
   VoxelView view = viewWithoutEntropy(map, block, offset);
-  const auto& classes = block.classes();
+  const auto classes = block.classes().size(), all = map.classCount() + 1;
   double total = 0.0;
-  for (std::size_t i = 0; i < classes.size(); ++i)
-    total += static_cast<double>(evidenceOf(block.plane(i)[offset]));
-  const double sum = total + map.priorSum();
-  double entropy = 0.0;
-  for (std::size_t i = 0; i < classes.size(); ++i) {
-    entropy -= plogp((map.prior() + static_cast<double>(evidenceOf(block.plane(i)[offset]))) / sum);
-  }
-  entropy -= static_cast<double>(map.classCount() + 1 - classes.size()) * plogp(map.prior() / sum);
+  for (std::size_t i = 0; i < classes; ++i) total += std::max(block.plane(i)[offset], 0);
+  const auto term = [&](double units) {
+    constexpr double kUnit = kEvidenceUnit;
+    const double others = map.prior() * static_cast<double>(all - 1) + kUnit * (total - units);
+    return entropyTerm(map.prior() + kUnit * units, others);
+  };
+  double entropy = static_cast<double>(all - classes) * term(0.0);
+  for (std::size_t i = 0; i < classes; ++i) entropy += term(std::max(block.plane(i)[offset], 0));
   view.entropy = static_cast<float>(entropy);
   return view;
 }

@@ -48,19 +48,21 @@ TEST_F(MapFile, PlyHasOneVertexAVoxel) {
   const std::size_t header = bytes.find(end) + end.size();
   const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), kAll);
   ASSERT_GT(voxels.size(), 100u);
-  EXPECT_EQ(bytes.size() - header, voxels.size() * 34);
+  EXPECT_EQ(bytes.size() - header, voxels.size() * 42);
   EXPECT_NE(bytes.find("format binary_little_endian 1.0\n"), std::string::npos);
   EXPECT_NE(bytes.find("element vertex " + std::to_string(voxels.size()) + "\n"), std::string::npos);
   for (const std::size_t i : {std::size_t{0}, voxels.size() / 2, voxels.size() - 1}) {
-    const char* record = bytes.data() + header + 34 * i;
-    float x = 0.0f, evidence = 0.0f;
+    const char* record = bytes.data() + header + 42 * i;
+    float x = 0.0f, occupancy = 0.0f, evidence = 0.0f;
     std::uint16_t label = 0;
     std::memcpy(&x, record, 4);
     std::memcpy(&label, record + 15, 2);
-    std::memcpy(&evidence, record + 30, 4);
+    std::memcpy(&occupancy, record + 22, 4);
+    std::memcpy(&evidence, record + 38, 4);
     EXPECT_EQ(x, voxels[i].x);
     EXPECT_EQ(label, voxels[i].label);
     EXPECT_EQ(static_cast<std::uint8_t>(record[17]), voxels[i].state);
+    EXPECT_EQ(occupancy, voxels[i].occupancy);
     EXPECT_EQ(evidence, voxels[i].evidence);
   }
 }

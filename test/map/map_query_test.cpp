@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "bki_mapping/map/map_query.h"
 
@@ -31,6 +32,7 @@ VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
   EXPECT_EQ(judged.variance, view.variance);
   EXPECT_EQ(judged.evidence, view.evidence);
   EXPECT_EQ(judged.occupancy, view.occupancy);
+  EXPECT_EQ(judged.class_probability, view.class_probability);
   EXPECT_EQ(judged.entropy, 0.0f);
   return view;
 }
@@ -45,6 +47,70 @@ TEST(MapQuery, OccupiedVoxel) {
   EXPECT_NEAR(view.entropy, -p * std::log(p) - f * std::log(f) - 2 * o * std::log(o), 1e-6);
   EXPECT_NEAR(view.evidence, 1.0, 1e-6);
   EXPECT_NEAR(view.occupancy, 1 - f, 1e-6);
+  EXPECT_NEAR(view.class_probability, (0.75 + kPrior) / (0.75 + 3 * kPrior), 1e-6);
+}
+
+TEST(MapQuery, EvidenceForFreeLowersOccupancyAndNotTheClass) {
+  const auto hit = viewOf({{1, 0.6f}, {2, 0.2f}}),
+             crossed = viewOf({{1, 0.6f}, {2, 0.2f}, {kFreeClass, 0.4f}}),
+             cleared = viewOf({{1, 0.6f}, {2, 0.2f}, {kFreeClass, 4.0f}});
+  EXPECT_EQ(crossed.state, VoxelState::kOccupied);
+  EXPECT_EQ(cleared.state, VoxelState::kFree);
+  for (const VoxelView& view : {hit, crossed, cleared}) {
+    EXPECT_NEAR(view.class_probability, 0.75, 2e-3) << "of class 1, in a free voxel, too";
+  }
+  EXPECT_GT(hit.occupancy, 0.99f);
+  EXPECT_NEAR(crossed.occupancy, 2.0 / 3.0, 2e-3);
+  EXPECT_NEAR(cleared.occupancy, 1.0 / 6.0, 2e-3);
+  const auto only_free = viewOf({{kFreeClass, 1.0f}});
+  EXPECT_NEAR(only_free.class_probability, 1.0 / 3.0, 1e-6) << "nothing says which class";
+  EXPECT_NEAR(only_free.occupancy, 3 * kPrior / (4 * kPrior + 1.0), 1e-6);
+}
+
+TEST(MapQuery, StatesFollowFromTheProbabilities) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> exponent(-6.0f, 6.0f);
+  int occupied = 0, decided = 0;
+  for (int n = 0; n < 2000; ++n) {
+    std::vector<std::pair<int, float>> evidence;
+    for (const int id : {0, 1, 2, int{kFreeClass}}) {
+      if (random() % 3 != 0) evidence.emplace_back(id, std::exp(exponent(random)));
+    }
+    if (evidence.empty()) continue;
+    SemanticMap map = mapWith(evidence, 77);
+    for (const ClassId id : {ClassId{0}, ClassId{1}, ClassId{2}}) {
+      map.setFreeGain(id, std::exp(static_cast<double>(exponent(random)) / 3));
+    }
+    map.setGainPersistence(random() % 2 == 0 ? 0.0 : 2.0);
+    const VoxelView view = viewVoxel(map, *map.find({{0, 0, 0}}), 77);
+    const float something = view.occupancy * view.class_probability, nothing = 1.0f - view.occupancy;
+    if (std::abs(something - nothing) < 1e-5f) continue;  // rounding decides
+    ++decided;
+    occupied += view.state == VoxelState::kOccupied;
+    EXPECT_EQ(view.state == VoxelState::kOccupied, something > nothing) << n;
+  }
+  EXPECT_GT(occupied, 300);
+  EXPECT_GT(decided - occupied, 300);
+}
+
+TEST(MapQuery, TheLastUnitDecides) {
+  // Floats hold 24 bits: these numbers of units are equal as floats.
+  const auto viewOfUnits = [](EvidenceUnits one, EvidenceUnits two, EvidenceUnits free) {
+    SemanticMap map(GridGeometry(1.0), kPrior, 3);
+    const std::pair<ClassId, EvidenceUnits> all[] = {{1, one}, {2, two}, {kFreeClass, free}};
+    for (const auto& [id, units] : all) {
+      EvidenceUnits plane[kBlockVoxels] = {};
+      plane[77] = units;
+      map.getOrAllocate({{0, 0, 0}}).add(id, plane);
+    }
+    return viewVoxel(map, *map.find({{0, 0, 0}}), 77);
+  };
+  constexpr EvidenceUnits kMany = 1 << 30;
+  EXPECT_EQ(viewOfUnits(kMany, kMany + 1, 0).label, 2);
+  EXPECT_EQ(viewOfUnits(kMany + 1, kMany, 0).label, 1);
+  EXPECT_EQ(viewOfUnits(kMany, kMany, kMany).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewOfUnits(kMany, kMany, kMany + 1).state, VoxelState::kFree);
+  EXPECT_EQ(viewOfUnits(-5, -5, -5).state, VoxelState::kUnknown) << "taken back without having been added";
 }
 
 TEST(MapQuery, FreeVoxelAndTies) {
@@ -65,7 +131,8 @@ TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
   EXPECT_EQ(view().state, VoxelState::kOccupied);
   EXPECT_EQ(view().label, 1);
   EXPECT_NEAR(view().probability, (0.375 + kPrior) / sum, 1e-6);
-  EXPECT_NEAR(view().occupancy, 1.0 - (0.5 + kPrior) / sum, 1e-6);
+  EXPECT_NEAR(view().occupancy, (0.625 + 3 * kPrior) / (0.625 + 4 * kPrior + 0.1 * 0.5), 1e-6)
+      << "evidence for free counts as it does for the state";
   map.setFreeGain(1, 1.0);
   map.setFreeGain(2, 0.1);  // not the class with the most evidence
   EXPECT_EQ(view().state, VoxelState::kFree);
@@ -98,6 +165,8 @@ TEST(MapQuery, UnknownVoxelHasThePrior) {
        {viewVoxel(map, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
     EXPECT_EQ(view.state, VoxelState::kUnknown);
     EXPECT_NEAR(view.probability, 0.25, 1e-6);
+    EXPECT_NEAR(view.occupancy, 0.75, 1e-6);
+    EXPECT_NEAR(view.class_probability, 1.0 / 3.0, 1e-6);
     EXPECT_NEAR(view.entropy, std::log(4.0), 1e-6);
     EXPECT_EQ(view.evidence, 0.0f);
   }

@@ -69,7 +69,7 @@ class MappingTest(unittest.TestCase):
         self.assertTrue(answer.success, answer.message)
         with open(path, 'rb') as file:
             body = file.read().split(b'end_header\n', 1)[1]
-        records = struct.iter_unpack('<3f3BHB4f', body)
+        records = struct.iter_unpack('<3f3BHB6f', body)
         return {r[:3]: (r[6], r[7]) for r in records}
 
     def test_markers_show_the_hits_in_the_colours_of_their_classes(self):
@@ -110,11 +110,13 @@ class MappingTest(unittest.TestCase):
         # Evidence: 2 for the car, 1 for free of the beam that ends beyond the voxel's centre; prior 21 * 0.001.
         block = next(b for b in message.blocks if (b.x, b.y, b.z) == (0, 0, 0))
         self.assertAlmostEqual(block.probability[4], (2 + 0.001) / (3 + 21 * 0.001), places=5)
+        self.assertAlmostEqual(block.occupancy[4], (2 + 20 * 0.001) / (3 + 21 * 0.001), places=5)
+        self.assertAlmostEqual(block.class_probability[4], (2 + 0.001) / (2 + 20 * 0.001), places=5)
 
         cloud = self.latest('voxel_cloud', PointCloud2, stamp)
         names = [f.name for f in cloud.fields]
-        for name in ('x', 'y', 'z', 'rgb', 'label', 'probability', 'variance', 'entropy', 'state'):
-            self.assertIn(name, names)
+        self.assertEqual(names, ['x', 'y', 'z', 'rgb', 'label', 'state', 'probability', 'occupancy', 'class_probability',
+                                 'variance', 'entropy', 'evidence'])
         offset = {f.name: f.offset for f in cloud.fields}
         points = {}
         for i in range(cloud.width):

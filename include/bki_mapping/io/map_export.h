@@ -16,7 +16,7 @@ struct VoxelRecord {
   std::uint8_t red, green, blue;
   std::uint16_t label;  ///< class id; 255 unless occupied
   std::uint8_t state;   ///< VoxelState
-  float probability, variance, entropy, evidence;
+  float probability, occupancy, class_probability, variance, entropy, evidence;  ///< as in VoxelView
 };
 
 /// Parses a list of states such as "occupied,free". @throws std::invalid_argument on an unknown word.

@@ -16,15 +16,20 @@ enum class VoxelState : std::uint8_t {
   kOccluded = 3,  ///< no evidence; the last scan to reach it saw it only beyond the ends of beams
 };
 
-/// Summary of the Dirichlet posterior of one voxel.
+/// Summary of the Dirichlet posterior of one voxel. Equations 10 to 13 in docs/method.md.
 struct VoxelView {
   VoxelState state = VoxelState::kUnknown;
   ClassId label = kFreeClass;  ///< the class of an occupied voxel (ties: the smaller id), else kFreeClass
   float probability = 0.0f;    ///< p = alpha / sum(alpha) of `label`
   float variance = 0.0f;       ///< p (1 - p) / (sum(alpha) + 1)
-  float entropy = 0.0f;        ///< of the expected class distribution, over all classes and `free` [nat]
-  float evidence = 0.0f;       ///< sum(alpha) minus the sum of the priors
-  float occupancy = 0.0f;      ///< 1 - p(free)
+  /// Probability that something is there: 1 - p(free), with the evidence for `free` times the gain that
+  /// decides the state.
+  float occupancy = 0.0f;
+  /// Probability of the likeliest class, given that something is there; in a free voxel, too. Evidence for
+  /// `free` does not dilute it. 1 / number of classes without evidence for a class.
+  float class_probability = 0.0f;
+  float entropy = 0.0f;   ///< of the expected class distribution, over all classes and `free` [nat]
+  float evidence = 0.0f;  ///< sum(alpha) minus the sum of the priors
 };
 
 /// The state and posterior of a voxel. @param offset of the voxel in its block.

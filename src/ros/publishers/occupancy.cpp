@@ -18,6 +18,8 @@ OccupancyBlock toMessage(const SemanticMap& map, const BlockIndex& index, const 
     message.state[v] = static_cast<std::uint8_t>(view.state);
     message.label[v] = view.label;
     message.probability[v] = view.probability;
+    message.occupancy[v] = view.occupancy;
+    message.class_probability[v] = view.class_probability;
   }
   return message;
 }
