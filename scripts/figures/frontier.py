@@ -55,19 +55,22 @@ def row_of(name, figures):
 
 
 def draw_calibration(figures_of, name, output):
-    """Draws reliability diagrams of the class's probability and, on simulated drives, of occupancy; returns the section."""
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4))
+    """Draws reliability diagrams of p, of the class probability and, on simulated drives, of occupancy; returns the
+    section."""
+    figure, axes = plt.subplots(1, 3, figsize=(14, 4.4))
     rows = []
     for preset, figures in figures_of.items():
         truth = figures.get('truth', {})
-        curves = (('class', figures['reliability']), ('occupancy', truth.get('occupancy_reliability', [])))
+        curves = (('probability', figures['probability_reliability']),
+                  ('class_probability', figures['class_probability_reliability']),
+                  ('occupancy', truth.get('occupancy_reliability', [])))
         for ax, (what, bins) in zip(axes, curves):
             seen = [b for b in bins if b['count'] > 0]
             ax.plot([b['probability'] for b in seen], [b['right'] for b in seen], 'o-', markersize=4, label=preset)
             rows += [[preset, what, b['count'], b['probability'], b['right']] for b in seen]
-    for ax, what in zip(axes, ("of the voxel's class, at points", 'of being occupied, of voxels')):
+    for ax, what in zip(axes, ('probability, at points', 'class_probability, at points', 'occupancy, of voxels')):
         ax.plot((0, 1), (0, 1), 'k:')
-        ax.set_xlabel('probability ' + what)
+        ax.set_xlabel(what)
         ax.set_ylabel('fraction that is correct')
         ax.grid(True, alpha=0.3)
     axes[0].legend(fontsize=8)
@@ -77,13 +80,14 @@ def draw_calibration(figures_of, name, output):
 
     def percent(value):
         return '' if value is None else f'{100 * value:.1f}'
-    table = [[preset, percent(f['calibration_error']), percent(f.get('truth', {}).get('occupancy_calibration_error')),
-              percent(f['sparsification_error'])] for preset, f in figures_of.items()]
+    table = [[preset, percent(f['probability_calibration_error']), percent(f['class_probability_calibration_error']),
+              percent(f.get('truth', {}).get('occupancy_calibration_error')), percent(f['sparsification_error'])]
+             for preset, f in figures_of.items()]
     return f'''Reliability: how often a prediction of a given probability is correct ([calibration_{name}.csv](calibration_{name}.csv)).
 
 ![calibration](calibration_{name}.png)
 
-{markdown(['preset', 'ECE of the class [%]', 'ECE of occupancy [%]', 'AUSE [%]'], table)}'''
+{markdown(['preset', 'ECE of probability [%]', 'ECE of class_probability [%]', 'ECE of occupancy [%]', 'AUSE [%]'], table)}'''
 
 
 def draw_frontier(rows, name, title, output):

@@ -81,7 +81,7 @@ std::string figureText(double figure) {
 class Table {
  public:
   void percent(const std::string& name, double fraction, const std::string& meaning) {
-    out_ << std::left << std::setw(20) << name << std::right << std::setw(6) << figureText(100.0 * fraction)
+    out_ << std::left << std::setw(22) << name << std::right << std::setw(6) << figureText(100.0 * fraction)
          << " %  " << meaning << "\n";
   }
   void text(const std::string& line) { out_ << line << "\n"; }
@@ -98,8 +98,8 @@ void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table
   table.percent("voxel mIoU", truth.meanIou(classes),
                 "of the classes of voxels, over the classes that occur");
   table.percent("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
-  table.percent("occupancy ECE", truth.occupancy.error(),
-                "expected calibration error of the probability of occupancy");
+  table.percent("ECE occupancy", truth.occupancy.error(),
+                "the same of the probability that something is in a voxel");
   table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
              " voxels of classes that can move (nothing movable near for 0.5 s); " +
              figureText(truth.mean_ghosts) + " on average while mapping");
@@ -123,7 +123,10 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");
   table.percent("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
-  table.percent("ECE", s.reliability.error(), "expected calibration error of the class's probability");
+  table.percent("ECE probability", s.probability.error(),
+                "expected calibration error of p, in which the class and free share");
+  table.percent("ECE class_probability", s.class_probability.error(),
+                "the same of the probability of the class, given that something is there");
   table.percent("AUSE", s.sparsification_error, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
@@ -162,7 +165,8 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"miou_input", s.input.meanIou()},
                   {"accuracy_map", s.map.accuracy()},
                   {"accuracy_input", s.input.accuracy()},
-                  {"calibration_error", s.reliability.error()},
+                  {"probability_calibration_error", s.probability.error()},
+                  {"class_probability_calibration_error", s.class_probability.error()},
                   {"sparsification_error", s.sparsification_error},
                   {"median_ms", quality.median_ms},
                   {"labels_not_in_table", quality.unknown_labels},
@@ -176,7 +180,8 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                                   {"iou_map", s.map.iou(c.id)},
                                   {"iou_input", s.input.iou(c.id)}});
   }
-  figures["reliability"] = reliabilityJson(s.reliability);
+  figures["probability_reliability"] = reliabilityJson(s.probability);
+  figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";
 }

@@ -132,7 +132,9 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
     }
     if (view.state != VoxelState::kOccupied) continue;
     ranked.push_back(voxel);
-    quality.reliability.add(static_cast<double>(view.probability), voxel.points, voxel.points - voxel.wrong);
+    const std::size_t right = voxel.points - voxel.wrong;
+    quality.probability.add(static_cast<double>(view.probability), voxel.points, right);
+    quality.class_probability.add(static_cast<double>(view.class_probability), voxel.points, right);
   }
   quality.sparsification_error = sparsificationError(std::move(ranked));
   return quality;

@@ -59,7 +59,9 @@ struct SemanticQuality {
   Confusion map;    ///< predicted by the voxel that contains the point
   Confusion input;  ///< predicted by the label given to the mapper
 
-  Reliability reliability;  ///< of the class's probability, over the points in occupied voxels
+  // Over the points in occupied voxels:
+  Reliability probability;        ///< of p, the class's share of the whole posterior, `free` included
+  Reliability class_probability;  ///< of C, the class's share of what is not `free`
 
   /// Area under the sparsification error curve (AUSE; Ilg et al., ECCV 2018). Removing the voxels with the
   /// largest variance first leaves more errors than removing those with the most errors first; this is the

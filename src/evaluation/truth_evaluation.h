@@ -41,7 +41,7 @@ struct TruthQuality {
   SpaceQuality all;
   /// Classes of the voxels that were hit or crossed, or are occupied in the map; kFreeClass for free ones.
   Confusion voxels;
-  Reliability occupancy;     ///< of 1 - p(free), over known voxels that were hit or crossed
+  Reliability occupancy;     ///< of occupancy, over known voxels that were hit or crossed
   std::size_t movable = 0;   ///< voxels occupied in the map by a class that can move
   std::size_t ghosts = 0;    ///< of these, those that nothing of such a class has been near for 0.5 s
   double mean_ghosts = 0.0;  ///< mean of `ghosts` over the calls of countGhosts

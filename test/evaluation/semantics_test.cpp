@@ -87,7 +87,7 @@ TEST_F(Quality, WrongVoxelsAreOccupiedByAClassThatNoPointHas) {
   EXPECT_EQ(wrong[0].x, 1);
 }
 
-TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
+TEST_F(Quality, CalibrationComparesProbabilitiesWithWhatIsRight) {
   set(0, 1, 0.8f);
   set(0, 2, 0.2f);
   see(0, 10, 10, 3);
@@ -95,10 +95,20 @@ TEST_F(Quality, CalibrationComparesProbabilityWithWhatIsRight) {
   set(1, 2, 1.0f);
   see(1, 20, 20, 4);  // all are correct at probability 1
   const SemanticQuality quality = evaluation_.compare(map_);
-  EXPECT_EQ(quality.reliability.bins()[8].count + quality.reliability.bins()[7].count,
-            4u);  // 0.8 may round either way
-  EXPECT_EQ(quality.reliability.bins()[9].count, 4u);
-  EXPECT_NEAR(quality.reliability.error(), (std::abs(3 - 3.2) + 0.0) / 8, 1e-5);
+  for (const Reliability& each : {quality.probability, quality.class_probability}) {
+    EXPECT_EQ(each.bins()[8].count + each.bins()[7].count, 4u);  // 0.8 may round either way
+    EXPECT_EQ(each.bins()[9].count, 4u);
+    EXPECT_NEAR(each.error(), (std::abs(3 - 3.2) + 0.0) / 8, 1e-5);
+  }
+}
+
+TEST_F(Quality, EvidenceForFreeDilutesTheProbabilityAndNotTheClass) {
+  set(0, 1, 0.6f);
+  set(0, kFreeClass, 0.4f);
+  see(0, 10, 10, 4);  // all are correct, at probability 0.6 and class probability 1
+  const SemanticQuality quality = evaluation_.compare(map_);
+  EXPECT_NEAR(quality.probability.error(), 0.4, 1e-5);
+  EXPECT_NEAR(quality.class_probability.error(), 0.0, 1e-5);
 }
 
 TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {

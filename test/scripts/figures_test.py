@@ -72,7 +72,8 @@ class Figures(unittest.TestCase):
         self.assertEqual(len(rows), len(os.listdir(presets)) + 2)
         self.assertEqual(float(rows['preset paper_none']['sa']), 100.0)
         curves = {(row['preset'], row['of']) for row in self.rows('calibration_small.csv')}
-        self.assertEqual(curves, {(os.path.splitext(p)[0], of) for p in os.listdir(presets) for of in ('class', 'occupancy')})
+        kinds = ('probability', 'class_probability', 'occupancy')
+        self.assertEqual(curves, {(os.path.splitext(p)[0], of) for p in os.listdir(presets) for of in kinds})
         self.assertGreater(float(rows['line, bilinear, observed']['free_recall']), float(rows['linear, 1']['free_recall']))
 
     def test_method(self):
