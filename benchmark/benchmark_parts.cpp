@@ -8,6 +8,7 @@
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "io/voxel_pcl.h"
+#include "map/view_kernels.h"
 #include "mapping/scan_preprocessor.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
@@ -99,6 +100,41 @@ void lines(benchmark::State& state, BeamIndexType index, const std::string& inst
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.seen.beams.ends.size()));
 }
 
+/// A map of 64 blocks of five planes, four classes and `free`, which stays in a core's caches.
+SemanticMap mapOfFivePlanes() {
+  Fixture& f = fixture();
+  SemanticMap map(f.geometry, f.config.prior, f.classes->size());
+  std::vector<EvidenceUnits> plane(kBlockVoxels);
+  std::uint32_t n = 1;
+  for (int x = 0; x < 64; ++x) {
+    for (const ClassId id : {ClassId{0}, ClassId{3}, ClassId{8}, ClassId{11}, kFreeClass}) {
+      for (EvidenceUnits& units : plane) {
+        n = n * 1664525u + 1013904223u;
+        units = n >> 31 == 0 ? 0 : static_cast<EvidenceUnits>(n >> 12);
+      }
+      map.getOrAllocate({{x, 0, 0}}).add(id, plane.data());
+    }
+  }
+  return map;
+}
+
+/// Reads whole blocks. Prints the time of a block.
+void readBlocks(benchmark::State& state, const std::string& instruction_set, BlockFields fields) {
+  const SemanticMap map = mapOfFivePlanes();
+  const auto blocks = sortedBlocks(map);
+  const ViewKernels& kernels = viewKernelsFor(instruction_set);
+  BlockView view;
+  for (auto _ : state) {
+    for (const auto& [index, block] : blocks) {
+      readBlock(kernels, map, *block, fields, view);
+      benchmark::DoNotOptimize(&view);
+    }
+  }
+  using benchmark::Counter;
+  state.counters["block"] =
+      Counter(static_cast<double>(blocks.size()), Counter::kIsIterationInvariantRate | Counter::kInvert);
+}
+
 /// State, class and probability of every voxel of the map.
 void queries(benchmark::State& state) {
   Fixture& f = fixture();
@@ -138,6 +174,9 @@ int main(int argc, char** argv) {
   for (const std::string& set : instructionSets()) {
     add("Hits/" + set, [set](auto& state) { hits(state, set); });
     add("LinesFromTable/" + set, [set](auto& state) { lines(state, BeamIndexType::kTable, set); });
+    add("ReadStates/" + set, [set](auto& state) { readBlocks(state, set, BlockFields::kStates); });
+    add("ReadBlock/" + set, [set](auto& state) { readBlocks(state, set, BlockFields::kAllButEntropy); });
+    add("ReadBlockWithEntropy/" + set, [set](auto& state) { readBlocks(state, set, BlockFields::kAll); });
   }
   add("LinesFromRtree", [](auto& state) { lines(state, BeamIndexType::kRtree, ""); });
   add("Query", queries);

@@ -33,8 +33,11 @@ endfunction()
 
 bki_mapping_core_room(core SOURCES class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
-bki_mapping_core_room(map SOURCES column_map.cpp map_query.cpp semantic_map.cpp LINK bki_mapping_core)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
+bki_mapping_core_room(map SOURCES
+    column_map.cpp map_query.cpp semantic_map.cpp
+    view_kernels.cpp view_kernels_avx2.cpp view_kernels_avx512.cpp view_kernels_generic.cpp
+  LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(update SOURCES
     map_updater.cpp

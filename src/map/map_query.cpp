@@ -2,21 +2,65 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "map/view_kernels.h"
 
 namespace bki_mapping {
 namespace {
+
+constexpr EvidenceUnits kNoEvidence[kBlockVoxels] = {};
+
+BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
+  BlockPlanes planes;
+  planes.map = &map;
+  planes.free = kNoEvidence;
+  for (std::size_t p = 0; p < block.classes().size(); ++p) {
+    const ClassId id = block.classes()[p];
+    if (id == kFreeClass) {
+      planes.free = block.plane(p);
+      planes.has_free = true;
+      continue;
+    }
+    const float gain = map.freeGain(id, 0.0f);
+    const bool decays = gain > 1.0f && map.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
+    planes.planes[planes.count++] = {block.plane(p), id, gain, decays};
+  }
+  return planes;
+}
 
 /// - p log(p), accurate for p near 1, too. @param others sum of the other concentrations.
 double entropyTerm(double alpha, double others) {
   return alpha / (alpha + others) * std::log1p(others / alpha);
 }
 
-/// Whether a voxel with evidence is occupied: Equation 11 in docs/method.md, decided on whole units.
+}  // namespace
+
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free) {
   return best >= static_cast<double>(gain) * free;
 }
 
-}  // namespace
+float decayedGain(const SemanticMap& map, ClassId id, float hits) {
+  return map.freeGain(id, hits);
+}
+
+void readBlock(const ViewKernels& kernels, const SemanticMap& map, const Block& block, BlockFields fields,
+               BlockView& view) {
+  const auto read = fields == BlockFields::kStates          ? kernels.states
+                    : fields == BlockFields::kAllButEntropy ? kernels.posterior
+                                                            : kernels.all;
+  read(planesOf(map, block), view);
+  const Block::Occlusion& marks = block.occlusion();
+  if (marks.none()) return;
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    if (marks[v] && view.state[v] == VoxelState::kUnknown) view.state[v] = VoxelState::kOccluded;
+  }
+}
+
+void readBlock(const SemanticMap& map, const Block& block, BlockFields fields, BlockView& view) {
+  static const ViewKernels* const fastest = &viewKernelsFor("");
+  readBlock(*fastest, map, block, fields, view);
+}
 
 VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset) {
   // Units are whole numbers, of which doubles hold the sum over all classes exactly.

@@ -2,7 +2,8 @@
 /// They see it by way of vec_generic.h, vec_avx2.h or vec_avx512.h, which set kLanes, include this file, and
 /// define the remaining words. Names are Highway's where Highway has the word.
 ///
-/// - FloatVec, IntVec: kLanes floats; kLanes 32-bit integers. Arithmetic, shifts, comparisons and & | ~ are
+/// - FloatVec, IntVec, ByteVec: kLanes floats, 32-bit integers, unsigned bytes. Arithmetic, shifts,
+/// comparisons and & | ~ are
 ///   operators, also with a single number on one side.
 /// - Float4: four floats, on every instruction set.
 /// - Mask: an IntVec whose lanes are 0 or -1, which is what a comparison gives.
@@ -11,7 +12,7 @@
 /// - LoadU(p), StoreU(v, p): from and to memory of any alignment. LoadFour(p): a Float4.
 /// - AddU(v, p): adds to the numbers at p.
 /// - AddPairs(v, p, q): adds lanes 0 and 1 of a Float4 at p, lanes 2 and 3 at q; the two must not overlap.
-/// - ConvertTo<V>(v): integers to floats, or floats to integers towards 0.
+/// - ConvertTo<V>(v): integers to floats, floats to integers towards 0, or integers to their lowest bytes.
 /// - BitCast<V>(v): the same bits as another type.
 /// - Min(a, b), Max(a, b): lane by lane. Floats must not be NaN.
 /// - Abs(v), Sqrt(v): lane by lane. MinAbs(a, b): Min(Abs(a), Abs(b)).
@@ -48,6 +49,7 @@ namespace {
 typedef float FloatVec __attribute__((vector_size(kLanes * sizeof(float))));
 typedef std::int32_t IntVec __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
 typedef IntVec Mask;
+typedef std::uint8_t ByteVec __attribute__((vector_size(kLanes)));
 typedef float Float4 __attribute__((vector_size(4 * sizeof(float))));
 
 [[gnu::always_inline]] inline FloatVec Set(float x) {

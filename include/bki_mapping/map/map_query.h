@@ -1,6 +1,7 @@
 /// @file Queries: the state and the posterior of a voxel.
 #pragma once
 
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,34 @@ struct VoxelView {
   float evidence = 0.0f;  ///< sum(alpha) minus the sum of the priors
 };
 
+/// What VoxelView says of each voxel of a block, by GridGeometry::offsetInBlock.
+struct BlockView {
+  template <typename T>
+  using PerVoxel = std::array<T, kBlockVoxels>;
+
+  PerVoxel<VoxelState> state;
+  PerVoxel<ClassId> label;
+  PerVoxel<float> probability, variance, occupancy, class_probability, entropy, evidence;
+
+  /// One voxel. @param offset 0 to 511.
+  VoxelView at(int offset) const {
+    const auto v = static_cast<std::size_t>(offset);
+    return {state[v],   label[v],   probability[v], variance[v], occupancy[v], class_probability[v],
+            entropy[v], evidence[v]};
+  }
+};
+
+/// The fields of a BlockView that readBlock computes; the others keep their values.
+enum class BlockFields {
+  kStates,         ///< state and label
+  kAllButEntropy,  ///< takes up to twice as long as states
+  kAll,            ///< takes three times as long as without entropy
+};
+
+/// Reads all voxels of a block, many times as fast as one by one. States and labels are those of viewVoxel;
+/// the other fields differ from them by at most 1e-6 of their value.
+void readBlock(const SemanticMap& map, const Block& block, BlockFields fields, BlockView& view);
+
 /// The state and posterior of a voxel. @param offset of the voxel in its block.
 VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
 /// The same with entropy 0, which is much faster: the logarithms take most of the time.
@@ -44,13 +73,17 @@ VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
 /// All blocks, sorted by index (z, then y, then x), so that output does not depend on the order of creation.
 std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map);
 
-/// Calls visit(const VoxelIndex&, const VoxelView&) for every voxel that is not unknown, in sorted order.
+/// Calls visit(const VoxelIndex&, const VoxelView&) for every voxel that is not unknown, in sorted order. The
+/// views have entropy 0.
 template <typename Visit>
 void forEachKnownVoxel(const SemanticMap& map, Visit&& visit) {
+  BlockView view;
+  view.entropy.fill(0.0f);
   for (const auto& [index, block] : sortedBlocks(map)) {
+    readBlock(map, *block, BlockFields::kAllButEntropy, view);
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
-      const VoxelView view = viewVoxel(map, *block, offset);
-      if (view.state != VoxelState::kUnknown) visit(GridGeometry::voxelOf(index, offset), view);
+      const VoxelView voxel = view.at(offset);
+      if (voxel.state != VoxelState::kUnknown) visit(GridGeometry::voxelOf(index, offset), voxel);
     }
   }
 }

@@ -1,0 +1,189 @@
+/// @file Reading the voxels of a block, a vector at a time, over the vocabulary of simd/vec.h. viewVoxel is
+/// the same for one voxel, in double precision.
+#pragma once
+
+#include "map/vec_log_inl.h"
+#include "map/view_kernels.h"
+
+namespace bki_mapping {
+namespace {
+
+/// Sums of units over up to 255 planes, without rounding: of their upper and lower halves, each of which
+/// stays below 2^24, so that floats hold it exactly, too.
+struct ExactSum {
+  IntVec high, low;
+
+  [[gnu::always_inline]] void add(IntVec units) {
+    high += units >> 16;
+    low += units & 0xffff;
+  }
+  [[gnu::always_inline]] void subtract(IntVec units) {
+    high -= units >> 16;
+    low -= units & 0xffff;
+  }
+  /// The sum as evidence, rounded once.
+  [[gnu::always_inline]] FloatVec evidence() const {
+    static_assert(kEvidenceUnit == 0x1.0p-16f, "the upper half is a whole number of evidence");
+    return ConvertTo<FloatVec>(high) + kEvidenceUnit * ConvertTo<FloatVec>(low);
+  }
+};
+
+[[gnu::always_inline]] inline FloatVec evidenceOf(IntVec units) {
+  return kEvidenceUnit * ConvertTo<FloatVec>(units);
+}
+
+/// What one pass over the planes finds.
+struct Likeliest {
+  IntVec best;    ///< evidence of the class with the most [units]
+  IntVec label;   ///< that class; kFreeClass if no class has evidence
+  FloatVec gain;  ///< of that class
+  Mask decays;    ///< whether the gain depends on `best`
+  ExactSum classes;
+};
+
+[[gnu::always_inline]] inline Likeliest findLikeliest(const BlockPlanes& planes, int v) {
+  Likeliest found = {{}, Set(kFreeClass), Set(1.0f), {}, {{}, {}}};
+  for (std::size_t p = 0; p < planes.count; ++p) {
+    const BlockPlanes::Plane& plane = planes.planes[p];
+    const IntVec units = Max(LoadU(plane.units + v), IntVec{});
+    const Mask more = units > found.best;  // of equal evidence, the first class has the smaller id
+    found.best = Max(units, found.best);
+    found.label = IfThenElse(more, Set(plane.id), found.label);
+    found.gain = IfThenElse(more, Set(plane.gain), found.gain);
+    found.decays = IfThenElse(more, Set(-static_cast<int>(plane.decays)), found.decays);
+    found.classes.add(units);
+  }
+  return found;
+}
+
+/// Lets gains decay where a voxel has evidence for `free`; elsewhere they make no difference. Lane by lane:
+/// few voxels are of a class whose gain decays, and states must not depend on the instruction set.
+[[gnu::always_inline]] inline void decay(const BlockPlanes& planes, IntVec free, Likeliest& found) {
+  const Mask decays = found.decays & (free > 0);
+  if (!AnyTrue(decays)) return;
+  const FloatVec hits = evidenceOf(found.best);
+  float gain[kLanes];  // an element of a vector by a variable index would keep the vector in memory
+  StoreU(found.gain, gain);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (decays[lane])
+      gain[lane] = decayedGain(*planes.map, static_cast<ClassId>(found.label[lane]), hits[lane]);
+  }
+  found.gain = LoadU(gain);
+}
+
+/// Equation 11, as isOccupied decides it.
+[[gnu::always_inline]] inline Mask occupied(const Likeliest& found, IntVec free) {
+  const FloatVec hits = evidenceOf(found.best), misses = found.gain * evidenceOf(free);
+  const Mask plain = found.gain == 1.0f;
+  const Mask result = IfThenElse(plain, found.best >= free, hits >= misses);
+  constexpr float kRounding = 1e-6f;  // more than floats err by
+  const Mask close = ~plain & (free > 0) & (Abs(hits - misses) <= kRounding * hits);
+  if (!AnyTrue(close)) return result;
+  std::int32_t exact[kLanes];
+  StoreU(result, exact);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (close[lane]) exact[lane] = -isOccupied(found.best[lane], found.gain[lane], free[lane]);
+  }
+  return LoadU(exact);
+}
+
+/// What the entropy needs beyond Likeliest.
+struct Concentrations {
+  float prior;
+  FloatVec inverse_sum;  ///< 1 / sum(alpha)
+  FloatVec others;       ///< sum(alpha) minus the largest
+};
+
+/// A sum with the rounding of each addition taken into account in the next (Kahan): the entropy may have 255
+/// terms.
+struct CompensatedSum {
+  FloatVec sum, lost;
+
+  [[gnu::always_inline]] void add(FloatVec term) {
+    const FloatVec corrected = term - lost, next = sum + corrected;
+    lost = (next - sum) - corrected;
+    sum = next;
+  }
+};
+
+/// - p log(p) of one concentration, of at most half the sum.
+[[gnu::always_inline]] inline FloatVec entropyTerm(FloatVec alpha, const Concentrations& c) {
+  const FloatVec p = alpha * c.inverse_sum;
+  return -p * log(p);
+}
+/// 0 where the mask is set, else v.
+[[gnu::always_inline]] inline FloatVec unless(Mask mask, FloatVec v) {
+  return BitCast<FloatVec>(BitCast<IntVec>(v) & ~mask);
+}
+
+/// - sum of p log(p). Terms are of one sign, so that nothing cancels. The largest p may be near 1; its
+/// logarithm comes from the sum of the others. All others are at most 1/2.
+[[gnu::always_inline]] inline FloatVec entropyOf(const BlockPlanes& planes, const Likeliest& found,
+                                                 IntVec free, const Concentrations& c, int v) {
+  const Mask free_is_largest = (free > found.best) | (found.label == kFreeClass);
+  const IntVec largest = IfThenElse(free_is_largest, Set(kFreeClass), found.label);
+  const FloatVec alpha = c.prior + evidenceOf(Max(found.best, free));
+  CompensatedSum entropy = {alpha * c.inverse_sum * logOnePlus(c.others / alpha), {}};
+  for (std::size_t p = 0; p < planes.count; ++p) {
+    const BlockPlanes::Plane& plane = planes.planes[p];
+    const IntVec units = Max(LoadU(plane.units + v), IntVec{});
+    entropy.add(unless(largest == plane.id, entropyTerm(c.prior + evidenceOf(units), c)));
+  }
+  // Classes without a plane, and `free` if it has none, have the prior.
+  auto absent = Set(static_cast<float>(planes.map->classCount() - planes.count));
+  if (planes.has_free) {
+    entropy.add(unless(free_is_largest, entropyTerm(c.prior + evidenceOf(free), c)));
+  } else {
+    absent += ConvertTo<FloatVec>(free_is_largest + 1);
+  }
+  entropy.add(absent * entropyTerm(Set(c.prior), c));
+  return entropy.sum;
+}
+
+template <bool kPosterior, bool kEntropy>
+void readPlanes(const BlockPlanes& planes, BlockView& view) {
+  // Far below a unit of evidence a smaller prior makes no difference, and floats could not hold it.
+  const double least = 1e-30;
+  const double prior = planes.map->prior() > least ? planes.map->prior() : least;
+  const auto classes = static_cast<double>(planes.map->classCount());
+  const auto prior_once = static_cast<float>(prior), prior_classes = static_cast<float>(prior * classes),
+             prior_sum = static_cast<float>(prior * (classes + 1.0));
+  for (int v = 0; v < kBlockVoxels; v += kLanes) {
+    const IntVec free = Max(LoadU(planes.free + v), IntVec{});
+    Likeliest found = findLikeliest(planes, v);
+    decay(planes, free, found);
+    const Mask is_known = (found.best | free) != 0;
+    const Mask is_occupied = is_known & occupied(found, free);
+    static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
+    const IntVec state = (is_known & 1) - is_occupied, label = found.label | ~is_occupied;
+    static_assert(kFreeClass == 0xff, "all bits set");
+    StoreU(ConvertTo<ByteVec>(state), reinterpret_cast<std::uint8_t*>(view.state.data() + v));
+    StoreU(ConvertTo<ByteVec>(label), view.label.data() + v);
+    if constexpr (!kPosterior) continue;
+
+    ExactSum total = found.classes;
+    total.add(free);
+    const FloatVec evidence = total.evidence(), sum = prior_sum + evidence, inverse_sum = 1.0f / sum;
+    const IntVec own = IfThenElse(is_occupied, found.best, free);
+    ExactSum others = total;
+    others.subtract(own);
+    const FloatVec p = (prior_once + evidenceOf(own)) * inverse_sum,
+                   not_p = (prior_classes + others.evidence()) * inverse_sum;
+    const FloatVec something = prior_classes + found.classes.evidence(),
+                   nothing = prior_once + found.gain * evidenceOf(free);
+    StoreU(evidence, view.evidence.data() + v);
+    StoreU(p, view.probability.data() + v);
+    StoreU(p * not_p / (sum + 1.0f), view.variance.data() + v);
+    StoreU(something / (something + nothing), view.occupancy.data() + v);
+    StoreU((prior_once + evidenceOf(found.best)) / something, view.class_probability.data() + v);
+    if constexpr (!kEntropy) continue;
+
+    others = total;
+    others.subtract(Max(found.best, free));
+    const Concentrations c = {prior_once, inverse_sum, prior_classes + others.evidence()};
+    StoreU(entropyOf(planes, found, free, c, v), view.entropy.data() + v);
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping

@@ -1,0 +1,176 @@
+// A block that is read at once equals its voxels, one by one, on every instruction set.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "map/view_kernels.h"
+#include "simd/instruction_sets.h"
+#include "simd/vec_generic.h"
+
+#include "map/vec_log_inl.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr float kError = 1e-6f;  // what map_query.h promises
+
+/// What a random map is made of.
+struct Kind {
+  std::size_t classes;  ///< in the class table
+  int planes;           ///< of the block, at most
+  double prior;
+  enum Evidence { kPlain, kTies, kExtreme } evidence;
+  bool gains, persistence, occlusion;
+};
+
+EvidenceUnits randomUnits(Kind::Evidence kind, std::mt19937& random) {
+  constexpr EvidenceUnits kEdges[] = {
+      0, 0, 1, -1, kMostUnits, -kMostUnits, kMostUnits - 1, 1 << 30, 1 << 24, (1 << 24) + 1};
+  std::uniform_real_distribution<double> exponent(0.0, 25.0);
+  switch (kind) {
+    case Kind::kTies:
+      return static_cast<EvidenceUnits>(random() % 3) << 16;
+    case Kind::kExtreme:
+      if (random() % 2 == 0) return kEdges[random() % std::size(kEdges)];
+      return static_cast<EvidenceUnits>(random() % 2 == 0 ? -std::exp2(exponent(random))
+                                                          : std::exp2(exponent(random)));
+    default:
+      return random() % 3 == 0 ? 0 : static_cast<EvidenceUnits>(std::exp2(exponent(random)));
+  }
+}
+
+SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
+  SemanticMap map(GridGeometry(0.3), kind.prior, kind.classes);
+  Block& block = map.getOrAllocate({{0, 0, 0}});
+  std::vector<EvidenceUnits> plane(kBlockVoxels);
+  for (int p = 0; p < kind.planes; ++p) {
+    const std::size_t n = random() % (kind.classes + 1);
+    const auto id = n == kind.classes ? kFreeClass : static_cast<ClassId>(n);
+    for (EvidenceUnits& units : plane) units = randomUnits(kind.evidence, random);
+    block.change(id, [&](EvidenceUnits* to) {
+      std::copy(plane.begin(), plane.end(), to);
+      return true;
+    });
+  }
+  if (kind.occlusion) {
+    Block::Occlusion marks;
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) marks[v] = random() % 2 == 0;
+    block.setOcclusion(marks);
+  }
+  constexpr double kGains[] = {1.0, 0.1, 0.5, 2.0, 8.0, 1e-6, 1e6};
+  for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
+    map.setFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
+  }
+  if (kind.persistence) map.setGainPersistence(std::exp2(static_cast<double>(random() % 20) - 10.0));
+  return map;
+}
+
+void expectNear(float value, float expected, const char* field, const std::string& where) {
+  ASSERT_NEAR(value, expected, kError * std::abs(expected)) << field << ", " << where;
+}
+
+/// Compares every voxel of the map's block with viewVoxel.
+void compare(const SemanticMap& map, const std::string& set, const std::string& what) {
+  const Block& block = *map.find({{0, 0, 0}});
+  BlockView view, states, posterior;
+  std::memset(static_cast<void*>(&view), 0x55, sizeof(view));
+  states = posterior = view;
+  const ViewKernels& kernels = viewKernelsFor(set);
+  readBlock(kernels, map, block, BlockFields::kAll, view);
+  readBlock(kernels, map, block, BlockFields::kStates, states);
+  readBlock(kernels, map, block, BlockFields::kAllButEntropy, posterior);
+  EXPECT_EQ(states.state, view.state) << set << ", " << what;
+  EXPECT_EQ(states.label, view.label) << set << ", " << what;
+  posterior.entropy = view.entropy;
+  EXPECT_EQ(std::memcmp(&posterior, &view, sizeof(view)), 0) << set << ", " << what;
+  for (int offset = 0; offset < kBlockVoxels; ++offset) {
+    const VoxelView got = view.at(offset), expected = viewVoxel(map, block, offset);
+    const std::string where = set + ", " + what + ", voxel " + std::to_string(offset);
+    ASSERT_EQ(got.state, expected.state) << where;
+    ASSERT_EQ(got.label, expected.label) << where;
+    expectNear(got.probability, expected.probability, "probability", where);
+    expectNear(got.variance, expected.variance, "variance", where);
+    expectNear(got.occupancy, expected.occupancy, "occupancy", where);
+    expectNear(got.class_probability, expected.class_probability, "class_probability", where);
+    expectNear(got.entropy, expected.entropy, "entropy", where);
+    expectNear(got.evidence, expected.evidence, "evidence", where);
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
+TEST(VecLog, ErrsByLessThanItsBound) {
+  const auto expectClose = [](FloatVec got, float x, double expected) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      ASSERT_NEAR(static_cast<double>(got[lane]), expected,
+                  static_cast<double>(kLogError) * std::abs(expected))
+          << x;
+    }
+  };
+  for (float x = 1e-37f; x < 1e37f; x *= 1.0003f) {
+    if (x <= 0.5f || x >= 2.0f) expectClose(log(Set(x)), x, std::log(static_cast<double>(x)));
+    expectClose(logOnePlus(Set(x)), x, std::log1p(static_cast<double>(x)));
+    if (HasFatalFailure()) return;
+  }
+  expectClose(logOnePlus(FloatVec{}), 0.0f, 0.0);
+}
+
+TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
+  std::mt19937 random(8);
+  int n = 0;
+  for (const auto evidence : {Kind::kPlain, Kind::kTies, Kind::kExtreme}) {
+    for (const bool gains : {false, true}) {
+      for (const bool persistence : {false, true}) {
+        for (const double prior : {0.001, 1e-6, 1.0, 1e9}) {
+          for (const auto& [classes, planes] : {std::pair{3, 0}, {1, 2}, {3, 6}, {20, 8}, {254, 1200}}) {
+            const Kind kind{
+                static_cast<std::size_t>(classes), planes, prior, evidence, gains, persistence, n % 2 == 0};
+            const SemanticMap map = randomMap(kind, random);
+            for (const std::string& set : instructionSets()) compare(map, set, "map " + std::to_string(n));
+            if (HasFatalFailure()) return;
+            ++n;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(ReadBlock, DecidesByTheLastUnit) {
+  for (const std::string& set : instructionSets()) {
+    for (const double gain : {1.0, 0.5, 2.0, 0.1, 4.0}) {
+      SemanticMap map(GridGeometry(0.3), 0.001, 3);
+      map.setFreeGain(1, gain);
+      Block& block = map.getOrAllocate({{0, 0, 0}});
+      std::vector<EvidenceUnits> hits(kBlockVoxels), free(kBlockVoxels);
+      for (int v = 0; v < kBlockVoxels; ++v) {
+        const auto at = static_cast<std::size_t>(v);
+        free[at] = 1 << (v % 29);
+        hits[at] = static_cast<EvidenceUnits>(std::lround(gain * free[at])) + v / 29 % 3 - 1;
+      }
+      block.add(1, hits.data());
+      block.add(kFreeClass, free.data());
+      compare(map, set, "gain " + std::to_string(gain));
+    }
+  }
+}
+
+TEST(ReadBlock, ATinyPriorIsANumberStill) {
+  for (const std::string& set : instructionSets()) {
+    SemanticMap map(GridGeometry(0.3), 1e-300, 3);
+    std::vector<EvidenceUnits> hits(kBlockVoxels, 0);
+    hits[0] = 1;
+    map.getOrAllocate({{0, 0, 0}}).add(1, hits.data());
+    BlockView view;
+    readBlock(viewKernelsFor(set), map, *map.find({{0, 0, 0}}), BlockFields::kAll, view);
+    for (std::size_t v = 0; v < 2; ++v) {
+      EXPECT_NEAR(view.probability[v], v == 0 ? 1.0 : 0.25, 1e-6);
+      EXPECT_NEAR(view.occupancy[v], v == 0 ? 1.0 : 0.75, 1e-6);
+      EXPECT_NEAR(view.entropy[v], v == 0 ? 0.0 : std::log(4.0), 1e-6);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping
