@@ -69,7 +69,8 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
       blocks_[stack].erase(index.z);
     }
   }
-  Cells cells;
+  std::array<Cells, kBlockEdge * kBlockEdge> cells;
+  BlockView view;
   for (const StackIndex& stack : stacks) {
     const auto blocks = blocks_.find(stack);
     if (blocks->second.empty()) {
@@ -77,19 +78,18 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
       columns_.erase(stack);
       continue;
     }
-    Columns& columns = columns_[stack];
-    for (int c = 0; c < kBlockEdge * kBlockEdge; ++c) {
-      cells.clear();
-      for (const std::int32_t z : blocks->second) {
-        const Block& block = *map.find({{stack.first, stack.second, z}});
-        for (int k = 0; k < kBlockEdge; ++k) {
-          const VoxelView view = viewWithoutEntropy(map, block, c + kBlockEdge * kBlockEdge * k);
-          if (view.state != VoxelState::kUnknown) {
-            cells.push_back({z * kBlockEdge + k, view.state, view.label});
-          }
-        }
+    for (Cells& column : cells) column.clear();
+    for (const std::int32_t z : blocks->second) {
+      readBlock(map, *map.find({{stack.first, stack.second, z}}), BlockFields::kStates, view);
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        if (view.state[v] == VoxelState::kUnknown) continue;
+        const auto layer = static_cast<std::int32_t>(v / cells.size());
+        cells[v % cells.size()].push_back({z * kBlockEdge + layer, view.state[v], view.label[v]});
       }
-      columns[static_cast<std::size_t>(c)] = viewColumn(cells, classes, rules_, map.geometry().resolution());
+    }
+    Columns& columns = columns_[stack];
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      columns[c] = viewColumn(cells[c], classes, rules_, map.geometry().resolution());
     }
   }
   return stacks;
