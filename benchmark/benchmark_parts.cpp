@@ -7,7 +7,7 @@
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "io/voxel_pcl.h"
+#include "io/voxel_points.h"
 #include "map/view_kernels.h"
 #include "mapping/scan_preprocessor.h"
 #include "points/downsample.h"
@@ -153,9 +153,13 @@ void queries(benchmark::State& state) {
 /// The cloud of the topic voxel_cloud.
 void voxelCloud(benchmark::State& state) {
   Fixture& f = fixture();
+  std::vector<std::uint8_t> data;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(
-        toPcl(collectVoxels(f.mapper.map(), *f.classes, {VoxelState::kOccupied, VoxelState::kFree})));
+    const VoxelPoints points(f.mapper.map(), *f.classes, {{VoxelState::kOccupied, VoxelState::kFree}},
+                             sortedBlocks(f.mapper.map()), f.pool);
+    data.resize(points.count() * sizeof(VoxelPoint));
+    points.write(reinterpret_cast<VoxelPoint*>(data.data()));
+    benchmark::DoNotOptimize(data.data());
   }
 }
 

@@ -7,9 +7,8 @@
 #include <stdexcept>
 
 #include "io/atomic_file.h"
-#include "io/little_endian.h"
 #include "io/voxel_pcl.h"
-#include "map/voxel_color.h"
+#include "io/voxel_points.h"
 
 namespace bki_mapping {
 namespace {
@@ -21,31 +20,32 @@ const char kPlyProperties[] =
     "property float probability\nproperty float occupancy\nproperty float class_probability\n"
     "property float variance\nproperty float entropy\nproperty float evidence\n";
 
-std::string plyBytes(const std::vector<VoxelRecord>& voxels, double resolution) {
-  std::ostringstream header;
-  header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
-         << " m, map frame\nelement vertex " << voxels.size() << "\n"
-         << kPlyProperties << "end_header\n";
-  std::string bytes = header.str();
-  for (const VoxelRecord& v : voxels) {
-    for (const float c : {v.x, v.y, v.z}) appendBytes(bytes, c);
-    for (const std::uint8_t c : {v.red, v.green, v.blue}) appendBytes(bytes, c);
-    appendBytes(bytes, v.label);
-    appendBytes(bytes, v.state);
-    for (const float f :
-         {v.probability, v.occupancy, v.class_probability, v.variance, v.entropy, v.evidence}) {
-      appendBytes(bytes, f);
-    }
-  }
-  return bytes;
+/// Files do not wait for threads that may serve the mapper at the time.
+constexpr int kThreads = 1;
+
+/// The header followed by the points, of type Point. Bytes are in host order, which is little-endian on all
+/// platforms of ROS 1.
+template <typename Point>
+std::string withPoints(std::string header, const VoxelPoints& points) {
+  const std::size_t begin = header.size();
+  header.resize(begin + points.count() * sizeof(Point));
+  points.write(reinterpret_cast<Point*>(header.data() + begin));
+  return header;
 }
 
-std::string pcdBytes(const std::vector<VoxelRecord>& voxels) {
-  const pcl::PCLPointCloud2 cloud = toPcl(voxels);
+std::string plyBytes(const VoxelPoints& points, double resolution) {
+  std::ostringstream header;
+  header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
+         << " m, map frame\nelement vertex " << points.count() << "\n"
+         << kPlyProperties << "end_header\n";
+  return withPoints<VoxelRecord>(header.str(), points);
+}
+
+std::string pcdBytes(const VoxelPoints& points) {
   // PCL's own writer maps the file into memory, and the process dies if the disk fills up meanwhile.
-  return pcl::PCDWriter().generateHeaderBinary(cloud, Eigen::Vector4f::Zero(),
-                                               Eigen::Quaternionf::Identity()) +
-         "DATA binary\n" + std::string(cloud.data.begin(), cloud.data.end());
+  const std::string header = pcl::PCDWriter().generateHeaderBinary(
+      pclHeader(points.count()), Eigen::Vector4f::Zero(), Eigen::Quaternionf::Identity());
+  return withPoints<VoxelPoint>(header + "DATA binary\n", points);
 }
 
 std::string endingOf(const std::string& path) {
@@ -54,8 +54,8 @@ std::string endingOf(const std::string& path) {
 
 }  // namespace
 
-std::set<VoxelState> parseStates(const std::string& list) {
-  std::set<VoxelState> states;
+VoxelStates parseStates(const std::string& list) {
+  VoxelStates states;
   std::istringstream words(list);
   for (std::string word; std::getline(words, word, ',');) {
     if (word == "occupied") {
@@ -72,26 +72,12 @@ std::set<VoxelState> parseStates(const std::string& list) {
   return states;
 }
 
-void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::set<VoxelState>& states,
-                  const BlockIndex& index, const Block& block, std::vector<VoxelRecord>& voxels) {
-  for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    if (states.count(viewWithoutEntropy(map, block, offset).state) == 0) continue;
-    const VoxelView view = viewVoxel(map, block, offset);
-    const VoxelIndex voxel = GridGeometry::voxelOf(index, offset);
-    const Eigen::Vector3f centre = map.geometry().voxelCentre(voxel).cast<float>();
-    const Color color = semanticColor(view, classes);
-    voxels.push_back({centre.x(), centre.y(), centre.z(), color[0], color[1], color[2], view.label,
-                      static_cast<std::uint8_t>(view.state), view.probability, view.occupancy,
-                      view.class_probability, view.variance, view.entropy, view.evidence});
-  }
-}
-
 std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
-                                       const std::set<VoxelState>& states) {
-  std::vector<VoxelRecord> voxels;
-  for (const auto& [index, block] : sortedBlocks(map)) {
-    appendVoxels(map, classes, states, index, *block, voxels);
-  }
+                                       const VoxelStates& states) {
+  ThreadPool pool(kThreads);
+  const VoxelPoints points(map, classes, {states}, sortedBlocks(map), pool);
+  std::vector<VoxelRecord> voxels(points.count());
+  points.write(voxels.data());
   return voxels;
 }
 
@@ -103,11 +89,12 @@ void checkMapFileName(const std::string& path) {
 }
 
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-               const std::set<VoxelState>& states) {
+               const VoxelStates& states) {
   checkMapFileName(path);
-  const std::vector<VoxelRecord> voxels = collectVoxels(map, classes, states);
+  ThreadPool pool(kThreads);
+  const VoxelPoints points(map, classes, {states}, sortedBlocks(map), pool);
   AtomicFile file(path);
-  file.write(endingOf(path) == ".ply" ? plyBytes(voxels, map.geometry().resolution()) : pcdBytes(voxels));
+  file.write(endingOf(path) == ".ply" ? plyBytes(points, map.geometry().resolution()) : pcdBytes(points));
   file.commit();
 }
 

@@ -1,16 +1,14 @@
-/// @file Voxels as a PCL cloud: the fields of PCD files and of the topic voxel_cloud.
+/// @file Voxels as a PCL cloud: the header of PCD files.
 #pragma once
 
 #include <pcl/PCLPointCloud2.h>
 
-#include <vector>
-
-#include "bki_mapping/io/map_export.h"
+#include <cstddef>
 
 namespace bki_mapping {
 
-/// Fields x y z rgb (float32; rgb packed as PCL does), label (uint16), state (uint8), probability occupancy
-/// class_probability variance entropy evidence (float32).
-pcl::PCLPointCloud2 toPcl(const std::vector<VoxelRecord>& voxels);
+/// A cloud of `count` VoxelPoints, without their data. @throws std::length_error if a cloud cannot hold so
+/// many.
+pcl::PCLPointCloud2 pclHeader(std::size_t count);
 
 }  // namespace bki_mapping

@@ -15,9 +15,9 @@ constexpr Color kFreeColor = {200, 225, 240};
 constexpr Color kOccludedColor = {60, 60, 70};
 
 /// The colour of the class for an occupied voxel; kFreeColor or kOccludedColor for others.
-inline Color semanticColor(const VoxelView& view, const ClassTable& classes) {
-  if (view.state == VoxelState::kFree) return kFreeColor;
-  const SemanticClass* known = classes.find(view.label);
+inline Color semanticColor(VoxelState state, ClassId label, const ClassTable& classes) {
+  if (state == VoxelState::kFree) return kFreeColor;
+  const SemanticClass* known = classes.find(label);
   return known ? known->color : kOccludedColor;
 }
 

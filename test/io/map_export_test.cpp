@@ -19,7 +19,7 @@
 namespace bki_mapping {
 namespace {
 
-const std::set<VoxelState> kAll = {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded};
+const VoxelStates kAll = {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded};
 
 class MapFile : public testing::Test {
  protected:
@@ -29,7 +29,7 @@ class MapFile : public testing::Test {
     mapper_ = std::make_unique<SemanticMapper>(config, reference::smallTable());
     mapper_->integrate(reference::nastyScenes()[0].scan);
   }
-  void write(const std::string& path, const std::set<VoxelState>& states) {
+  void write(const std::string& path, const VoxelStates& states) {
     exportMap(path, mapper_->map(), mapper_->classes(), states);
   }
   static std::string read(const std::string& path) {
@@ -86,7 +86,7 @@ TEST_F(MapFile, PclReadsBothFormats) {
 
 TEST_F(MapFile, HoldsTheStatesAskedFor) {
   std::size_t sum = 0;
-  for (const VoxelState state : kAll) {
+  for (const VoxelState state : {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}) {
     const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), {state});
     EXPECT_GT(voxels.size(), 0u) << static_cast<int>(state);
     for (const VoxelRecord& v : voxels) EXPECT_EQ(v.state, static_cast<int>(state));

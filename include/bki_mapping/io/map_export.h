@@ -1,7 +1,6 @@
 /// @file Exports maps as PLY and PCD files.
 #pragma once
 
-#include <set>
 #include <string>
 #include <vector>
 
@@ -10,8 +9,8 @@
 
 namespace bki_mapping {
 
-/// One voxel of a map file; docs/files.md describes the fields.
-struct VoxelRecord {
+/// One voxel of a map file, laid out as a vertex of a PLY file; docs/files.md describes the fields.
+struct [[gnu::packed]] VoxelRecord {
   float x, y, z;  ///< centre, map frame [m]
   std::uint8_t red, green, blue;
   std::uint16_t label;  ///< class id; 255 unless occupied
@@ -20,20 +19,16 @@ struct VoxelRecord {
 };
 
 /// Parses a list of states such as "occupied,free". @throws std::invalid_argument on an unknown word.
-std::set<VoxelState> parseStates(const std::string& list);
-
-/// Appends the voxels of one block that are in the given states.
-void appendVoxels(const SemanticMap& map, const ClassTable& classes, const std::set<VoxelState>& states,
-                  const BlockIndex& index, const Block& block, std::vector<VoxelRecord>& voxels);
+VoxelStates parseStates(const std::string& list);
 
 /// The voxels in the given states, blocks in sorted order.
 std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
-                                       const std::set<VoxelState>& states);
+                                       const VoxelStates& states);
 
 /// Writes a map file by AtomicFile. The extension, .ply or .pcd, chooses the format (both binary).
 /// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-               const std::set<VoxelState>& states);
+               const VoxelStates& states);
 /// Checks the extension before long work. @throws std::invalid_argument if exportMap does not support it.
 void checkMapFileName(const std::string& path);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <initializer_list>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,23 @@ enum class VoxelState : std::uint8_t {
   kFree = 1,      ///< `free` has more evidence, times the class's gain, than any class
   kOccupied = 2,  ///< otherwise; with a gain of 1, some class has the largest alpha
   kOccluded = 3,  ///< no evidence; the last scan to reach it saw it only beyond the ends of beams
+};
+
+/// A set of voxel states.
+class VoxelStates {
+ public:
+  VoxelStates() = default;
+  VoxelStates(std::initializer_list<VoxelState> states) {
+    for (const VoxelState state : states) insert(state);
+  }
+  void insert(VoxelState state) { bits_ |= bitOf(state); }
+  bool contains(VoxelState state) const { return (bits_ & bitOf(state)) != 0; }
+  bool operator==(const VoxelStates& other) const { return bits_ == other.bits_; }
+
+ private:
+  static unsigned bitOf(VoxelState state) { return 1u << static_cast<unsigned>(state); }
+
+  unsigned bits_ = 0;
 };
 
 /// Summary of the Dirichlet posterior of one voxel. Equations 10 to 13 in docs/method.md.

@@ -1,13 +1,17 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "bki_mapping/map/map_query.h"
 #include "map/voxel_color.h"
 #include "ros/map_publisher.h"
+#include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -35,20 +39,28 @@ double heightFraction(double z) {
   return z / 20.0 - std::floor(z / 20.0);
 }
 
-Color colorOf(const VoxelView& view, double z, ColorMode mode, const ClassTable& classes) {
+/// The colour of a voxel of a block. @param z height of its centre [m].
+Color colorOf(const BlockView& view, std::size_t v, double z, ColorMode mode, const ClassTable& classes) {
   switch (mode) {
     case ColorMode::kProbability:
-      return rainbow(view.probability);
+      return rainbow(view.probability[v]);
     case ColorMode::kVariance:
-      return rainbow(4.0 * view.variance);  // p (1 - p) is at most 1/4
+      return rainbow(4.0 * view.variance[v]);  // p (1 - p) is at most 1/4
     case ColorMode::kHeight:
       return rainbow(heightFraction(z));
     default:
-      return semanticColor(view, classes);
+      return semanticColor(view.state[v], view.label[v], classes);
   }
 }
 
+/// The fields of a BlockView that colorOf reads.
+BlockFields fieldsOf(ColorMode mode) {
+  const bool numbers = mode == ColorMode::kProbability || mode == ColorMode::kVariance;
+  return numbers ? BlockFields::kAllButEntropy : BlockFields::kStates;
+}
+
 constexpr int kRegionEdge = SemanticMap::kRegionEdge;
+constexpr std::size_t kBlocksOfRegion = 64;  // of a street; there is room for 512
 
 /// Marker arrays with one CUBE_LIST per class and region of the map: its namespace is the class's name, its
 /// id that of the region. Only changed regions are sent; a marker that became empty is deleted.
@@ -92,7 +104,7 @@ class CellMarkers : public MapPublisher {
       if (inView(index, snapshot) != region.in_view) regions.insert(index);
     }
     MarkerArray message;
-    for (const GridIndex& index : regions.members()) appendRegion(regionAt(index), snapshot, message);
+    appendRegions(regions.members(), snapshot, message);
     forgetEmpty(regions.members(), snapshot);
     if (!message.markers.empty()) publisher_.publish(message);
   }
@@ -105,11 +117,11 @@ class CellMarkers : public MapPublisher {
     message.markers.back().pose.orientation.w = 1.0;
     for (const auto& entry : snapshot.map.entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
-    for (auto region = regions_.begin(); region != regions_.end(); ++region) {
-      region->second.shown.clear();
-      appendRegion(region, snapshot, message);
-      indices.push_back(region->first);
+    for (auto& [index, region] : regions_) {
+      region.shown.clear();
+      indices.push_back(index);
     }
+    appendRegions(indices, snapshot, message);
     forgetEmpty(indices, snapshot);
     return message;
   }
@@ -145,11 +157,25 @@ class CellMarkers : public MapPublisher {
     return snapshot.inView(Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edge, edge);
   }
 
-  void appendRegion(Regions::iterator entry, const MapSnapshot& snapshot, MarkerArray& message) {
-    Region& region = entry->second;
-    Markers markers;
-    region.in_view = inView(entry->first, snapshot);
-    if (region.in_view) fill(entry->first, snapshot, markers);
+  /// Appends the markers of regions, which several threads fill.
+  void appendRegions(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot,
+                     MarkerArray& message) {
+    std::vector<Region*> regions;
+    for (const GridIndex& index : indices) {
+      regions.push_back(&regionAt(index)->second);
+      regions.back()->in_view = inView(index, snapshot);
+    }
+    std::vector<Markers> markers(indices.size());
+    ThreadPool pool(publishingThreads(kBlocksOfRegion * indices.size()));
+    pool.forEachInOrder(indices.size(), [&](std::size_t r, std::size_t) {
+      if (regions[r]->in_view) markers[r] = markersOf(indices[r], snapshot);
+    });
+    for (std::size_t r = 0; r < indices.size(); ++r)
+      append(std::move(markers[r]), snapshot, *regions[r], message);
+  }
+
+  /// Appends the markers of a region, and deletes those that have become empty.
+  void append(Markers markers, const MapSnapshot& snapshot, Region& region, MarkerArray& message) const {
     const std::set<ClassId> before = std::move(region.shown);
     region.shown.clear();
     for (const ClassId gone : before) {
@@ -165,29 +191,70 @@ class CellMarkers : public MapPublisher {
     }
   }
 
-  void fill(const GridIndex& region, const MapSnapshot& snapshot, Markers& markers) const {
+  /// Calls visit(offset, centre) for the voxels of a block that are shown.
+  template <typename Visit>
+  void forEachShown(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
+                    const Visit& visit) const {
+    const double edge = snapshot.map.geometry().resolution();
+    constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;
+    for (std::size_t layer = 0; layer < kBlockEdge; ++layer) {
+      const double z = (index.z * kBlockEdge + static_cast<int>(layer) + 0.5) * edge;
+      if (!snapshot.heightInView(z)) continue;
+      for (std::size_t v = layer * kLayer; v < (layer + 1) * kLayer; ++v) {
+        if (view.state[v] == state_) visit(v, z);
+      }
+    }
+  }
+
+  /// The markers of a region by class, without their id. Voxels are counted first, so that memory is taken
+  /// once.
+  Markers markersOf(const GridIndex& region, const MapSnapshot& snapshot) const {
     const SemanticMap& map = snapshot.map;
+    std::vector<std::pair<BlockIndex, const Block*>> shown;
+    std::array<std::size_t, 256> voxels{};
+    BlockView view;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = map.find(index);
-      for (int offset = 0; block && offset < kBlockVoxels; ++offset) {
-        const VoxelView view = viewWithoutEntropy(map, *block, offset);
-        if (view.state != state_) continue;
-        const Eigen::Vector3d centre = map.geometry().voxelCentre(GridGeometry::voxelOf(index, offset));
-        if (!snapshot.heightInView(centre.z())) continue;
-        auto marker = markers.find(view.label);
-        if (marker == markers.end()) {
-          marker = markers.emplace(view.label, emptyMarker(snapshot, view.label)).first;
-        }
-        geometry_msgs::Point point;
-        point.x = centre.x();
-        point.y = centre.y();
-        point.z = centre.z();
-        marker->second.points.push_back(point);
-        marker->second.colors.push_back(
-            rgba(colorOf(view, centre.z(), snapshot.config.color_mode, snapshot.classes), alpha_));
-      }
+      if (!block) continue;
+      readBlock(map, *block, BlockFields::kStates, view);
+      bool any = false;
+      forEachShown(index, view, snapshot, [&](std::size_t v, double) {
+        ++voxels[view.label[v]];
+        any = true;
+      });
+      if (any) shown.emplace_back(index, block);
     }
+    Markers markers;
+    std::array<Marker*, 256> of_label{};
+    for (std::size_t label = 0; label < voxels.size(); ++label) {
+      if (voxels[label] == 0) continue;
+      const auto id = static_cast<ClassId>(label);
+      of_label[label] = &markers.emplace(id, emptyMarker(snapshot, id)).first->second;
+      of_label[label]->points.reserve(voxels[label]);
+      of_label[label]->colors.reserve(voxels[label]);
+    }
+    for (const auto& [index, block] : shown) {
+      readBlock(map, *block, fieldsOf(snapshot.config.color_mode), view);
+      addVoxels(index, view, snapshot, of_label);
+    }
+    return markers;
+  }
+
+  void addVoxels(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
+                 const std::array<Marker*, 256>& of_label) const {
+    forEachShown(index, view, snapshot, [&](std::size_t v, double z) {
+      Marker& marker = *of_label[view.label[v]];
+      const Eigen::Vector3d centre =
+          snapshot.map.geometry().voxelCentre(GridGeometry::voxelOf(index, static_cast<int>(v)));
+      geometry_msgs::Point point;
+      point.x = centre.x();
+      point.y = centre.y();
+      point.z = z;
+      marker.points.push_back(point);
+      marker.colors.push_back(
+          rgba(colorOf(view, v, z, snapshot.config.color_mode, snapshot.classes), alpha_));
+    });
   }
 
   Marker emptyMarker(const MapSnapshot& snapshot, ClassId label) const {

@@ -1,80 +1,55 @@
-#include <bki_mapping/VoxelCloudUpdate.h>
-#include <pcl_conversions/pcl_conversions.h>
-#include <sensor_msgs/PointCloud2.h>
-
-#include <algorithm>
-
-#include "bki_mapping/io/map_export.h"
-#include "io/voxel_pcl.h"
+#include "streamed_cloud.h"
 #include "updates.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
 
-/// Collects the known voxels of blocks, as points with the fields of PCD files.
-class CloudBuilder {
- public:
-  explicit CloudBuilder(const MapSnapshot& snapshot) : snapshot_(snapshot) {}
+/// All known voxels.
+VoxelSelection known() {
+  return {{VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}};
+}
 
-  void add(const BlockIndex& index, const Block& block) {
-    appendVoxels(snapshot_.map, snapshot_.classes,
-                 {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}, index, block, voxels_);
-  }
-  void addAll(bool in_view) {
-    for (const auto& [index, block] : sortedBlocks(snapshot_.map)) {
-      if (!in_view || snapshot_.inView(index)) add(index, *block);
-    }
-    const auto hidden = [&](const VoxelRecord& v) {
-      return !snapshot_.heightInView(static_cast<double>(v.z));
-    };
-    if (in_view) voxels_.erase(std::remove_if(voxels_.begin(), voxels_.end(), hidden), voxels_.end());
-  }
-  sensor_msgs::PointCloud2 cloud() const {
-    pcl::PCLPointCloud2 cloud = toPcl(voxels_);
-    sensor_msgs::PointCloud2 message;
-    pcl_conversions::moveFromPCL(cloud, message);
-    message.header = snapshot_.header;
-    return message;
-  }
-
- private:
-  const MapSnapshot& snapshot_;
-  std::vector<VoxelRecord> voxels_;
-};
+StreamedCloud cloudOf(const MapSnapshot& snapshot, const VoxelSelection& selection,
+                      VoxelPoints::Blocks blocks) {
+  return {snapshot.header, {snapshot.map, snapshot.classes, selection, std::move(blocks)}};
+}
 
 class VoxelCloud : public MapPublisher {
  public:
   explicit VoxelCloud(const PublisherContext& context) {
-    publisher_ = context.advertiseWhole<sensor_msgs::PointCloud2>("voxel_cloud", *this);
+    publisher_ = context.advertiseWhole<StreamedCloud>("voxel_cloud", *this);
   }
 
  private:
   void publishNew(const MapSnapshot& snapshot) override {
-    CloudBuilder builder(snapshot);
-    builder.addAll(true);
-    publisher_.publish(builder.cloud());
+    VoxelSelection in_view = known();
+    in_view.min_z = snapshot.config.view_min_z;
+    in_view.max_z = snapshot.config.view_max_z;
+    VoxelPoints::Blocks blocks = sortedBlocks(snapshot.map);
+    const auto hidden = [&](const auto& block) { return !snapshot.inView(block.first); };
+    blocks.erase(std::remove_if(blocks.begin(), blocks.end(), hidden), blocks.end());
+    publisher_.publish(cloudOf(snapshot, in_view, std::move(blocks)));
   }
 };
 
-class VoxelCloudUpdates : public UpdatePublisher<VoxelCloudUpdate> {
+class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
  public:
   explicit VoxelCloudUpdates(const PublisherContext& context)
       : UpdatePublisher(context, "voxel_cloud_updates") {}
 
  private:
-  void fillWhole(const MapSnapshot& snapshot, VoxelCloudUpdate& message) const override {
-    CloudBuilder builder(snapshot);
-    builder.addAll(false);
-    message.cloud = builder.cloud();
+  void fillWhole(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
+    message.cloud = cloudOf(snapshot, known(), sortedBlocks(snapshot.map));
   }
-  void fillChanges(const MapSnapshot& snapshot, VoxelCloudUpdate& message) const override {
-    CloudBuilder builder(snapshot);
+  void fillChanges(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
+    VoxelPoints::Blocks blocks;
+    blocks.reserve(changed.blocks().size());
     message.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {
       message.blocks.push_back(toMessage(index));
-      if (const Block* block = snapshot.map.find({index})) builder.add({index}, *block);
+      if (const Block* block = snapshot.map.find({index})) blocks.emplace_back(BlockIndex{index}, block);
     }
-    message.cloud = builder.cloud();
+    message.cloud = cloudOf(snapshot, known(), std::move(blocks));
   }
 };
 

@@ -1,0 +1,140 @@
+/// @file Maps in blocks as streamed messages.
+#pragma once
+
+#include <bki_mapping/OccupancyMap.h>
+#include <bki_mapping/OccupancyUpdate.h>
+
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "bki_mapping/map/map_query.h"
+#include "streamed_message.h"
+
+namespace bki_mapping::ros_interface {
+
+/// The field `blocks` of OccupancyMap and OccupancyUpdate. The map must outlive it, and not change.
+struct StreamedBlocks {
+  std::uint32_t bytes() const { return messageBytes(blocks.size(), kBytes); }
+  std::uint32_t count() const { return static_cast<std::uint32_t>(blocks.size()); }
+  void write(std::uint8_t* to) const {
+    constexpr std::size_t kBlocksPerJob = 64;
+    ThreadPool pool(publishingThreads(blocks.size()));
+    pool.forEach((blocks.size() + kBlocksPerJob - 1) / kBlocksPerJob, [&](std::size_t job, std::size_t) {
+      const std::size_t begin = job * kBlocksPerJob, end = std::min(blocks.size(), begin + kBlocksPerJob);
+      for (std::size_t b = begin; b < end; ++b) write(blocks[b].first, *blocks[b].second, to + b * kBytes);
+    });
+  }
+
+  const SemanticMap* map = nullptr;
+  std::vector<std::pair<BlockIndex, const Block*>> blocks;
+
+ private:
+  static constexpr std::size_t kBytes = 3 * sizeof(std::int32_t) + 2 * kBlockVoxels +
+                                        3 * sizeof(float) * kBlockVoxels;  ///< of an OccupancyBlock
+
+  void write(const BlockIndex& index, const Block& block, std::uint8_t* to) const {
+    BlockView view;
+    readBlock(*map, block, BlockFields::kAllButEntropy, view);
+    OccupancyBlock message;
+    message.x = index.x;
+    message.y = index.y;
+    message.z = index.z;
+    copy(view.state, message.state);
+    copy(view.label, message.label);
+    copy(view.probability, message.probability);
+    copy(view.occupancy, message.occupancy);
+    copy(view.class_probability, message.class_probability);
+    ros::serialization::OStream stream(to, kBytes);
+    stream.next(message);
+  }
+  template <typename From, typename To>
+  static void copy(const From& from, To& to) {
+    static_assert(sizeof(from) == sizeof(to));
+    std::memcpy(to.data(), from.data(), sizeof(to));
+  }
+};
+
+/// A bki_mapping/OccupancyMap.
+struct StreamedMap {
+  template <typename Visit>
+  void forEachMember(const Visit& visit) const {
+    visit(header);
+    visit(resolution);
+    visit(block_edge);
+    visit(classes);
+    visit(blocks);
+  }
+
+  std_msgs::Header header;
+  float resolution = 0.0f;
+  std::uint32_t block_edge = kBlockEdge;
+  std::vector<ClassInfo> classes;
+  StreamedBlocks blocks;
+};
+
+/// A bki_mapping/OccupancyUpdate.
+struct StreamedUpdate {
+  template <typename Visit>
+  void forEachMember(const Visit& visit) const {
+    visit(header);
+    visit(sequence);
+    visit(whole);
+    visit(resolution);
+    visit(block_edge);
+    visit(classes);
+    visit(blocks);
+    visit(removed);
+  }
+
+  std_msgs::Header header;
+  std::uint64_t sequence = 0;
+  std::uint8_t whole = false;
+  float resolution = 0.0f;
+  std::uint32_t block_edge = kBlockEdge;
+  std::vector<ClassInfo> classes;
+  StreamedBlocks blocks;
+  std::vector<BlockCoordinates> removed;
+};
+
+}  // namespace bki_mapping::ros_interface
+
+namespace ros {
+namespace message_traits {
+
+template <>
+struct MD5Sum<bki_mapping::ros_interface::StreamedMap>
+    : bki_mapping::ros_interface::SameTrait<MD5Sum<bki_mapping::OccupancyMap>> {};
+template <>
+struct DataType<bki_mapping::ros_interface::StreamedMap>
+    : bki_mapping::ros_interface::SameTrait<DataType<bki_mapping::OccupancyMap>> {};
+template <>
+struct Definition<bki_mapping::ros_interface::StreamedMap>
+    : bki_mapping::ros_interface::SameTrait<Definition<bki_mapping::OccupancyMap>> {};
+
+template <>
+struct MD5Sum<bki_mapping::ros_interface::StreamedUpdate>
+    : bki_mapping::ros_interface::SameTrait<MD5Sum<bki_mapping::OccupancyUpdate>> {};
+template <>
+struct DataType<bki_mapping::ros_interface::StreamedUpdate>
+    : bki_mapping::ros_interface::SameTrait<DataType<bki_mapping::OccupancyUpdate>> {};
+template <>
+struct Definition<bki_mapping::ros_interface::StreamedUpdate>
+    : bki_mapping::ros_interface::SameTrait<Definition<bki_mapping::OccupancyUpdate>> {};
+
+}  // namespace message_traits
+
+namespace serialization {
+
+template <>
+struct Serializer<bki_mapping::ros_interface::StreamedBlocks>
+    : bki_mapping::ros_interface::ArraySerializer<bki_mapping::ros_interface::StreamedBlocks> {};
+template <>
+struct Serializer<bki_mapping::ros_interface::StreamedMap>
+    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedMap> {};
+template <>
+struct Serializer<bki_mapping::ros_interface::StreamedUpdate>
+    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedUpdate> {};
+
+}  // namespace serialization
+}  // namespace ros
