@@ -135,7 +135,7 @@ VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {
 std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map) {
   std::vector<std::pair<BlockIndex, const Block*>> blocks;
   blocks.reserve(map.size());
-  for (const auto& entry : map.entries()) blocks.emplace_back(entry.index, entry.block.get());
+  for (const auto& [index, block] : map.entries()) blocks.emplace_back(index, block);
   std::sort(blocks.begin(), blocks.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return blocks;
 }

@@ -16,104 +16,125 @@ void growCapacity(std::size_t size, std::vector<T>& elements) {
 
 }  // namespace
 
-GridIndex SemanticMap::regionOf(const BlockIndex& block) {
-  static_assert(kRegionEdge == kBlockEdge, "blocks lie in a region as voxels lie in a block");
-  return GridGeometry::blockOf({block});
-}
-
-std::vector<std::uint32_t>& SemanticMap::regionAt(const BlockIndex& block) {
-  const std::uint32_t known = region_position_.find(regionOf(block));
-  if (known != kNoPosition) return regions_[known].entries;
+Region& SemanticMap::writableRegion(const BlockIndex& block) {
+  const GridIndex index = regionOf(block);
+  const std::uint32_t known = region_position_.find(index);
+  if (known != kNoPosition) {
+    SharedRegion& shared = regions_[known];
+    if (shared.shared) {
+      std::shared_ptr<Region> copy = shared.region->sharingCopy();
+      region_bytes_ += copy->bytes() - shared.region->bytes();
+      shared = {std::move(copy), false};
+    }
+    return *shared.region;
+  }
   // Allocate first, so that nothing after it can fail.
   growCapacity(regions_.size() + 1, regions_);
-  growCapacity(regions_.size() + spare_lists_.size() + 1, spare_lists_);
-  region_position_.insert(regionOf(block), static_cast<std::uint32_t>(regions_.size()));
-  regions_.push_back({regionOf(block), {}});
-  if (!spare_lists_.empty()) {
-    regions_.back().entries = std::move(spare_lists_.back());
-    spare_lists_.pop_back();
+  growCapacity(regions_.size() + spare_regions_.size() + 1, spare_regions_);
+  std::shared_ptr<Region> region = spare_regions_.empty() ? std::make_shared<Region>(index) : nullptr;
+  region_position_.insert(index, static_cast<std::uint32_t>(regions_.size()));
+  if (!region) {
+    region = std::move(spare_regions_.back());
+    spare_regions_.pop_back();
+    spare_bytes_ -= region->bytes();
+    region->reuseFor(index);
   }
-  return regions_.back().entries;
+  region_bytes_ += region->bytes();
+  regions_.push_back({std::move(region), false});
+  return *regions_.back().region;
 }
 
 void SemanticMap::dropIfEmpty(const BlockIndex& block) noexcept {
   const std::uint32_t position = region_position_.find(regionOf(block));
-  if (!regions_[position].entries.empty()) return;
-  spare_lists_.push_back(std::move(regions_[position].entries));
-  region_position_.erase(regions_[position].index);
+  const Region& region = *regions_[position].region;
+  if (region.size() > 0) return;
+  region_bytes_ -= region.bytes();
+  if (spare_regions_.size() < spare_regions_.capacity()) {
+    spare_bytes_ += region.bytes();
+    spare_regions_.push_back(std::move(regions_[position].region));
+  }
+  region_position_.erase(regionOf(block));
   if (position + 1 != regions_.size()) {
     regions_[position] = std::move(regions_.back());
-    region_position_.set(regions_[position].index, position);
+    region_position_.set(regions_[position].region->index(), position);
   }
   regions_.pop_back();
 }
 
 const Block* SemanticMap::find(const BlockIndex& index) const {
-  const std::uint32_t position = position_.find(index);
-  return position == kNoPosition ? nullptr : entries_[position].block.get();
+  const std::uint32_t position = region_position_.find(regionOf(index));
+  return position == kNoPosition ? nullptr : regions_[position].region->find(Region::numberOf(index));
 }
 
-void SemanticMap::append(const BlockIndex& index) {
-  // Allocate first, so that nothing after it can fail.
-  growCapacity(entries_.size() + 1, entries_);
-  growCapacity(entries_.size() + spare_.size() + 1, spare_);
-  std::vector<std::uint32_t>& region = regionAt(index);
+SemanticMap::Claim SemanticMap::claim(const BlockIndex& index) {
+  Region& region = writableRegion(index);
+  const int number = Region::numberOf(index);
+  if (Block* known = region.find(number)) return {known, false, !region.owns(number)};
   try {
-    growCapacity(region.size() + 1, region);
-    std::unique_ptr<Block> block = spare_.empty() ? std::make_unique<Block>() : nullptr;
-    position_.insert(index, static_cast<std::uint32_t>(entries_.size()));
-    if (!block) {
-      block = std::move(spare_.back());
-      spare_bytes_ -= block->bytes();
-      spare_.pop_back();
+    growCapacity(size_ + spare_blocks_.size() + 1, spare_blocks_);
+    const std::size_t before = region.bytes();
+    region.reserveOne();
+    region_bytes_ += region.bytes() - before;
+    if (spare_blocks_.empty()) {
+      region.insert(number, std::make_shared<Block>());
+    } else {
+      spare_bytes_ -= spare_blocks_.back()->bytes();
+      region.insert(number, std::move(spare_blocks_.back()));
+      spare_blocks_.pop_back();
     }
-    entries_.push_back({index, std::move(block), static_cast<std::uint32_t>(region.size())});
   } catch (...) {
     dropIfEmpty(index);
     throw;
   }
-  region.push_back(static_cast<std::uint32_t>(entries_.size() - 1));
+  ++size_;
+  return {region.find(number), true, false};
 }
 
-std::size_t SemanticMap::positionOf(const BlockIndex& index) {
-  const std::uint32_t position = position_.find(index);
-  if (position != kNoPosition) return position;
-  append(index);
-  return entries_.size() - 1;
+void SemanticMap::replace(const BlockIndex& index, std::shared_ptr<Block> block) noexcept {
+  writableRegion(index).replace(Region::numberOf(index), std::move(block));
 }
 
-void SemanticMap::erase(const BlockIndex& index) noexcept {
-  const std::uint32_t hole = position_.find(index);
-  if (hole == kNoPosition) return;
-  const auto removeFrom = [this](std::vector<std::uint32_t>& region, std::uint32_t position) {
-    region[position] = region.back();
-    entries_[region[position]].position_in_region = position;
-    region.pop_back();
-  };
-  removeFrom(regionAt(index), entries_[hole].position_in_region);
+Block& SemanticMap::getOrAllocate(const BlockIndex& index) {
+  const Claim claimed = claim(index);
+  if (!claimed.shared) return *claimed.block;
+  auto copy = std::make_shared<Block>(*claimed.block, 0);
+  Block& block = *copy;
+  replace(index, std::move(copy));
+  return block;
+}
+
+void SemanticMap::erase(const BlockIndex& index) {
+  if (!find(index)) return;
+  const int number = Region::numberOf(index);
+  Region& region = writableRegion(index);
+  const bool own = region.owns(number);
+  std::shared_ptr<Block> block = region.remove(number);
+  --size_;
   dropIfEmpty(index);
-  position_.erase(index);
-  if (entries_[hole].block->empty()) {
-    spare_bytes_ += entries_[hole].block->bytes();
-    spare_.push_back(std::move(entries_[hole].block));
-  }
-  if (hole + 1 != entries_.size()) {
-    Entry& last = entries_.back();
-    position_.set(last.index, hole);
-    regionAt(last.index)[last.position_in_region] = hole;
-    entries_[hole] = std::move(last);
-  }
-  entries_.pop_back();
+  if (!own || !block->empty() || spare_blocks_.size() == spare_blocks_.capacity()) return;
+  spare_bytes_ += block->bytes();
+  spare_blocks_.push_back(std::move(block));
 }
 
 void SemanticMap::clear() noexcept {
-  entries_ = decltype(entries_)();
-  position_ = GridTable();
   regions_ = decltype(regions_)();
   region_position_ = GridTable();
-  spare_ = decltype(spare_)();
-  spare_lists_ = decltype(spare_lists_)();
-  spare_bytes_ = 0;
+  size_ = 0;
+  spare_blocks_ = decltype(spare_blocks_)();
+  spare_regions_ = decltype(spare_regions_)();
+  region_bytes_ = spare_bytes_ = 0;
+}
+
+SemanticMap SemanticMap::snapshot() {
+  SemanticMap copy(geometry_, prior_, class_count_);
+  copy.free_gains_ = free_gains_;
+  copy.gain_persistence_ = gain_persistence_;
+  copy.region_position_ = region_position_;
+  copy.size_ = size_;
+  copy.region_bytes_ = region_bytes_;
+  for (SharedRegion& region : regions_) region.shared = true;
+  copy.regions_ = regions_;
+  return copy;
 }
 
 void SemanticMap::add(const SemanticMap& other) {
@@ -122,7 +143,7 @@ void SemanticMap::add(const SemanticMap& other) {
     throw std::invalid_argument(
         "maps can only be added if resolution, prior and number of classes are the same in both");
   }
-  for (const Entry& entry : other.entries_) {
+  for (const Entry& entry : other.entries()) {
     Block& block = getOrAllocate(entry.index);
     const auto& classes = entry.block->classes();
     for (std::size_t i = 0; i < classes.size(); ++i) block.add(classes[i], entry.block->plane(i));
@@ -132,17 +153,14 @@ void SemanticMap::add(const SemanticMap& other) {
 }
 
 std::size_t SemanticMap::indexBytes() const {
-  std::size_t sum = entries_.capacity() * sizeof(Entry) + position_.bytes() + region_position_.bytes() +
-                    regions_.capacity() * sizeof(regions_[0]) + spare_.capacity() * sizeof(spare_[0]) +
-                    spare_lists_.capacity() * sizeof(spare_lists_[0]) + spare_bytes_;
-  for (const Region& region : regions_) sum += region.entries.capacity() * sizeof(region.entries[0]);
-  for (const auto& list : spare_lists_) sum += list.capacity() * sizeof(list[0]);
-  return sum;
+  return region_bytes_ + spare_bytes_ + region_position_.bytes() + regions_.capacity() * sizeof(regions_[0]) +
+         spare_blocks_.capacity() * sizeof(spare_blocks_[0]) +
+         spare_regions_.capacity() * sizeof(spare_regions_[0]);
 }
 
 std::size_t SemanticMap::bytes() const {
   std::size_t sum = indexBytes();
-  for (const Entry& entry : entries_) sum += entry.block->bytes();
+  for (const Entry& entry : entries()) sum += entry.block->bytes();
   return sum;
 }
 

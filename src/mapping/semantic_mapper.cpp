@@ -165,7 +165,7 @@ void SemanticMapper::recover() noexcept {
   pipeline_ = nullptr;
   if (map_.size() == 0) map_.clear();  // frees what a refused scan has allocated for the index
   block_bytes_ = 0;
-  for (const SemanticMap::Entry& entry : map_.entries()) block_bytes_ += entry.block->bytes();
+  for (const auto& [index, block] : map_.entries()) block_bytes_ += block->bytes();
   returnMemory();
 }
 

@@ -23,20 +23,17 @@ void MapUpdater::setTasks(const ScanEvidence& scan) {
 }
 
 std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
-  const std::size_t size = map.size();
-  const std::size_t entry = map.positionOf(index);
-  const bool is_new = map.size() > size;
+  const std::uint32_t known = touched_.find(index);
+  if (known != kNoPosition) return known;
+  const SemanticMap::Claim claimed = map.claim(index);
   try {
-    if (job_of_entry_.size() <= entry) job_of_entry_.resize(std::max(entry + 1, 2 * job_of_entry_.size()));
-    const std::uint32_t known = job_of_entry_[entry];
-    if (known < jobs_.size() && jobs_[known].index == index) return known;
-    touched_.push_back(index);
-    jobs_.push_back({index, map.entries()[entry].block.get(), is_new, 0, false, 0});
+    touched_.insert(index);
+    jobs_.push_back({index, claimed.block, nullptr, claimed.is_new, claimed.shared, 0, false, 0});
   } catch (...) {
-    if (is_new) map.erase(index);
+    if (claimed.is_new) map.erase(index);
     throw;
   }
-  return job_of_entry_[entry] = static_cast<std::uint32_t>(jobs_.size() - 1);
+  return static_cast<std::uint32_t>(jobs_.size() - 1);
 }
 
 void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {
@@ -81,7 +78,12 @@ std::size_t MapUpdater::reservePlanes(BlockJob& job, std::size_t position) {
   const std::size_t count = classes.count();
   job.bytes_before = job.is_new ? 0 : job.block->bytes();
   for (const ClassId known : job.block->classes()) classes.reset(known);
-  job.block->reserve(classes.count());
+  if (job.is_shared) {
+    job.copy = std::make_shared<Block>(*job.block, classes.count());
+    job.block = job.copy.get();
+  } else {
+    job.block->reserve(classes.count());
+  }
   return count;
 }
 
@@ -120,9 +122,15 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
   }
 }
 
+void MapUpdater::useCopies(SemanticMap& map) noexcept {
+  for (BlockJob& job : jobs_) {
+    if (job.copy) map.replace(job.index, std::move(job.copy));
+  }
+}
+
 void MapUpdater::rollBack(SemanticMap& map) noexcept {
   for (const BlockJob& job : jobs_) {
-    job.block->shrink();
+    if (!job.is_shared) job.block->shrink();
     if (job.is_new) map.erase(job.index);
   }
   jobs_.clear();
@@ -193,6 +201,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   stats.collect_ms = watch.lap();
 
   // From here on nothing allocates memory, so that nothing can fail.
+  useCopies(map);
   const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], scan.withdraws, worker); };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add);

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <vector>
 
+#include "parallel/index_numbering.h"
 #include "parallel/runs_by_index.h"
 #include "update/evidence.h"
 #include "update/sum_kernels.h"
@@ -33,8 +35,8 @@ struct UpdateLimits {
 };
 
 /// Adds scans to maps in three phases: collect the touched blocks and create those that are missing, reserve
-/// all memory, then add the sums, one job for each group of blocks. Only the first two phases can fail; they
-/// are then undone. Keeps its memory from scan to scan.
+/// all memory and copy the blocks that a snapshot shares, then add the sums, one job for each group of
+/// blocks. Only the first two phases can fail; they are then undone. Keeps its memory from scan to scan.
 class MapUpdater {
  public:
   /// Adds a scan: hits, then free space, then marks. The result is the same to the bit for any number of
@@ -45,14 +47,15 @@ class MapUpdater {
                         const UpdateLimits& limits = UpdateLimits());
 
   /// The blocks that the last update may have changed, created or erased, each once.
-  const std::vector<GridIndex>& touched() const { return touched_; }
+  const std::vector<GridIndex>& touched() const { return touched_.members(); }
 
  private:
   /// A touched block of the map.
   struct BlockJob {
     BlockIndex index;
     Block* block;
-    bool is_new;
+    std::shared_ptr<Block> copy;  ///< to be written to instead of a block that a snapshot shares
+    bool is_new, is_shared;
     std::size_t bytes_before;  ///< memory of the block; 0 if it is new
     // Set after adding:
     bool empty;
@@ -99,6 +102,8 @@ class MapUpdater {
   /// Reserves the planes of a job's block. @param position of the job in jobs_.
   /// @return the number of classes to which this scan may add in the block.
   std::size_t reservePlanes(BlockJob& job, std::size_t position);
+  /// Puts the copies of shared blocks into the map.
+  void useCopies(SemanticMap& map) noexcept;
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   /// @param withdraws whether memory of planes that are gone is returned.
@@ -106,11 +111,8 @@ class MapUpdater {
   /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
 
-  std::vector<GridIndex> touched_;  ///< blocks, job by job
+  IndexNumbering touched_;  ///< blocks, in the order of jobs_
   std::vector<BlockJob> jobs_;
-  /// For each position in SemanticMap::entries(), the position of the block's job in jobs_. Entries may be
-  /// stale, from an earlier update; the index of the job tells.
-  std::vector<std::uint32_t> job_of_entry_;
   RunsByIndex<std::uint32_t> group_jobs_;  ///< jobs by group
   std::vector<Group> groups_;              ///< by falling cost
   std::vector<Task> tasks_;                ///< in the order of execution

@@ -6,12 +6,12 @@
 
 #include <atomic>
 #include <cstdlib>
-#include <cstring>
-#include <map>
 #include <new>
+#include <optional>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
+#include "reference/content.h"
 #include "reference/scenes.h"
 
 namespace {
@@ -71,6 +71,8 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
 namespace bki_mapping {
 namespace {
 
+using reference::contentOf;
+
 Scan everywhere() {
   for (const reference::Scene& scene : reference::nastyScenes(3000)) {
     if (scene.name == "everywhere") return scene.scan;
@@ -118,27 +120,16 @@ TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {
   EXPECT_GE(quiet, 15u);
 }
 
-/// The planes and the occlusion marks of each block as bytes.
-std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
-  std::map<GridIndex, std::string> content;
-  for (const auto& entry : map.entries()) {
-    std::string& text = content[entry.index];
-    for (std::size_t c = 0; c < entry.block->classes().size(); ++c) {
-      text += static_cast<char>(entry.block->classes()[c]);
-      text.append(reinterpret_cast<const char*>(entry.block->plane(c)), kBlockVoxels * sizeof(EvidenceUnits));
-    }
-    text += entry.block->occlusion().to_string();
-  }
-  return content;
-}
-
 /// Lets the first allocation of a scan fail, then the second, and so on, until the scan succeeds.
-/// @param on whether all later allocations fail, too.
-void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& second, bool on) {
+/// @param on whether all later allocations fail, too. @param shared whether a snapshot shares the blocks.
+void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& second, bool on,
+                    bool shared = false) {
   SemanticMapper whole(config, reference::smallTable()), failing(config, reference::smallTable());
   whole.integrate(first);
   failing.integrate(first);
   const auto before = contentOf(failing.map());
+  std::optional<SemanticMap> snapshot;
+  if (shared) snapshot = failing.snapshot();
   whole.integrate(second);
   const auto after = contentOf(whole.map());
   ASSERT_NE(before, after);
@@ -161,6 +152,9 @@ void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& s
   }
   EXPECT_EQ(contentOf(failing.map()), after);
   EXPECT_EQ(failing.mapBytes(), failing.map().bytes());
+  if (snapshot) {
+    EXPECT_EQ(contentOf(*snapshot), before);
+  }
   EXPECT_GT(failures, 50) << "too few allocations for the test to mean much";
 }
 
@@ -226,6 +220,28 @@ TEST(Allocation, AFailureOnOneOfTwoThreadsLeavesTheMapAsItWas) {
     failEverywhere(config, everywhere(), fewPoints(1), false);
     failEverywhere(config, fewPoints(1), everywhere(), false);  // the index grows, too
   }
+}
+
+TEST(Allocation, AFailureLeavesTheMapAndItsSnapshotAsTheyWere) {
+  for (const char* mode : {"linear", "line"}) {
+    MapperConfig config;
+    config.free_space.mode = mode;
+    config.threads = 1;
+    for (const bool on : {false, true}) failEverywhere(config, fewPoints(0), fewPoints(1), on, true);
+  }
+}
+
+TEST(Allocation, NoneInTheSteadyStateAfterASnapshotIsGone) {
+  const Scan scan = everywhere();
+  MapperConfig config;
+  config.threads = 1;
+  SemanticMapper mapper(config, reference::smallTable());
+  for (int n = 0; n < 3; ++n) mapper.integrate(scan);
+  {
+    const SemanticMap snapshot = mapper.snapshot();
+    EXPECT_GT(allocationsOf(mapper, scan), mapper.map().size()) << "blocks are copied";
+  }
+  EXPECT_EQ(allocationsOf(mapper, scan), 0u);
 }
 
 TEST(Allocation, BytesOfAMapAreWhatItTakes) {

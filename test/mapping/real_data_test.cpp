@@ -8,6 +8,7 @@
 
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/sequence.h"
+#include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
 #include "reference/reference.h"
@@ -21,13 +22,13 @@ void expectSampledVoxelsEqualBruteForce(const Scan& scan, const MapperConfig& co
   SemanticMapper mapper(config, classes);
   mapper.integrate(scan);
   const reference::ScanReference brute(scan, *classes, config);
-  const auto& entries = mapper.map().entries();
+  const auto blocks = sortedBlocks(mapper.map());
   std::mt19937 random(4);
   double free_seen = 0.0;
   for (int trial = 0; trial < 150; ++trial) {
     // Voxels of the map and, every fifth time, voxels one block above, which may lie outside the map.
     VoxelIndex voxel =
-        GridGeometry::voxelOf(entries[random() % entries.size()].index, static_cast<int>(random() % 512));
+        GridGeometry::voxelOf(blocks[random() % blocks.size()].first, static_cast<int>(random() % 512));
     if (trial % 5 == 4) voxel.z += kBlockEdge;
     const Block* block = mapper.map().find(GridGeometry::blockOf(voxel));
     for (int label = -1; label < 20; ++label) {

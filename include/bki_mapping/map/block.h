@@ -33,12 +33,23 @@ inline EvidenceUnits unitsOf(double evidence) {
   return static_cast<EvidenceUnits>(std::lround(evidence / static_cast<double>(kEvidenceUnit)));
 }
 
+/// What std::make_shared adds to an object [bytes].
+constexpr std::size_t kReferenceCountBytes = 2 * sizeof(void*);
+
 /// The evidence of 512 voxels: one plane for each class of which a voxel has evidence. A class without a
 /// plane has no evidence in the block: its concentrations equal the prior. Equal evidence means equal blocks,
 /// however it came together.
 class Block {
  public:
   using Occlusion = std::bitset<kBlockVoxels>;
+
+  Block() = default;
+  /// A copy with memory for the planes of further classes.
+  Block(const Block& other, std::size_t further_classes) : occlusion_(other.occlusion_) {
+    reserve(other.classes_.size() + further_classes);
+    classes_.assign(other.classes_.begin(), other.classes_.end());
+    planes_.assign(other.planes_.begin(), other.planes_.end());
+  }
 
   /// The classes with a plane, by rising id; may include kFreeClass.
   const std::vector<ClassId>& classes() const { return classes_; }
@@ -122,9 +133,10 @@ class Block {
   /// Whether the block holds no evidence and no occlusion marks.
   bool empty() const { return classes_.empty() && occlusion_.none(); }
 
-  /// Memory of the block, including this object [bytes].
+  /// Memory of the block, including this object and its reference count [bytes].
   std::size_t bytes() const {
-    return sizeof(*this) + planes_.capacity() * sizeof(EvidenceUnits) + classes_.capacity() * sizeof(ClassId);
+    return sizeof(*this) + kReferenceCountBytes + planes_.capacity() * sizeof(EvidenceUnits) +
+           classes_.capacity() * sizeof(ClassId);
   }
 
  private:

@@ -1,4 +1,5 @@
-/// @file The map: a sparse grid of blocks. (The state of a voxel: map_query.h.)
+/// @file The map: a sparse grid of blocks, shared with its snapshots and copied when written. (The state of a
+/// voxel: map_query.h.)
 #pragma once
 
 #include <array>
@@ -10,18 +11,20 @@
 #include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/map/block.h"
+#include "bki_mapping/map/region.h"
 
 namespace bki_mapping {
 
 /// A sparse grid of Dirichlet posteriors. A voxel's concentrations are alpha[k] = prior + evidence[k] for
-/// every class of the table and for `free`.
+/// every class of the table and for `free`. Maps and their snapshots share what they have in common: a map
+/// copies a region or a block before it writes to it for the first time after a snapshot.
 class SemanticMap {
  public:
   struct Entry {
     BlockIndex index;
-    std::unique_ptr<Block> block;
-    std::uint32_t position_in_region;  ///< in the region's list
+    const Block* block;
   };
+  class Entries;
 
   /// @param prior concentration alpha0 of each class before any scan, > 0.
   /// @param class_count number of classes in the table, `free` not counted, 1 to 254.
@@ -49,35 +52,51 @@ class SemanticMap {
   /// @param persistence in units of evidence; 0: gains do not decay.
   void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
 
-  /// All blocks, in unspecified order.
-  const std::vector<Entry>& entries() const { return entries_; }
-  std::size_t size() const { return entries_.size(); }
+  /// All blocks, in unspecified order: a range for `for (const auto& [index, block] : map.entries())`.
+  Entries entries() const;
+  std::size_t size() const { return size_; }
+
+  /// The same map, as it stays: nothing that happens to this one shows in it. Takes time and memory for each
+  /// region, not for each block; a block is copied when this map next writes to it. Snapshots may be read and
+  /// destroyed in any thread while this map is written to in another one.
+  SemanticMap snapshot();
 
   /// @return nullptr if the map has no such block.
   const Block* find(const BlockIndex& index) const;
-  /// The block with this index, which is created if missing.
-  Block& getOrAllocate(const BlockIndex& index) { return *entries_[positionOf(index)].block; }
-  /// The position of a block in entries(); the block is created if missing. The position is valid until a
-  /// block is erased. @throws std::bad_alloc; the map is then unchanged.
-  std::size_t positionOf(const BlockIndex& index);
-  void erase(const BlockIndex& index) noexcept;
+  /// The block with this index, to be written to. It is created if missing, and copied if it is shared.
+  /// @throws std::bad_alloc; the map is then unchanged.
+  Block& getOrAllocate(const BlockIndex& index);
+
+  /// A block that is going to be written to.
+  struct Claim {
+    Block* block;
+    bool is_new;
+    bool shared;  ///< with a snapshot: write to a copy, and replace the block by the copy
+  };
+  /// As getOrAllocate(), but leaves it to the caller to copy a shared block, so that many can be copied at
+  /// once. After this, replace() allocates nothing, until the next snapshot.
+  Claim claim(const BlockIndex& index);
+  /// Replaces a claimed block.
+  void replace(const BlockIndex& index, std::shared_ptr<Block> block) noexcept;
+
+  /// Erases a block if the map has it. Allocates nothing after a claim() of the block.
+  /// @throws std::bad_alloc; the map is then unchanged.
+  void erase(const BlockIndex& index);
   /// Erases all blocks, and frees their memory and that of the index.
   void clear() noexcept;
 
-  /// Edge of a region, a cube of blocks [blocks]. Blocks are also listed by region.
-  static constexpr int kRegionEdge = 8;
-  static GridIndex regionOf(const BlockIndex& block);
+  static GridIndex regionOf(const BlockIndex& block) { return Region::regionOf(block); }
 
   /// Calls visit(index) for every block within `radius` of a point, and for some farther ones. The cost
   /// depends on the number of blocks near the point, not on the size of the map.
   /// @param point map frame [m]. @param radius [m].
   template <typename Visit>
   void forEachBlockNear(const Eigen::Vector3d& point, double radius, Visit&& visit) const {
-    const double edge = kRegionEdge * geometry_.blockSize();
+    const double edge = Region::kEdge * geometry_.blockSize();
     const Eigen::Array3d low = ((point.array() - radius) / edge).floor();
     const Eigen::Array3d high = ((point.array() + radius) / edge).floor();
     if (!((high - low + 1.0).prod() < static_cast<double>(regions_.size()))) {
-      for (const Entry& entry : entries_) visit(entry.index);
+      for (const SharedRegion& shared : regions_) shared.region->forEachIndex(visit);
       return;
     }
     const Eigen::Array3i first = low.cast<int>(), last = high.cast<int>();
@@ -85,8 +104,7 @@ class SemanticMap {
       for (int y = first.y(); y <= last.y(); ++y) {
         for (int x = first.x(); x <= last.x(); ++x) {
           const std::uint32_t region = region_position_.find({x, y, z});
-          if (region == kNoPosition) continue;
-          for (const std::uint32_t entry : regions_[region].entries) visit(entries_[entry].index);
+          if (region != kNoPosition) regions_[region].region->forEachIndex(visit);
         }
       }
     }
@@ -96,21 +114,20 @@ class SemanticMap {
   /// @throws std::invalid_argument if the resolution, the prior or the number of classes differs.
   void add(const SemanticMap& other);
 
-  /// Allocated memory of all blocks and of the index [bytes].
+  /// Memory of all blocks and of the index [bytes], including what is shared with snapshots.
   std::size_t bytes() const;
-  /// The part of bytes() that does not belong to the blocks in entries(). Linear in the number of regions.
+  /// The part of bytes() that does not belong to the blocks in entries().
   std::size_t indexBytes() const;
 
  private:
-  struct Region {
-    GridIndex index;
-    std::vector<std::uint32_t> entries;  ///< its blocks, by position in entries_
+  /// Regions are never empty.
+  struct SharedRegion {
+    std::shared_ptr<Region> region;
+    bool shared;  ///< with a snapshot: must not be written to
   };
 
-  /// Adds a block that the map does not have. @throws std::bad_alloc; the map is then unchanged.
-  void append(const BlockIndex& index);
-  /// The list of the blocks in the region of a block; the region is created if missing.
-  std::vector<std::uint32_t>& regionAt(const BlockIndex& block);
+  /// The region of a block, to be written to. It is created if missing, and copied if it is shared.
+  Region& writableRegion(const BlockIndex& block);
   /// Erases the region of a block if it is empty.
   void dropIfEmpty(const BlockIndex& block) noexcept;
 
@@ -119,14 +136,64 @@ class SemanticMap {
   std::size_t class_count_;
   std::array<float, 256> free_gains_;
   float gain_persistence_ = 0.0f;
-  std::vector<Entry> entries_;
-  GridTable position_;  ///< of each block in entries_
-  std::vector<Region> regions_;
+  std::vector<SharedRegion> regions_;
   GridTable region_position_;  ///< of each region in regions_
-  // The capacity of both suffices for all present blocks and regions, so that erasing allocates nothing:
-  std::vector<std::unique_ptr<Block>> spare_;            ///< empty blocks, to be reused
-  std::vector<std::vector<std::uint32_t>> spare_lists_;  ///< lists of erased regions, to be reused
-  std::size_t spare_bytes_ = 0;                          ///< memory of the blocks in spare_
+  std::size_t size_ = 0;       ///< number of blocks
+  // Their capacity suffices for the blocks and regions that were added here, so that erasing allocates
+  // nothing:
+  std::vector<std::shared_ptr<Block>> spare_blocks_;    ///< empty ones, to be reused
+  std::vector<std::shared_ptr<Region>> spare_regions_;  ///< empty ones, to be reused
+  std::size_t region_bytes_ = 0;                        ///< memory of the regions, also of those to be reused
+  std::size_t spare_bytes_ = 0;                         ///< memory of the blocks in spare_blocks_
 };
+
+/// The blocks of a map, region by region.
+class SemanticMap::Entries {
+ public:
+  class Iterator {
+   public:
+    Iterator(const std::vector<SharedRegion>& regions, std::size_t region)
+        : regions_(&regions), region_(region) {
+      if (region_ < regions_->size()) moveToNext(0);
+    }
+    Entry operator*() const {
+      const Region& region = *(*regions_)[region_].region;
+      return {region.blockIndex(number_), region.find(number_)};
+    }
+    Iterator& operator++() {
+      moveToNext(number_ + 1);
+      return *this;
+    }
+    bool operator!=(const Iterator& other) const {
+      return region_ != other.region_ || number_ != other.number_;
+    }
+
+   private:
+    /// Moves to the first present block from a number on.
+    void moveToNext(int number) {
+      const Region& region = *(*regions_)[region_].region;
+      while (number < Region::kBlocks && !region.has(number)) ++number;
+      number_ = number;
+      if (number < Region::kBlocks) return;
+      number_ = 0;
+      if (++region_ < regions_->size()) moveToNext(0);  // at most once: regions are never empty
+    }
+
+    const std::vector<SharedRegion>* regions_;
+    std::size_t region_;
+    int number_ = 0;
+  };
+
+  explicit Entries(const std::vector<SharedRegion>& regions) : regions_(regions) {}
+  Iterator begin() const { return Iterator(regions_, 0); }
+  Iterator end() const { return Iterator(regions_, regions_.size()); }
+
+ private:
+  const std::vector<SharedRegion>& regions_;
+};
+
+inline SemanticMap::Entries SemanticMap::entries() const {
+  return Entries(regions_);
+}
 
 }  // namespace bki_mapping

@@ -48,14 +48,19 @@ class SemanticMapper {
   template <typename Forget>
   std::vector<GridIndex> eraseBlocks(Forget&& forget) {
     std::vector<GridIndex> erased;
-    for (const SemanticMap::Entry& entry : map_.entries()) {
-      if (!forget(entry.index)) continue;
-      erased.push_back(entry.index);
-      block_bytes_ -= entry.block->bytes();
+    for (const auto& [index, block] : map_.entries()) {
+      if (forget(index)) erased.push_back(index);
     }
-    for (const GridIndex& index : erased) map_.erase({index});
+    for (const GridIndex& index : erased) {
+      const std::size_t bytes = map_.find({index})->bytes();
+      map_.erase({index});
+      block_bytes_ -= bytes;
+    }
     return erased;
   }
+
+  /// The map as it is now, for other threads and for later (SemanticMap::snapshot).
+  SemanticMap snapshot() { return map_.snapshot(); }
 
   /// The blocks that the last integrate() or withdraw() may have changed, created or erased, each once.
   const std::vector<GridIndex>& touchedBlocks() const;

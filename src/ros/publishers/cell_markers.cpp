@@ -59,7 +59,7 @@ BlockFields fieldsOf(ColorMode mode) {
   return numbers ? BlockFields::kAllButEntropy : BlockFields::kStates;
 }
 
-constexpr int kRegionEdge = SemanticMap::kRegionEdge;
+constexpr int kRegionEdge = Region::kEdge;
 constexpr std::size_t kBlocksOfRegion = 64;  // of a street; there is room for 512
 
 /// Marker arrays with one CUBE_LIST per class and region of the map: its namespace is the class's name, its

@@ -1,0 +1,25 @@
+/// @file What a map holds, to be compared to the bit.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "bki_mapping/map/semantic_map.h"
+
+namespace bki_mapping::reference {
+
+/// The classes, the planes and the occlusion marks of each block as bytes.
+inline std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
+  std::map<GridIndex, std::string> content;
+  for (const auto& [index, block] : map.entries()) {
+    std::string& text = content[index];
+    for (std::size_t c = 0; c < block->classes().size(); ++c) {
+      text += static_cast<char>(block->classes()[c]);
+      text.append(reinterpret_cast<const char*>(block->plane(c)), kBlockVoxels * sizeof(EvidenceUnits));
+    }
+    text += block->occlusion().to_string();
+  }
+  return content;
+}
+
+}  // namespace bki_mapping::reference
