@@ -4,13 +4,17 @@
 #include <topic_tools/shape_shifter.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <fstream>
 #include <iostream>
+#include <thread>
 
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/stopwatch.h"
-#include "ros/map_publisher.h"
+#include "ros/publisher_set.h"
+#include "ros/snapshot_request.h"
 #include "simulation/lidar.h"
 #include "tools/options.h"
 
@@ -28,40 +32,68 @@ po::options_description options() {
                              "scans between two publications")(
       "csv", po::value<std::string>()->value_name("FILE"), "table of all times")(
       "view-range", tools::realOption("--view-range", 0.0)->value_name("M")->default_value(0.0),
-      "parameter view_range [m]");
+      "parameter view_range [m]")("waits", tools::realOption("--waits", 0.1)->value_name("HZ"),
+                                  "instead, send scans at this rate, without and with subscribers, and "
+                                  "measure how long each takes to be in the map; keeps all scans in memory");
   return options;
 }
 
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
+/// @param share 0 for the smallest value, 1 for the largest.
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+}
+double median(const std::vector<double>& values) {
+  return quantile(values, 0.5);
 }
 
-int measure(const po::variables_map& given) {
+/// Receives all topics of this node and drops what it receives.
+class Listener {
+ public:
+  Listener() { node_.setCallbackQueue(&unread_); }
+  void subscribe(const std::string& topic) {
+    const boost::function<void(const topic_tools::ShapeShifter::ConstPtr&)> ignore =
+        [](const topic_tools::ShapeShifter::ConstPtr&) {};
+    subscribers_.push_back(node_.subscribe(topic, 1, ignore));
+  }
+  /// Subscribes to the map topics, and waits until their publishers know.
+  void subscribeToAll() {
+    ros::master::V_TopicInfo topics;
+    ros::master::getTopics(topics);
+    for (const auto& topic : topics) {
+      if (topic.name.rfind(node_.getNamespace() + '/', 0) == 0) subscribe(topic.name);
+    }
+    const auto connected = [](const ros::Subscriber& s) { return s.getNumPublishers() > 0; };
+    while (ros::ok() && !std::all_of(subscribers_.begin(), subscribers_.end(), connected)) {
+      ros::WallDuration(0.05).sleep();
+    }
+  }
+  void dropMessages() { unread_.clear(); }
+
+ private:
+  ros::NodeHandle node_{"~"};
+  ros::CallbackQueue unread_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+int measureTopics(const po::variables_map& given) {
   const auto scans = tools::count(given, "scans");
   const auto every = tools::count(given, "every");
   ServerConfig config;
   config.view_range = given["view-range"].as<double>();
   SemanticMapper mapper(MapperConfig(), std::make_shared<const ClassTable>(loadClassTable(config.classes)));
-  std::vector<geometry_msgs::PoseStamped> trajectory;
+  std::vector<SensorPose> trajectory;
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
   ros::NodeHandle node("~");
-  ros::CallbackQueue connections, unread;
+  ros::CallbackQueue connections;
   node.setCallbackQueue(&connections);
   const auto snapshot = [&] {
-    return MapSnapshot{{}, mapper.map(), mapper.classes(), trajectory, config, sensor};
+    return std::make_shared<const MapSnapshot>(
+        MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor});
   };
   const auto publishers = makePublishers({node, config, snapshot});
-
-  ros::NodeHandle listener("~");
-  listener.setCallbackQueue(&unread);
-  std::vector<ros::Subscriber> subscribers;
-  for (const auto& publisher : publishers) {
-    const boost::function<void(const topic_tools::ShapeShifter::ConstPtr&)> ignore =
-        [](const topic_tools::ShapeShifter::ConstPtr&) {};
-    subscribers.push_back(listener.subscribe(publisher->topic(), 1, ignore));
-  }
+  Listener listener;
+  for (const auto& publisher : publishers) listener.subscribe(publisher->topic());
   const auto all = [&] {
     return std::all_of(publishers.begin(), publishers.end(), [](const auto& p) { return p->wanted(); });
   };
@@ -73,6 +105,7 @@ int measure(const po::variables_map& given) {
   if (given.count("csv") > 0) csv.open(given["csv"].as<std::string>());
   csv << "topic,scan,blocks,ms\n";
   std::vector<std::vector<double>> times(publishers.size());
+  std::vector<double> snapshots;
   std::vector<std::size_t> blocks;
   for (std::size_t i = 0; i < scans && ros::ok(); ++i) {
     const Scan scan = drive.frame(i).scan();
@@ -82,28 +115,97 @@ int measure(const po::variables_map& given) {
     for (const auto& publisher : publishers) publisher->changed.add(mapper.touchedBlocks());
     if (i % every != 0) continue;
     blocks.push_back(mapper.map().size());
+    Stopwatch watch;
+    const auto now = snapshot();
+    snapshots.push_back(watch.lap());
     for (std::size_t p = 0; p < publishers.size(); ++p) {
-      Stopwatch watch;
-      publishers[p]->publish(snapshot());
+      watch.lap();
+      publishers[p]->publish(*now);
       times[p].push_back(watch.lap());
       csv << publishers[p]->topic() << ',' << i << ',' << blocks.back() << ',' << times[p].back() << '\n';
     }
-    unread.clear();
+    listener.dropMessages();
     tools::showProgress(i + 1, scans, "scans");
   }
   csv.close();
   if (given.count("csv") > 0 && !csv) throw std::runtime_error("the CSV file cannot be written");
   // The first fifth against the last shows which times grow with the map.
-  const std::size_t n = times[0].size(), fifth = std::max<std::size_t>(n / 5, 1);
+  const std::size_t n = snapshots.size(), fifth = std::max<std::size_t>(n / 5, 1);
+  const auto print = [&](const std::string& name, const std::vector<double>& of_all) {
+    const auto part = static_cast<std::ptrdiff_t>(fifth);
+    std::printf("%-60s %10.2f %10.2f\n", name.c_str(), median({of_all.begin(), of_all.begin() + part}),
+                median({of_all.end() - part, of_all.end()}));
+  };
   std::printf("map: %zu blocks after %zu scans, %zu in the end\n", blocks[fifth / 2], (fifth / 2) * every,
               blocks.back());
   std::printf("%-60s %10s %10s\n", "topic: median time to build and send [ms]", "first 5th", "last 5th");
-  for (std::size_t p = 0; p < publishers.size(); ++p) {
-    const auto begin = times[p].begin();
-    const std::vector<double> first(begin, begin + static_cast<std::ptrdiff_t>(fifth));
-    const std::vector<double> last(times[p].end() - static_cast<std::ptrdiff_t>(fifth), times[p].end());
-    std::printf("%-60s %10.2f %10.2f\n", publishers[p]->topic().c_str(), median(first), median(last));
+  print("snapshot", snapshots);
+  for (std::size_t p = 0; p < publishers.size(); ++p) print(publishers[p]->topic(), times[p]);
+  return 0;
+}
+
+/// Maps scans that come at a fixed rate. @return for each, the time from its coming to its being in the map
+/// [ms].
+std::vector<double> waits(const std::vector<Scan>& scans, double rate, bool listens) {
+  const ServerConfig config;
+  SemanticMapper mapper(MapperConfig(), std::make_shared<const ClassTable>(loadClassTable(config.classes)));
+  std::vector<SensorPose> trajectory;
+  Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
+  ros::CallbackQueue queue;
+  PublisherSet* publishers = nullptr;
+  const auto snapshot = [&] {
+    publishers->closeChanges();
+    return MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor};
+  };
+  std::vector<double> waits;
+  std::atomic<bool> mapped{false}, done{false};
+  PublisherSet publishing(ros::NodeHandle("~"), config,
+                          [&] { return SnapshotRequest::ask(queue, snapshot); });
+  publishers = &publishing;
+  publishing.start();
+  Listener listener;
+  std::thread mapping([&] {
+    const auto start = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+    for (const Scan& scan : scans) {
+      const std::chrono::duration<double> after(static_cast<double>(waits.size()) / rate);
+      const auto comes = start + std::chrono::duration_cast<std::chrono::nanoseconds>(after);
+      const auto since = [&] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - comes).count();
+      };
+      while (since() < 0.0) queue.callAvailable(ros::WallDuration(-since()));
+      queue.callAvailable();
+      mapper.integrate(scan);
+      waits.push_back(1e3 * since());
+      sensor = scan.origin;
+      trajectory.emplace_back();
+      publishing.changed(mapper.touchedBlocks());
+      tools::showProgress(waits.size(), scans.size(), "scans");
+    }
+    mapped = true;
+    while (!done) queue.callAvailable(ros::WallDuration(0.01));  // the publishers may still ask
+  });
+  if (listens) listener.subscribeToAll();
+  while (!mapped) {
+    ros::WallDuration(0.05).sleep();
+    listener.dropMessages();
   }
+  publishing.stop();
+  done = true;
+  mapping.join();
+  std::printf("%s: %zu blocks; wait of a scan [ms]: median %.1f, 90 %% %.1f, 99 %% %.1f, worst %.1f\n",
+              listens ? "all topics subscribed" : "no subscriber       ", mapper.map().size(),
+              quantile(waits, 0.5), quantile(waits, 0.9), quantile(waits, 0.99), quantile(waits, 1.0));
+  return waits;
+}
+
+int measureWaits(const po::variables_map& given) {
+  const auto count = tools::count(given, "scans");
+  const simulation::Drive drive({static_cast<int>(count), 8.0, 1, {}});
+  std::vector<Scan> scans;
+  for (std::size_t i = 0; i < count; ++i) scans.push_back(drive.frame(i).scan());
+  const double rate = given["waits"].as<double>();
+  const double without = quantile(waits(scans, rate, false), 0.99);
+  std::printf("99 %%: ratio %.2f\n", quantile(waits(scans, rate, true), 0.99) / without);
   return 0;
 }
 
@@ -119,6 +221,6 @@ int main(int argc, char** argv) {
                      options());
     if (!given) return 0;
     if (!ros::master::check()) throw std::runtime_error("no ROS master is running; start roscore");
-    return measure(*given);
+    return given->count("waits") > 0 ? measureWaits(*given) : measureTopics(*given);
   });
 }

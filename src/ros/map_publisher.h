@@ -1,47 +1,21 @@
 /// @file MapPublisher, the publisher of one map topic. PublisherSet owns one for each topic.
 #pragma once
 
-#include <geometry_msgs/PoseStamped.h>
 #include <ros/console.h>
 #include <ros/node_handle.h>
 #include <ros/single_subscriber_publisher.h>
-#include <std_msgs/Header.h>
 
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/semantic_map.h"
 #include "parallel/index_numbering.h"
-#include "ros/server_config.h"
+#include "ros/map_snapshot.h"
 
 namespace bki_mapping::ros_interface {
-
-/// The state of the server from which messages are built.
-struct MapSnapshot {
-  std_msgs::Header header;  ///< map frame, stamp of the last scan
-  const SemanticMap& map;
-  const ClassTable& classes;
-  const std::vector<geometry_msgs::PoseStamped>& trajectory;  ///< sensor poses of integrated scans
-  const ServerConfig& config;
-  Eigen::Vector3d sensor;  ///< origin of the last scan, map frame [m]
-
-  /// Whether a cube is within view_range of the sensor; true without such a limit.
-  /// @param edge of the cube [m].
-  bool inView(const Eigen::Vector3d& centre, double edge) const {
-    const double beyond = (centre - sensor).cwiseAbs().maxCoeff() - 0.5 * edge;
-    return config.view_range <= 0.0 || beyond <= config.view_range;
-  }
-  /// Whether a height is between view_min_z and view_max_z.
-  bool heightInView(double z) const { return z >= config.view_min_z && z <= config.view_max_z; }
-  bool inView(const BlockIndex& block) const {
-    const GridGeometry& geometry = map.geometry();
-    return inView(geometry.blockCentre(block), geometry.blockSize());
-  }
-};
 
 /// The blocks that changed since the last publication.
 class ChangedBlocks {
@@ -50,6 +24,7 @@ class ChangedBlocks {
     if (all_) return;
     for (const GridIndex& block : blocks) blocks_.insert(block);
   }
+  void add(const ChangedBlocks& changed) { changed.all() ? addAll() : add(changed.blocks()); }
   void addAll() {
     all_ = true;
     blocks_.clear();
@@ -68,7 +43,8 @@ class ChangedBlocks {
   bool all_ = false;
 };
 
-/// Publishes one topic. Builds messages only while the topic has subscribers.
+/// Publishes one topic. Builds messages only while the topic has subscribers. Runs in the thread of
+/// PublisherSet.
 class MapPublisher {
  public:
   virtual ~MapPublisher() = default;
@@ -98,6 +74,7 @@ class MapPublisher {
   virtual void startOver() { changed.addAll(); }
 
   ChangedBlocks changed;
+  std::chrono::steady_clock::time_point next;  ///< earliest next publication
 
  protected:
   virtual void publishNew(const MapSnapshot& snapshot) = 0;
@@ -107,9 +84,10 @@ class MapPublisher {
 
 /// What the constructor of a publisher needs.
 struct PublisherContext {
-  ros::NodeHandle& node;
+  ros::NodeHandle& node;  ///< its callback queue is served by the thread of the publishers
   const ServerConfig& config;
-  std::function<MapSnapshot()> snapshot;  ///< returns the present state
+  /// Lists all changes in the publishers' `changed`, and returns the state that has them.
+  std::function<std::shared_ptr<const MapSnapshot>()> snapshot;
 
   /// Advertises a topic with whole maps: a new subscriber makes `owner` publish again.
   template <typename Message>
@@ -124,9 +102,9 @@ struct PublisherContext {
   ros::Publisher advertiseUpdates(const std::string& topic, MapPublisher& owner, Send&& send) const {
     const auto connected = [&owner, send, make = snapshot](const ros::SingleSubscriberPublisher& subscriber) {
       owner.tryTo([&] {
-        const MapSnapshot now = make();
-        if (!owner.changed.empty()) owner.publish(now);
-        send(subscriber, now);
+        const std::shared_ptr<const MapSnapshot> now = make();
+        if (!owner.changed.empty()) owner.publish(*now);
+        send(subscriber, *now);
       });
     };
     return advertise<Message>(topic, connected, false);

@@ -7,6 +7,7 @@
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/mapping/parameters.h"
 #include "ros/pose_conversion.h"
+#include "ros/snapshot_request.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -27,8 +28,12 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   for (const std::string& warning : settingWarnings(mapper_config)) ROS_WARN("%s", warning.c_str());
 
   poses_ = std::make_unique<PoseSource>(node_);
-  publishing_ =
-      std::make_unique<PublisherSet>(PublisherContext{node_, config_, [this] { return snapshot(); }});
+  publishing_ = std::make_unique<PublisherSet>(node_, config_, [this] {
+    return SnapshotRequest::ask(queue_, [this] {
+      publishing_->closeChanges();
+      return snapshot();
+    });
+  });
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
   offerServices();
@@ -39,9 +44,14 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
       [this] { status_publisher_.publish(status()); });
   status_publisher_.publish(status());
   thread_ = std::thread(&MappingServer::work, this);
+  publishing_->start();
+  saving_.start();
 }
 
 MappingServer::~MappingServer() {
+  // First those who ask for snapshots, while the mapping thread still answers.
+  saving_.stop();
+  publishing_->stop();
   running_ = false;
   thread_.join();
   const std::string summary = ledger_.summary(waiting_.size());
@@ -90,7 +100,6 @@ void MappingServer::work() {
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
     checkClock();
     processQueue();
-    publishing_->publishDue(snapshot());
     diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
   }
 }
@@ -177,7 +186,7 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   warnOfFarPoints(waiting.input, stats.counts.beyond_max);
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
-  appendPose(header, placed.T_map_sensor);
+  appendPose(header.stamp, placed.T_map_sensor);
   publishing_->changed(mapper_->touchedBlocks());
   moveWindow();
   status_publisher_.publish(status());
@@ -192,18 +201,14 @@ void MappingServer::warnOfFarPoints(std::size_t input, std::size_t count) {
       count, cloud_subscribers_[input].getTopic().c_str(), SensorModelConfig::kFarthest);
 }
 
-void MappingServer::appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor) {
-  geometry_msgs::PoseStamped sensor;
-  sensor.header.frame_id = config_.frame_id;
-  sensor.header.stamp = header.stamp;
-  sensor.pose = toPose(T_map_sensor);
+void MappingServer::appendPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor) {
   // Keeps one pose, not thousands, while the robot stands still.
   if (trajectory_.size() > 1) {
     const auto& last = trajectory_[trajectory_.size() - 2].pose.position;
     const Eigen::Vector3d moved = T_map_sensor.translation() - Eigen::Vector3d(last.x, last.y, last.z);
     if (moved.norm() < mapper_->config().resolution) trajectory_.pop_back();
   }
-  trajectory_.push_back(sensor);
+  trajectory_.push_back({stamp, toPose(T_map_sensor)});
 }
 
 void MappingServer::moveWindow() {
@@ -215,8 +220,8 @@ void MappingServer::moveWindow() {
   };
   publishing_->changed(
       mapper_->eraseBlocks([&](const BlockIndex& block) { return outside(geometry.blockCentre(block)); }));
-  const auto left = [&](const geometry_msgs::PoseStamped& pose) {
-    const auto& p = pose.pose.position;
+  const auto left = [&](const SensorPose& sensor) {
+    const auto& p = sensor.pose.position;
     return outside({p.x, p.y, p.z});
   };
   trajectory_.erase(std::remove_if(trajectory_.begin(), trajectory_.end(), left), trajectory_.end());
@@ -278,11 +283,15 @@ MappingStatus MappingServer::status() {
   return status;
 }
 
-MapSnapshot MappingServer::snapshot() const {
-  MapSnapshot snapshot{std_msgs::Header(), mapper_->map(), mapper_->classes(), trajectory_, config_, sensor_};
+MapSnapshot MappingServer::snapshot() {
+  MapSnapshot snapshot{{}, mapper_->snapshot(), mapper_->classes(), trajectory_, config_, sensor_};
   snapshot.header.frame_id = config_.frame_id;
   snapshot.header.stamp = map_stamp_;
   return snapshot;
+}
+
+std::shared_ptr<const MapSnapshot> MappingServer::askForSnapshot() {
+  return SnapshotRequest::ask(queue_, [this] { return snapshot(); });
 }
 
 }  // namespace bki_mapping::ros_interface

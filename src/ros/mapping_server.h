@@ -27,8 +27,10 @@
 
 namespace bki_mapping::ros_interface {
 
-/// Owns a mapper and one thread. All callbacks and publishers run on this thread, by a callback queue of its
-/// own, so that mapping never blocks the threads of a nodelet manager.
+/// Owns a mapper and three threads, each with a callback queue of its own, so that mapping never blocks the
+/// threads of a nodelet manager. The mapping thread takes clouds and adds them to the map; it alone touches
+/// the mapper. The map topics and ~save_map have a thread each, and work on snapshots that the mapping thread
+/// makes between two scans.
 class MappingServer {
  public:
   /// @param node resolves topics. @param private_node holds parameters and services.
@@ -62,7 +64,7 @@ class MappingServer {
   void onTimeJump(const ros::Time& new_time, const std::string& what);
   /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
-  void appendPose(const std_msgs::Header& header, const Eigen::Isometry3d& T_map_sensor);
+  void appendPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor);
   /// Erases blocks and poses outside of the window around the sensor.
   void moveWindow();
   /// Counts a cloud as dropped and logs the reason, each sentence at most once in 5 s.
@@ -70,9 +72,12 @@ class MappingServer {
   /// Assesses the points of each input since the last call, and logs warnings.
   Health judgeAllPoints();
   MappingStatus status();
-  MapSnapshot snapshot() const;
+  /// The state of the server. For the mapping thread.
+  MapSnapshot snapshot();
+  /// The same for all other threads: waits until the mapping thread has no scan in work.
+  std::shared_ptr<const MapSnapshot> askForSnapshot();
 
-  ros::CallbackQueue queue_;
+  ros::CallbackQueue queue_, saving_queue_;
   ros::NodeHandle node_, private_node_;
   ServerConfig config_;
   std::unique_ptr<SemanticMapper> mapper_;
@@ -85,7 +90,7 @@ class MappingServer {
 
   ros::Time map_stamp_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
-  std::vector<geometry_msgs::PoseStamped> trajectory_;
+  std::vector<SensorPose> trajectory_;
   SentenceThrottle throttle_;
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
 
@@ -97,6 +102,7 @@ class MappingServer {
   std::unique_ptr<MappingDiagnostics> diagnostics_;
   std::unique_ptr<LiveSettings> live_settings_;
 
+  ros::AsyncSpinner saving_{1, &saving_queue_};
   std::atomic<bool> running_{true};
   std::thread thread_;
 };

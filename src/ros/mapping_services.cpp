@@ -15,7 +15,9 @@ void MappingServer::offerServices() {
   services_.push_back(private_node_.advertiseService("publish_map", &MappingServer::onPublishMap, this));
   services_.push_back(private_node_.advertiseService("pause", &MappingServer::onPause, this));
   services_.push_back(private_node_.advertiseService("resume", &MappingServer::onResume, this));
-  services_.push_back(private_node_.advertiseService("save_map", &MappingServer::onSaveMap, this));
+  ros::NodeHandle saving(private_node_);
+  saving.setCallbackQueue(&saving_queue_);
+  services_.push_back(saving.advertiseService("save_map", &MappingServer::onSaveMap, this));
 }
 
 void MappingServer::reset() {
@@ -62,7 +64,9 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
       throw std::invalid_argument("path '" + request.path + "' must not hold a zero byte");
     }
     const std::string include = request.include.empty() ? "occupied" : request.include;
-    exportMap(request.path, mapper_->map(), mapper_->classes(), parseStates(include));
+    const VoxelStates states = parseStates(include);
+    const std::shared_ptr<const MapSnapshot> snapshot = askForSnapshot();
+    exportMap(request.path, snapshot->map, snapshot->classes, states);
     response.success = true;
     response.message = "wrote " + request.path + " (" + include + ")";
   } catch (const std::exception& fault) {

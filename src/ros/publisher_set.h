@@ -1,8 +1,14 @@
 /// @file PublisherSet, the publishers of all map topics: decides when each of them publishes.
 #pragma once
 
+#include <ros/callback_queue.h>
+
+#include <atomic>
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <mutex>
+#include <thread>
 #include <vector>
 
 #include "ros/map_publisher.h"
@@ -14,25 +20,51 @@ namespace bki_mapping::ros_interface {
 /// @param rate publish_rate [Hz]. @param took duration of the last publication.
 std::chrono::duration<double> publishPeriod(double rate, std::chrono::duration<double> took);
 
-/// Owns the publishers. Each publishes changes at most publish_rate times a second, and takes at most a tenth
-/// of the time, however large the map.
+/// Owns the publishers and their thread, in which they work on snapshots: mapping goes on meanwhile. The
+/// thread has a lower priority than mapping. Each publisher publishes changes at most publish_rate times a
+/// second, and takes at most a tenth of the time, however large the map.
 class PublisherSet {
  public:
-  explicit PublisherSet(const PublisherContext& context)
-      : publishers_(makePublishers(context)), next_(publishers_.size()) {}
+  using TakeSnapshot = std::function<std::shared_ptr<const MapSnapshot>()>;
 
-  /// Records blocks that were changed, created or erased.
+  /// @param take_snapshot called in the thread of the publishers; asks the mapping thread to call
+  /// closeChanges() and to make a snapshot.
+  PublisherSet(const ros::NodeHandle& node, const ServerConfig& config, TakeSnapshot take_snapshot);
+  ~PublisherSet() { stop(); }
+
+  /// Starts the thread.
+  void start();
+  /// Ends the thread. Until then take_snapshot must answer, or throw.
+  void stop();
+  /// Records blocks that were changed, created or erased. For the mapping thread, as closeChanges().
   void changed(const std::vector<GridIndex>& blocks);
-  /// Lets every publisher send the whole map again.
+  /// What was recorded until now is in the snapshot that is made next, and what comes later is not.
+  void closeChanges();
+  /// Lets every publisher send the whole map again. For any thread.
   void startOver();
-  /// Publishes the topics that are due.
-  void publishDue(const MapSnapshot& snapshot);
 
  private:
   using Clock = std::chrono::steady_clock;
 
+  void work();
+  void wake();
+  /// Takes a snapshot, and passes on to the publishers what has changed until then.
+  std::shared_ptr<const MapSnapshot> takeSnapshot();
+  /// The topics that are due. Drops the changes if nobody listens to any topic.
+  std::vector<MapPublisher*> findDue();
+  void publishDue();
+
+  ros::CallbackQueue queue_;
+  ros::NodeHandle node_;
+  TakeSnapshot take_snapshot_;
   std::vector<std::unique_ptr<MapPublisher>> publishers_;
-  std::vector<Clock::time_point> next_;  ///< earliest next publication of each publisher
+
+  std::mutex mutex_;  ///< of the following three
+  ChangedBlocks changed_, closed_;
+  bool start_over_ = false;
+
+  std::atomic<bool> running_{false};
+  std::thread thread_;
 };
 
 }  // namespace bki_mapping::ros_interface

@@ -16,7 +16,12 @@ class Trajectory : public MapPublisher {
   void publishNew(const MapSnapshot& snapshot) override {
     nav_msgs::Path path;
     path.header = snapshot.header;
-    path.poses = snapshot.trajectory;
+    path.poses.resize(snapshot.trajectory.size());
+    for (std::size_t n = 0; n < path.poses.size(); ++n) {
+      path.poses[n].header.frame_id = snapshot.header.frame_id;
+      path.poses[n].header.stamp = snapshot.trajectory[n].stamp;
+      path.poses[n].pose = snapshot.trajectory[n].pose;
+    }
     publisher_.publish(path);
   }
 };
