@@ -19,7 +19,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import CAR, TIMEOUT, Listener, Robot, program  # noqa: E402
 
 POINTS = [(0.3 * i - 30.0, 8.0 + 0.01 * i, 0.1 * (i % 20) - 1.0) for i in range(2000)]
-BYTES_A_VERTEX = 3 * 4 + 3 + 2 + 1 + 4 * 4  # size of a vertex in .ply files
+BYTES_A_VERTEX = 3 * 4 + 3 + 2 + 1 + 6 * 4  # size of a vertex in .ply files
 
 
 def complete(path):
