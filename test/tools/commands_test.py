@@ -58,8 +58,9 @@ PARTS = {
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roscore|roslaunch(?!.* --ros-args)|rosrun pcl_ros|rviz|rostopic echo)\b')
 WRONG = re.compile(r'\bERROR\b|FATAL|Traceback|\b[Uu]nknown\b|has died|command not found|No such file', re.MULTILINE)
-# rviz with software rendering: a shader for images, which these displays do not use.
-HARMLESS = re.compile(r'rviz/glsl120/indexed_8bit_image')
+# rviz with software rendering: a shader for images, which these displays do not use. roscpp: a call to the master that
+# failed once and is repeated; what must follow from the call is waited for.
+HARMLESS = re.compile(r'rviz/glsl120/indexed_8bit_image|Failed to contact master at \S+\s+Retrying')
 
 
 def text_of(document):
