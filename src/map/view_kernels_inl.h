@@ -124,13 +124,17 @@ struct CompensatedSum {
   const IntVec largest = IfThenElse(free_is_largest, Set(kFreeClass), found.label);
   const FloatVec alpha = c.prior + evidenceOf(Max(found.best, free));
   CompensatedSum entropy = {alpha * c.inverse_sum * logOnePlus(c.others / alpha), {}};
+  // Where a class has no evidence, and where there is no plane for it, it has the prior.
+  auto absent = Set(static_cast<float>(planes.map->classCount() - planes.count));
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
     const IntVec units = Max(LoadU(plane.units + v), IntVec{});
-    entropy.add(unless(largest == plane.id, entropyTerm(c.prior + evidenceOf(units), c)));
+    if (AnyTrue(units != 0)) {
+      entropy.add(unless(largest == plane.id, entropyTerm(c.prior + evidenceOf(units), c)));
+    } else {
+      absent += 1.0f;
+    }
   }
-  // Classes without a plane, and `free` if it has none, have the prior.
-  auto absent = Set(static_cast<float>(planes.map->classCount() - planes.count));
   if (planes.has_free) {
     entropy.add(unless(free_is_largest, entropyTerm(c.prior + evidenceOf(free), c)));
   } else {
@@ -140,14 +144,65 @@ struct CompensatedSum {
   return entropy.sum;
 }
 
+/// The priors of the map.
+struct Priors {
+  float once, classes, sum;  ///< of one concentration, of all classes, and of `free`, too
+
+  explicit Priors(const SemanticMap& map) {
+    // Far below a unit of evidence a smaller prior makes no difference, and floats could not hold it.
+    const double least = 1e-30;
+    const double prior = map.prior() > least ? map.prior() : least;
+    const auto count = static_cast<double>(map.classCount());
+    once = static_cast<float>(prior);
+    classes = static_cast<float>(prior * count);
+    sum = static_cast<float>(prior * (count + 1.0));
+  }
+};
+
+/// Equations 10 and 13 of a vector of voxels.
+template <bool kEntropy>
+[[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
+                                                  const Likeliest& found, IntVec free, Mask is_occupied,
+                                                  int v, BlockView& view) {
+  ExactSum total = found.classes;
+  total.add(free);
+  const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
+  const IntVec own = IfThenElse(is_occupied, found.best, free);
+  ExactSum others = total;
+  others.subtract(own);
+  const FloatVec p = (prior.once + evidenceOf(own)) * inverse_sum,
+                 not_p = (prior.classes + others.evidence()) * inverse_sum;
+  const FloatVec something = prior.classes + found.classes.evidence(),
+                 nothing = prior.once + found.gain * evidenceOf(free);
+  StoreU(evidence, view.evidence.data() + v);
+  StoreU(p, view.probability.data() + v);
+  StoreU(p * not_p / (sum + 1.0f), view.variance.data() + v);
+  StoreU(something / (something + nothing), view.occupancy.data() + v);
+  StoreU((prior.once + evidenceOf(found.best)) / something, view.class_probability.data() + v);
+  if constexpr (!kEntropy) return;
+
+  others = total;
+  others.subtract(Max(found.best, free));
+  const Concentrations c = {prior.once, inverse_sum, prior.classes + others.evidence()};
+  StoreU(entropyOf(planes, found, free, c, v), view.entropy.data() + v);
+}
+
+/// Copies the posterior of one vector of voxels to another.
+template <bool kEntropy>
+[[gnu::always_inline]] inline void copyPosterior(int from, int to, BlockView& view) {
+  const auto copy = [from, to](auto& field) { StoreU(LoadU(field.data() + from), field.data() + to); };
+  copy(view.evidence);
+  copy(view.probability);
+  copy(view.variance);
+  copy(view.occupancy);
+  copy(view.class_probability);
+  if constexpr (kEntropy) copy(view.entropy);
+}
+
 template <bool kPosterior, bool kEntropy>
 void readPlanes(const BlockPlanes& planes, BlockView& view) {
-  // Far below a unit of evidence a smaller prior makes no difference, and floats could not hold it.
-  const double least = 1e-30;
-  const double prior = planes.map->prior() > least ? planes.map->prior() : least;
-  const auto classes = static_cast<double>(planes.map->classCount());
-  const auto prior_once = static_cast<float>(prior), prior_classes = static_cast<float>(prior * classes),
-             prior_sum = static_cast<float>(prior * (classes + 1.0));
+  const Priors prior(*planes.map);
+  int unknown = -1;  // first voxel of a vector without any evidence: all these vectors are alike
   for (int v = 0; v < kBlockVoxels; v += kLanes) {
     const IntVec free = Max(LoadU(planes.free + v), IntVec{});
     Likeliest found = findLikeliest(planes, v);
@@ -161,27 +216,12 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     StoreU(ConvertTo<ByteVec>(label), view.label.data() + v);
     if constexpr (!kPosterior) continue;
 
-    ExactSum total = found.classes;
-    total.add(free);
-    const FloatVec evidence = total.evidence(), sum = prior_sum + evidence, inverse_sum = 1.0f / sum;
-    const IntVec own = IfThenElse(is_occupied, found.best, free);
-    ExactSum others = total;
-    others.subtract(own);
-    const FloatVec p = (prior_once + evidenceOf(own)) * inverse_sum,
-                   not_p = (prior_classes + others.evidence()) * inverse_sum;
-    const FloatVec something = prior_classes + found.classes.evidence(),
-                   nothing = prior_once + found.gain * evidenceOf(free);
-    StoreU(evidence, view.evidence.data() + v);
-    StoreU(p, view.probability.data() + v);
-    StoreU(p * not_p / (sum + 1.0f), view.variance.data() + v);
-    StoreU(something / (something + nothing), view.occupancy.data() + v);
-    StoreU((prior_once + evidenceOf(found.best)) / something, view.class_probability.data() + v);
-    if constexpr (!kEntropy) continue;
-
-    others = total;
-    others.subtract(Max(found.best, free));
-    const Concentrations c = {prior_once, inverse_sum, prior_classes + others.evidence()};
-    StoreU(entropyOf(planes, found, free, c, v), view.entropy.data() + v);
+    if (unknown >= 0 && !AnyTrue(is_known)) {
+      copyPosterior<kEntropy>(unknown, v, view);
+      continue;
+    }
+    if (!AnyTrue(is_known)) unknown = v;
+    storePosterior<kEntropy>(planes, prior, found, free, is_occupied, v, view);
   }
 }
 

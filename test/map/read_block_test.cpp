@@ -21,7 +21,7 @@ struct Kind {
   std::size_t classes;  ///< in the class table
   int planes;           ///< of the block, at most
   double prior;
-  enum Evidence { kPlain, kTies, kExtreme } evidence;
+  enum Evidence { kPlain, kSparse, kTies, kExtreme } evidence;  ///< kSparse: mostly whole rows of zeros
   bool gains, persistence, occlusion;
 };
 
@@ -49,6 +49,10 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
     const std::size_t n = random() % (kind.classes + 1);
     const auto id = n == kind.classes ? kFreeClass : static_cast<ClassId>(n);
     for (EvidenceUnits& units : plane) units = randomUnits(kind.evidence, random);
+    constexpr std::size_t kRow = 16;  // at least a vector
+    for (std::size_t v = 0; kind.evidence == Kind::kSparse && v < plane.size(); v += kRow) {
+      if (random() % 4 != 0) std::fill_n(plane.data() + v, kRow, 0);
+    }
     block.change(id, [&](EvidenceUnits* to) {
       std::copy(plane.begin(), plane.end(), to);
       return true;
@@ -119,7 +123,7 @@ TEST(VecLog, ErrsByLessThanItsBound) {
 TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
   std::mt19937 random(8);
   int n = 0;
-  for (const auto evidence : {Kind::kPlain, Kind::kTies, Kind::kExtreme}) {
+  for (const auto evidence : {Kind::kPlain, Kind::kSparse, Kind::kTies, Kind::kExtreme}) {
     for (const bool gains : {false, true}) {
       for (const bool persistence : {false, true}) {
         for (const double prior : {0.001, 1e-6, 1.0, 1e9}) {
