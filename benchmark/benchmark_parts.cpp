@@ -135,6 +135,14 @@ void readBlocks(benchmark::State& state, const std::string& instruction_set, Blo
       Counter(static_cast<double>(blocks.size()), Counter::kIsIterationInvariantRate | Counter::kInvert);
 }
 
+/// A snapshot of 50,000 blocks, 64 in each region of the map, as in a street.
+void snapshots(benchmark::State& state) {
+  SemanticMap map(GridGeometry(0.3), 0.001, 3);
+  constexpr int kBlocks = 50000, kWidth = 10 * Region::kEdge;
+  for (int n = 0; n < kBlocks; ++n) map.getOrAllocate({{n / kWidth, n % kWidth, 0}});
+  for (auto _ : state) benchmark::DoNotOptimize(map.snapshot());
+}
+
 /// State, class and probability of every voxel of the map.
 void queries(benchmark::State& state) {
   Fixture& f = fixture();
@@ -183,6 +191,7 @@ int main(int argc, char** argv) {
     add("ReadBlockWithEntropy/" + set, [set](auto& state) { readBlocks(state, set, BlockFields::kAll); });
   }
   add("LinesFromRtree", [](auto& state) { lines(state, BeamIndexType::kRtree, ""); });
+  add("Snapshot", snapshots);
   add("Query", queries);
   add("VoxelCloud", voxelCloud);
   benchmark::Initialize(&argc, argv);
