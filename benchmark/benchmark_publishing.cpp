@@ -89,7 +89,7 @@ int measureTopics(const po::variables_map& given) {
   node.setCallbackQueue(&connections);
   const auto snapshot = [&] {
     return std::make_shared<const MapSnapshot>(
-        MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor});
+        MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor, 0});
   };
   const auto publishers = makePublishers({node, config, snapshot});
   Listener listener;
@@ -155,7 +155,7 @@ std::vector<double> waits(const std::vector<Scan>& scans, double rate, bool list
   PublisherSet* publishers = nullptr;
   const auto snapshot = [&] {
     publishers->closeChanges();
-    return MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor};
+    return MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor, 0};
   };
   std::vector<double> waits;
   std::atomic<bool> mapped{false}, done{false};

@@ -4,10 +4,12 @@
 #include <geometry_msgs/Pose.h>
 #include <std_msgs/Header.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "parallel/thread_pool.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
@@ -26,6 +28,15 @@ struct MapSnapshot {
   std::vector<SensorPose> trajectory;  ///< in the order of integration
   ServerConfig config;
   Eigen::Vector3d sensor;  ///< origin of the last scan, map frame [m]
+  int threads = 0;         ///< setting `threads` of the mapper
+
+  /// The number of threads that write a message. More than a few do not help: memory limits them.
+  /// @param blocks of which the message is made; few are not worth the start of threads.
+  int threadsFor(std::size_t blocks) const {
+    constexpr std::size_t kManyBlocks = 256;
+    constexpr int kMostThreads = 4;
+    return blocks < kManyBlocks ? 1 : std::min(threadCount(threads), kMostThreads);
+  }
 
   /// Whether a cube is within view_range of the sensor; true without such a limit.
   /// @param edge of the cube [m].

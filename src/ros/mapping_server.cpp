@@ -284,7 +284,8 @@ MappingStatus MappingServer::status() {
 }
 
 MapSnapshot MappingServer::snapshot() {
-  MapSnapshot snapshot{{}, mapper_->snapshot(), mapper_->classes(), trajectory_, config_, sensor_};
+  MapSnapshot snapshot{{},      mapper_->snapshot(),      mapper_->classes(), trajectory_, config_,
+                       sensor_, mapper_->config().threads};
   snapshot.header.frame_id = config_.frame_id;
   snapshot.header.stamp = map_stamp_;
   return snapshot;

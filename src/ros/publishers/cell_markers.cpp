@@ -1,5 +1,3 @@
-#include <visualization_msgs/MarkerArray.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +9,7 @@
 #include "bki_mapping/map/map_query.h"
 #include "map/voxel_color.h"
 #include "ros/map_publisher.h"
-#include "streamed_message.h"
+#include "streamed_markers.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -60,18 +58,16 @@ BlockFields fieldsOf(ColorMode mode) {
 }
 
 constexpr int kRegionEdge = Region::kEdge;
-constexpr std::size_t kBlocksOfRegion = 64;  // of a street; there is room for 512
 
 /// Marker arrays with one CUBE_LIST per class and region of the map: its namespace is the class's name, its
 /// id that of the region. Only changed regions are sent; a marker that became empty is deleted.
 class CellMarkers : public MapPublisher {
  public:
-  using MarkerArray = visualization_msgs::MarkerArray;
   using Marker = visualization_msgs::Marker;
 
   CellMarkers(const PublisherContext& context, const std::string& topic, VoxelState state, float alpha)
       : state_(state), alpha_(alpha) {
-    publisher_ = context.advertiseUpdates<MarkerArray>(
+    publisher_ = context.advertiseUpdates<StreamedMarkers>(
         topic, *this,
         [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
   }
@@ -83,8 +79,6 @@ class CellMarkers : public MapPublisher {
   }
 
  private:
-  using Markers = std::map<ClassId, Marker>;
-
   /// A region in which the map holds at least one block.
   struct Region {
     std::int32_t id;
@@ -103,18 +97,20 @@ class CellMarkers : public MapPublisher {
     for (const auto& [index, region] : regions_) {  // the view moves with the sensor
       if (inView(index, snapshot) != region.in_view) regions.insert(index);
     }
-    MarkerArray message;
+    StreamedMarkers message;
     appendRegions(regions.members(), snapshot, message);
     forgetEmpty(regions.members(), snapshot);
-    if (!message.markers.empty()) publisher_.publish(message);
+    if (message.count() > 0) publisher_.publish(message);
   }
 
-  MarkerArray whole(const MapSnapshot& snapshot) {
-    MarkerArray message;
-    message.markers.emplace_back();
-    message.markers.back().header = snapshot.header;
-    message.markers.back().action = Marker::DELETEALL;
-    message.markers.back().pose.orientation.w = 1.0;
+  /// A message that must not outlive the snapshot.
+  StreamedMarkers whole(const MapSnapshot& snapshot) {
+    StreamedMarker clear;
+    clear.frame.header = snapshot.header;
+    clear.frame.action = Marker::DELETEALL;
+    clear.frame.pose.orientation.w = 1.0;
+    StreamedMarkers message;
+    message.groups.push_back({{clear}, nullptr});
     for (const auto& entry : snapshot.map.entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
     for (auto& [index, region] : regions_) {
@@ -157,41 +153,28 @@ class CellMarkers : public MapPublisher {
     return snapshot.inView(Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edge, edge);
   }
 
-  /// Appends the markers of regions, which several threads fill.
+  /// Appends the markers of regions. Several threads count their voxels.
   void appendRegions(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot,
-                     MarkerArray& message) {
+                     StreamedMarkers& message) {
     std::vector<Region*> regions;
     for (const GridIndex& index : indices) {
       regions.push_back(&regionAt(index)->second);
       regions.back()->in_view = inView(index, snapshot);
     }
-    std::vector<Markers> markers(indices.size());
-    ThreadPool pool(publishingThreads(kBlocksOfRegion * indices.size()));
+    std::vector<Cells> cells(indices.size());
+    constexpr std::size_t kBlocks = 64;  // of a street, in a region; there is room for 512
+    message.threads = snapshot.threadsFor(kBlocks * indices.size());
+    ThreadPool pool(message.threads);
     pool.forEachInOrder(indices.size(), [&](std::size_t r, std::size_t) {
-      if (regions[r]->in_view) markers[r] = markersOf(indices[r], snapshot);
+      if (regions[r]->in_view) cells[r] = cellsOf(indices[r], snapshot);
     });
-    for (std::size_t r = 0; r < indices.size(); ++r)
-      append(std::move(markers[r]), snapshot, *regions[r], message);
-  }
-
-  /// Appends the markers of a region, and deletes those that have become empty.
-  void append(Markers markers, const MapSnapshot& snapshot, Region& region, MarkerArray& message) const {
-    const std::set<ClassId> before = std::move(region.shown);
-    region.shown.clear();
-    for (const ClassId gone : before) {
-      if (markers.count(gone) > 0) continue;
-      message.markers.push_back(emptyMarker(snapshot, gone));
-      message.markers.back().action = Marker::DELETE;
-      message.markers.back().id = region.id;
-    }
-    for (auto& [label, marker] : markers) {
-      marker.id = region.id;
-      region.shown.insert(label);
-      message.markers.push_back(std::move(marker));
+    for (std::size_t r = 0; r < indices.size(); ++r) {
+      MarkerGroup markers = markersOf(std::move(cells[r]), snapshot, *regions[r]);
+      if (!markers.markers.empty()) message.groups.push_back(std::move(markers));
     }
   }
 
-  /// Calls visit(offset, centre) for the voxels of a block that are shown.
+  /// Calls visit(offset, z) for the voxels of a block that are shown.
   template <typename Visit>
   void forEachShown(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
                     const Visit& visit) const {
@@ -206,54 +189,74 @@ class CellMarkers : public MapPublisher {
     }
   }
 
-  /// The markers of a region by class, without their id. Voxels are counted first, so that memory is taken
-  /// once.
-  Markers markersOf(const GridIndex& region, const MapSnapshot& snapshot) const {
-    const SemanticMap& map = snapshot.map;
-    std::vector<std::pair<BlockIndex, const Block*>> shown;
-    std::array<std::size_t, 256> voxels{};
+  /// What a region shows.
+  struct Cells {
+    std::vector<std::pair<BlockIndex, const Block*>> blocks;
+    std::array<std::uint32_t, 256> of_label{};  ///< number of voxels
+  };
+
+  Cells cellsOf(const GridIndex& region, const MapSnapshot& snapshot) const {
+    Cells cells;
     BlockView view;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
-      const Block* block = map.find(index);
+      const Block* block = snapshot.map.find(index);
       if (!block) continue;
-      readBlock(map, *block, BlockFields::kStates, view);
+      readBlock(snapshot.map, *block, BlockFields::kStates, view);
       bool any = false;
       forEachShown(index, view, snapshot, [&](std::size_t v, double) {
-        ++voxels[view.label[v]];
+        ++cells.of_label[view.label[v]];
         any = true;
       });
-      if (any) shown.emplace_back(index, block);
+      if (any) cells.blocks.emplace_back(index, block);
     }
-    Markers markers;
-    std::array<Marker*, 256> of_label{};
-    for (std::size_t label = 0; label < voxels.size(); ++label) {
-      if (voxels[label] == 0) continue;
-      const auto id = static_cast<ClassId>(label);
-      of_label[label] = &markers.emplace(id, emptyMarker(snapshot, id)).first->second;
-      of_label[label]->points.reserve(voxels[label]);
-      of_label[label]->colors.reserve(voxels[label]);
-    }
-    for (const auto& [index, block] : shown) {
-      readBlock(map, *block, fieldsOf(snapshot.config.color_mode), view);
-      addVoxels(index, view, snapshot, of_label);
-    }
-    return markers;
+    return cells;
   }
 
-  void addVoxels(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
-                 const std::array<Marker*, 256>& of_label) const {
+  /// The markers of a region, and the deletion of those that have become empty.
+  MarkerGroup markersOf(Cells cells, const MapSnapshot& snapshot, Region& region) const {
+    MarkerGroup group;
+    const auto append = [&](ClassId label, std::int32_t action) {
+      group.markers.push_back({emptyMarker(snapshot, label), cells.of_label[label]});
+      group.markers.back().frame.id = region.id;
+      group.markers.back().frame.action = action;
+    };
+    const std::set<ClassId> before = std::move(region.shown);
+    region.shown.clear();
+    for (const ClassId gone : before) {
+      if (cells.of_label[gone] == 0) append(gone, Marker::DELETE);
+    }
+    const std::size_t deleted = group.markers.size();
+    for (std::size_t label = 0; label < cells.of_label.size(); ++label) {
+      if (cells.of_label[label] == 0) continue;
+      append(static_cast<ClassId>(label), Marker::ADD);
+      region.shown.insert(static_cast<ClassId>(label));
+    }
+    group.write = [this, deleted, &snapshot, cells = std::move(cells)](std::vector<CubeWriter>& writers) {
+      std::array<CubeWriter*, 256> of_label{};
+      std::size_t number = deleted;
+      for (std::size_t label = 0; label < of_label.size(); ++label) {
+        if (cells.of_label[label] > 0) of_label[label] = &writers[number++];
+      }
+      for (const auto& [index, block] : cells.blocks) writeCubes(index, *block, snapshot, of_label);
+    };
+    return group;
+  }
+
+  void writeCubes(const BlockIndex& index, const Block& block, const MapSnapshot& snapshot,
+                  const std::array<CubeWriter*, 256>& of_label) const {
+    const ColorMode mode = snapshot.config.color_mode;
+    const double edge = snapshot.map.geometry().resolution();
+    BlockView view;
+    readBlock(snapshot.map, block, fieldsOf(mode), view);
+    double x[kBlockEdge], y[kBlockEdge];
+    for (int n = 0; n < kBlockEdge; ++n) {
+      x[n] = (index.x * kBlockEdge + n + 0.5) * edge;
+      y[n] = (index.y * kBlockEdge + n + 0.5) * edge;
+    }
     forEachShown(index, view, snapshot, [&](std::size_t v, double z) {
-      Marker& marker = *of_label[view.label[v]];
-      const Eigen::Vector3d centre =
-          snapshot.map.geometry().voxelCentre(GridGeometry::voxelOf(index, static_cast<int>(v)));
-      geometry_msgs::Point point;
-      point.x = centre.x();
-      point.y = centre.y();
-      point.z = z;
-      marker.points.push_back(point);
-      marker.colors.push_back(
-          rgba(colorOf(view, v, z, snapshot.config.color_mode, snapshot.classes), alpha_));
+      of_label[view.label[v]]->add({x[v % kBlockEdge], y[v / kBlockEdge % kBlockEdge], z},
+                                   rgba(colorOf(view, v, z, mode, snapshot.classes), alpha_));
     });
   }
 
@@ -263,7 +266,6 @@ class CellMarkers : public MapPublisher {
     marker.header = snapshot.header;
     marker.ns = known ? known->name : "free";
     marker.type = Marker::CUBE_LIST;
-    marker.action = Marker::ADD;
     marker.pose.orientation.w = 1.0;
     const double edge = snapshot.map.geometry().resolution();
     marker.scale.x = marker.scale.y = marker.scale.z = edge;

@@ -17,7 +17,7 @@ void fillMap(const MapSnapshot& snapshot, Message& message) {
     info.dynamic = c.dynamic;
     message.classes.push_back(info);
   }
-  message.blocks = {&snapshot.map, sortedBlocks(snapshot.map)};
+  message.blocks = {&snapshot.map, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
 }
 
 class Occupancy : public MapPublisher {
@@ -48,6 +48,7 @@ class OccupancyUpdates : public UpdatePublisher<StreamedUpdate> {
   void fillChanges(const MapSnapshot& snapshot, StreamedUpdate& message) const override {
     const SemanticMap& map = snapshot.map;
     message.blocks.map = &map;
+    message.blocks.threads = snapshot.threadsFor(changed.blocks().size());
     message.blocks.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {
       if (const Block* block = map.find({index})) {

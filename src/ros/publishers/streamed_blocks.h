@@ -19,7 +19,7 @@ struct StreamedBlocks {
   std::uint32_t count() const { return static_cast<std::uint32_t>(blocks.size()); }
   void write(std::uint8_t* to) const {
     constexpr std::size_t kBlocksPerJob = 64;
-    ThreadPool pool(publishingThreads(blocks.size()));
+    ThreadPool pool(threads);
     pool.forEach((blocks.size() + kBlocksPerJob - 1) / kBlocksPerJob, [&](std::size_t job, std::size_t) {
       const std::size_t begin = job * kBlocksPerJob, end = std::min(blocks.size(), begin + kBlocksPerJob);
       for (std::size_t b = begin; b < end; ++b) write(blocks[b].first, *blocks[b].second, to + b * kBytes);
@@ -28,6 +28,7 @@ struct StreamedBlocks {
 
   const SemanticMap* map = nullptr;
   std::vector<std::pair<BlockIndex, const Block*>> blocks;
+  int threads = 1;  ///< that write
 
  private:
   static constexpr std::size_t kBytes = 3 * sizeof(std::int32_t) + 2 * kBlockVoxels +
@@ -56,7 +57,7 @@ struct StreamedBlocks {
 };
 
 /// A bki_mapping/OccupancyMap.
-struct StreamedMap {
+struct StreamedMap : StandsFor<OccupancyMap> {
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -74,7 +75,7 @@ struct StreamedMap {
 };
 
 /// A bki_mapping/OccupancyUpdate.
-struct StreamedUpdate {
+struct StreamedUpdate : StandsFor<OccupancyUpdate> {
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -100,30 +101,6 @@ struct StreamedUpdate {
 }  // namespace bki_mapping::ros_interface
 
 namespace ros {
-namespace message_traits {
-
-template <>
-struct MD5Sum<bki_mapping::ros_interface::StreamedMap>
-    : bki_mapping::ros_interface::SameTrait<MD5Sum<bki_mapping::OccupancyMap>> {};
-template <>
-struct DataType<bki_mapping::ros_interface::StreamedMap>
-    : bki_mapping::ros_interface::SameTrait<DataType<bki_mapping::OccupancyMap>> {};
-template <>
-struct Definition<bki_mapping::ros_interface::StreamedMap>
-    : bki_mapping::ros_interface::SameTrait<Definition<bki_mapping::OccupancyMap>> {};
-
-template <>
-struct MD5Sum<bki_mapping::ros_interface::StreamedUpdate>
-    : bki_mapping::ros_interface::SameTrait<MD5Sum<bki_mapping::OccupancyUpdate>> {};
-template <>
-struct DataType<bki_mapping::ros_interface::StreamedUpdate>
-    : bki_mapping::ros_interface::SameTrait<DataType<bki_mapping::OccupancyUpdate>> {};
-template <>
-struct Definition<bki_mapping::ros_interface::StreamedUpdate>
-    : bki_mapping::ros_interface::SameTrait<Definition<bki_mapping::OccupancyUpdate>> {};
-
-}  // namespace message_traits
-
 namespace serialization {
 
 template <>

@@ -11,18 +11,18 @@
 
 #include "io/voxel_pcl.h"
 #include "io/voxel_points.h"
+#include "ros/map_snapshot.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
 
-/// The field `data` of a PointCloud2 of voxels. The map and the class table must outlive it, and not change.
+/// The field `data` of a PointCloud2 of voxels.
 class StreamedPoints {
  public:
   StreamedPoints() = default;  ///< no points
-  /// Counts the points.
-  StreamedPoints(const SemanticMap& map, const ClassTable& classes, const VoxelSelection& selection,
-                 VoxelPoints::Blocks blocks)
-      : content_(std::make_shared<Content>(map, classes, selection, std::move(blocks))) {}
+  /// Counts the points. @param snapshot must outlive this.
+  StreamedPoints(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+      : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))) {}
 
   std::size_t points() const { return content_ ? content_->points.count() : 0; }
   std::uint32_t bytes() const { return messageBytes(points(), sizeof(VoxelPoint)); }
@@ -33,9 +33,9 @@ class StreamedPoints {
 
  private:
   struct Content {
-    Content(const SemanticMap& map, const ClassTable& classes, const VoxelSelection& selection,
-            VoxelPoints::Blocks blocks)
-        : pool(publishingThreads(blocks.size())), points(map, classes, selection, std::move(blocks), pool) {}
+    Content(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+        : pool(snapshot.threadsFor(blocks.size())),
+          points(snapshot.map, snapshot.classes, selection, std::move(blocks), pool) {}
 
     ThreadPool pool;
     VoxelPoints points;
@@ -45,11 +45,13 @@ class StreamedPoints {
 };
 
 /// A sensor_msgs/PointCloud2 of voxels.
-struct StreamedCloud {
+struct StreamedCloud : StandsFor<sensor_msgs::PointCloud2> {
   StreamedCloud() = default;
-  StreamedCloud(const std_msgs::Header& header, StreamedPoints points) : data(std::move(points)) {
+  /// @param snapshot must outlive this.
+  StreamedCloud(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+      : data(snapshot, selection, std::move(blocks)) {
     pcl_conversions::fromPCL(pclHeader(data.points()), frame);
-    frame.header = header;
+    frame.header = snapshot.header;
   }
 
   template <typename Visit>
@@ -70,7 +72,7 @@ struct StreamedCloud {
 };
 
 /// A bki_mapping/VoxelCloudUpdate.
-struct StreamedCloudUpdate {
+struct StreamedCloudUpdate : StandsFor<VoxelCloudUpdate> {
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -92,30 +94,6 @@ struct StreamedCloudUpdate {
 }  // namespace bki_mapping::ros_interface
 
 namespace ros {
-namespace message_traits {
-
-template <>
-struct MD5Sum<bki_mapping::ros_interface::StreamedCloud>
-    : bki_mapping::ros_interface::SameTrait<MD5Sum<sensor_msgs::PointCloud2>> {};
-template <>
-struct DataType<bki_mapping::ros_interface::StreamedCloud>
-    : bki_mapping::ros_interface::SameTrait<DataType<sensor_msgs::PointCloud2>> {};
-template <>
-struct Definition<bki_mapping::ros_interface::StreamedCloud>
-    : bki_mapping::ros_interface::SameTrait<Definition<sensor_msgs::PointCloud2>> {};
-
-template <>
-struct MD5Sum<bki_mapping::ros_interface::StreamedCloudUpdate>
-    : bki_mapping::ros_interface::SameTrait<MD5Sum<bki_mapping::VoxelCloudUpdate>> {};
-template <>
-struct DataType<bki_mapping::ros_interface::StreamedCloudUpdate>
-    : bki_mapping::ros_interface::SameTrait<DataType<bki_mapping::VoxelCloudUpdate>> {};
-template <>
-struct Definition<bki_mapping::ros_interface::StreamedCloudUpdate>
-    : bki_mapping::ros_interface::SameTrait<Definition<bki_mapping::VoxelCloudUpdate>> {};
-
-}  // namespace message_traits
-
 namespace serialization {
 
 template <>

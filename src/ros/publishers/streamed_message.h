@@ -4,6 +4,7 @@
 
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -15,14 +16,6 @@
 
 namespace bki_mapping::ros_interface {
 
-/// The number of threads that fill in a message. More than a few do not help: memory limits them.
-/// @param blocks of which the message is made; few are not worth the start of threads.
-inline int publishingThreads(std::size_t blocks) {
-  constexpr std::size_t kManyBlocks = 256;
-  constexpr int kMostThreads = 4;
-  return blocks < kManyBlocks ? 1 : std::min(threadCount(0), kMostThreads);
-}
-
 /// @return count * size. @throws std::length_error if subscribers would refuse a message of so many bytes.
 inline std::uint32_t messageBytes(std::size_t count, std::size_t size) {
   constexpr std::size_t kMostBytes = 1000000000;
@@ -32,13 +25,34 @@ inline std::uint32_t messageBytes(std::size_t count, std::size_t size) {
   return static_cast<std::uint32_t>(count * size);
 }
 
-/// A trait of ROS for the message that a streamed one stands for, such as its MD5 sum.
-template <typename Trait>
-struct SameTrait {
-  static const char* value() { return Trait::value(); }
-  template <typename Streamed>
-  static const char* value(const Streamed&) {
-    return value();
+/// Asks for large pages for memory that is about to be written. A buffer of many MB is fresh from the system:
+/// with pages of 4 kB, taking it costs as much time as filling it.
+inline void useLargePages(std::uint8_t* data, std::size_t bytes) {
+  constexpr std::uintptr_t kPage = std::uintptr_t{1} << 21;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(data) + kPage - 1) / kPage * kPage,
+             end = (reinterpret_cast<std::uintptr_t>(data) + bytes) / kPage * kPage;
+  // Only a hint, so that it does not matter whether the system follows.
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+}
+
+/// Base of a streamed message, by which ROS takes it for the message that it stands for. ROS asks by these
+/// names.
+template <typename Message>
+struct StandsFor {
+  static const std::string& __s_getMD5Sum() { return kept<ros::message_traits::MD5Sum<Message>>(); }
+  static const std::string& __s_getDataType() { return kept<ros::message_traits::DataType<Message>>(); }
+  static const std::string& __s_getMessageDefinition() {
+    return kept<ros::message_traits::Definition<Message>>();
+  }
+  const std::string& __getMD5Sum() const { return __s_getMD5Sum(); }
+  const std::string& __getDataType() const { return __s_getDataType(); }
+  const std::string& __getMessageDefinition() const { return __s_getMessageDefinition(); }
+
+ private:
+  template <typename Trait>
+  static const std::string& kept() {
+    static const std::string value = Trait::value();
+    return value;
   }
 };
 
@@ -61,7 +75,9 @@ template <typename Streamed>
 struct ArraySerializer {
   static void write(ros::serialization::OStream& stream, const Streamed& array) {
     stream.next(array.count());
-    array.write(stream.advance(array.bytes()));
+    std::uint8_t* const to = stream.advance(array.bytes());
+    useLargePages(to, array.bytes());
+    array.write(to);
   }
   static std::uint32_t serializedLength(const Streamed& array) {
     return static_cast<std::uint32_t>(sizeof(std::uint32_t)) + array.bytes();

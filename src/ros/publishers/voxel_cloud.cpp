@@ -9,11 +9,6 @@ VoxelSelection known() {
   return {{VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}};
 }
 
-StreamedCloud cloudOf(const MapSnapshot& snapshot, const VoxelSelection& selection,
-                      VoxelPoints::Blocks blocks) {
-  return {snapshot.header, {snapshot.map, snapshot.classes, selection, std::move(blocks)}};
-}
-
 class VoxelCloud : public MapPublisher {
  public:
   explicit VoxelCloud(const PublisherContext& context) {
@@ -28,7 +23,7 @@ class VoxelCloud : public MapPublisher {
     VoxelPoints::Blocks blocks = sortedBlocks(snapshot.map);
     const auto hidden = [&](const auto& block) { return !snapshot.inView(block.first); };
     blocks.erase(std::remove_if(blocks.begin(), blocks.end(), hidden), blocks.end());
-    publisher_.publish(cloudOf(snapshot, in_view, std::move(blocks)));
+    publisher_.publish(StreamedCloud(snapshot, in_view, std::move(blocks)));
   }
 };
 
@@ -39,7 +34,7 @@ class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
 
  private:
   void fillWhole(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
-    message.cloud = cloudOf(snapshot, known(), sortedBlocks(snapshot.map));
+    message.cloud = {snapshot, known(), sortedBlocks(snapshot.map)};
   }
   void fillChanges(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
     VoxelPoints::Blocks blocks;
@@ -49,7 +44,7 @@ class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
       message.blocks.push_back(toMessage(index));
       if (const Block* block = snapshot.map.find({index})) blocks.emplace_back(BlockIndex{index}, block);
     }
-    message.cloud = cloudOf(snapshot, known(), std::move(blocks));
+    message.cloud = {snapshot, known(), std::move(blocks)};
   }
 };
 
