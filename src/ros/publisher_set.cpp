@@ -21,7 +21,7 @@ struct Wake : ros::CallbackInterface {
 /// Lets other threads of the process go first: publishing may wait, a scan may not. (On Linux the niceness of
 /// the process means that of the calling thread.)
 void yieldToOthers() {
-  constexpr int kNiceness = 10;
+  constexpr int kNiceness = 19;  // the most
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);
 }
 
