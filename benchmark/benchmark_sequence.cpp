@@ -9,11 +9,11 @@
 #include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cases.h"
+#include "core/atomic_file.h"
 #include "core/quantile.h"
 #include "core/stopwatch.h"
 #include "curves.h"
 #include "evaluation/run_report.h"
-#include "io/atomic_file.h"
 #include "tools/options.h"
 
 namespace {

@@ -8,9 +8,9 @@
 #include "bki_mapping/mapping/parameters.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cases.h"
+#include "core/atomic_file.h"
 #include "core/quantile.h"
 #include "core/stopwatch.h"
-#include "io/atomic_file.h"
 #include "simulation/lidar.h"
 #include "tools/draw.h"
 

@@ -6,7 +6,7 @@ find_package(nlohmann_json REQUIRED)
 
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
-    atomic_file.cpp class_table_yaml.cpp config_yaml.cpp map_export.cpp sequence_reader.cpp sequence_writer.cpp
+    class_table_yaml.cpp config_yaml.cpp map_export.cpp sequence_reader.cpp sequence_writer.cpp
     share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
   LINK bki_mapping_mapping pcl_common)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 #include "io/voxel_pcl.h"
 #include "io/voxel_points.h"
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/sequence.h"
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 
 namespace bki_mapping {
 namespace {

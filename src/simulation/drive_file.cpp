@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 #include "io/yaml_file.h"
 
 namespace bki_mapping::simulation {

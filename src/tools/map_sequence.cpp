@@ -8,8 +8,8 @@
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "core/atomic_file.h"
 #include "evaluation/run_report.h"
-#include "io/atomic_file.h"
 #include "tools/options.h"
 
 namespace {

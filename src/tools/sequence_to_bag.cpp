@@ -5,7 +5,7 @@
 #include <iostream>
 #include <memory>
 
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 #include "tools/options.h"
 #include "tools/sequence_messages.h"
 

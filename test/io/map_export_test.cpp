@@ -12,7 +12,7 @@
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 #include "reference/scenes.h"
 #include "temporary_folder.h"
 

@@ -15,7 +15,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "io/atomic_file.h"
+#include "core/atomic_file.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {

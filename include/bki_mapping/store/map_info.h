@@ -1,0 +1,61 @@
+/// @file What a map file says of its map.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/map/semantic_map.h"
+
+namespace bki_mapping {
+
+/// A map file cannot be read or written: one sentence with the file, the fault and the remedy.
+class MapFileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A unit of evidence is 2^-kUnitExponent.
+constexpr int kUnitExponent = 16;
+static_assert(kEvidenceUnit * (1 << kUnitExponent) == 1.0f);
+
+/// What all tiles of a map file have in common; fixed when the file is created.
+struct MapInfo {
+  double resolution = 0.0;  ///< edge of a voxel [m], > 0
+  double prior = 0.0;       ///< alpha0, concentration of each class before any scan, > 0
+  int unit_exponent = kUnitExponent;
+  std::string frame;                          ///< name of the map frame
+  std::shared_ptr<const ClassTable> classes;  ///< never nullptr
+  std::string parameters;  ///< the mapper's settings, for humans and for resuming; YAML, at most 1 MB
+  /// Name and version of the program that created the file; set by the library.
+  std::string program;
+
+  /// An empty map with this resolution, prior and number of classes, and without gains.
+  SemanticMap emptyMap() const;
+};
+
+/// A drive whose scans are in a map.
+struct DriveRecord {
+  std::string id;    ///< unique to the drive, wherever it was recorded; not empty, at most 1 MB
+  std::string name;  ///< for humans
+  /// The part of the file that holds the drive's evidence alone, > 0; 0: the evidence is in the sum only.
+  int part = 0;
+  std::uint64_t scans = 0;
+  std::uint64_t first_stamp = 0, last_stamp = 0;  ///< of the scans [ns], below 2^63
+  Eigen::AlignedBox3d bounds;                     ///< of the voxels that it saw, map frame [m]; may be empty
+
+  bool operator==(const DriveRecord& other) const;
+};
+
+/// Checks that maps can be added: same resolution, unit, prior, and classes with the same ids and names.
+/// Colours and flags of classes may differ.
+/// @param name, other_name what the error calls the two maps, such as their files.
+/// @throws std::invalid_argument in one sentence with both values of the first difference.
+void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,
+                   const MapInfo& other);
+
+}  // namespace bki_mapping
