@@ -61,3 +61,14 @@ bki_mapping_core_room(free_space SOURCES
   LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
+
+# Map files: SQLite and zlib. They name the program that wrote them.
+file(STRINGS package.xml version_line REGEX "<version>")
+string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${version_line}")
+find_package(SQLite3 REQUIRED)
+find_package(ZLIB REQUIRED)
+bki_mapping_core_room(store SOURCES
+    database.cpp map_file.cpp map_info.cpp records.cpp schema.cpp tile_codec.cpp
+  LINK bki_mapping_map)
+target_compile_definitions(bki_mapping_store PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
+target_link_libraries(bki_mapping_store PRIVATE SQLite::SQLite3 ZLIB::ZLIB)

@@ -6,9 +6,9 @@ find_package(nlohmann_json REQUIRED)
 
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
-    class_table_yaml.cpp config_yaml.cpp map_export.cpp sequence_reader.cpp sequence_writer.cpp
+    class_table_yaml.cpp config_yaml.cpp map_export.cpp mapper_file.cpp sequence_reader.cpp sequence_writer.cpp
     share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
-  LINK bki_mapping_mapping pcl_common)
+  LINK bki_mapping_mapping bki_mapping_store pcl_common)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)

@@ -59,6 +59,7 @@ bki_mapping_unit_tests(core atomic_file grid_geometry)
 bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
 bki_mapping_unit_tests(map column_map map_query read_block semantic_map)
+bki_mapping_unit_tests(store map_file)
 bki_mapping_unit_tests(points downsample point_bins tile_grid)
 bki_mapping_unit_tests(update sum_kernels)
 bki_mapping_unit_tests(beams beam_index instruction_sets line_setup occlusion)
@@ -92,7 +93,7 @@ add_test(NAME vector_symbols_test
     $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
     $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_kernel> $<TARGET_OBJECTS:bki_mapping_update>
     $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams>
-    $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping>)
+    $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping> $<TARGET_OBJECTS:bki_mapping_store>)
 
 if(CATKIN_ENABLE_TESTING)
   bki_mapping_script_test(tools commands_test)

@@ -137,12 +137,16 @@ SemanticMap SemanticMap::snapshot() {
   return copy;
 }
 
-void SemanticMap::add(const SemanticMap& other) {
+void SemanticMap::checkAddable(const SemanticMap& other) const {
   if (geometry_.resolution() != other.geometry_.resolution() || prior_ != other.prior_ ||
       class_count_ != other.class_count_) {
     throw std::invalid_argument(
         "maps can only be added if resolution, prior and number of classes are the same in both");
   }
+}
+
+void SemanticMap::add(const SemanticMap& other) {
+  checkAddable(other);
   for (const Entry& entry : other.entries()) {
     Block& block = getOrAllocate(entry.index);
     const auto& classes = entry.block->classes();

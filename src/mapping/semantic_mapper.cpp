@@ -164,9 +164,31 @@ void SemanticMapper::reset() {
 void SemanticMapper::recover() noexcept {
   pipeline_ = nullptr;
   if (map_.size() == 0) map_.clear();  // frees what a refused scan has allocated for the index
+  countBlockBytes();
+  returnMemory();
+}
+
+void SemanticMapper::countBlockBytes() noexcept {
   block_bytes_ = 0;
   for (const auto& [index, block] : map_.entries()) block_bytes_ += block->bytes();
-  returnMemory();
+}
+
+void SemanticMapper::addMap(SemanticMap other) {
+  map_.checkAddable(other);
+  if (map_.size() == 0) {
+    map_ = std::move(other);
+  } else {
+    const SemanticMap before = map_.snapshot();
+    try {
+      map_.add(other);
+    } catch (...) {
+      map_ = before;
+      countBlockBytes();
+      throw;
+    }
+  }
+  setGains();
+  countBlockBytes();
 }
 
 SemanticMapper::Pipeline& SemanticMapper::pipeline() {

@@ -1,11 +1,13 @@
 // Maps a sequence in SemanticKITTI's layout without ROS, and writes a map file and a report.
 #include <algorithm>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
 
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
+#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
@@ -17,11 +19,19 @@ namespace {
 using namespace bki_mapping;
 namespace po = tools::po;
 
+/// The frame of the maps of sequences.
+constexpr char kFrame[] = "map";
+
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("output", text("FILE.ply|FILE.pcd"), "map file")(
-      "include", text("STATES")->default_value("occupied"), "voxels in the map file: occupied,free,occluded")(
+  options.add_options()("output", text("FILE.bkm|FILE.ply|FILE.pcd"),
+                        "file for the map: .bkm to keep it, .ply or .pcd to look at it")(
+      "resume", text("FILE.bkm"), "continue the map in this file")(
+      "drive", text("ID"),
+      "what the map file calls these scans (default: name of the sequence's folder, first and last scan)")(
+      "include", text("STATES")->default_value("occupied"),
+      "voxels in a .ply or .pcd file: occupied,free,occluded")(
       "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
                                                         "print the effective parameters as YAML, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -34,25 +44,53 @@ std::string progressText(const ScanReport& scan) {
   return text.str();
 }
 
+/// The id of a drive is the same whenever the same scans are mapped, so that no map holds them twice.
+std::string driveId(const po::variables_map& given, const Sequence& sequence, std::size_t first,
+                    std::size_t last) {
+  if (given.count("drive")) return given["drive"].as<std::string>();
+  const std::filesystem::path folder = std::filesystem::canonical(given["sequence"].as<std::string>());
+  return folder.filename().string() + "/" + sequence.name(first) + "-" + sequence.name(last - 1);
+}
+
+/// Loads the map to be continued. @return the drives in it. @throws std::invalid_argument if `id` is among
+/// them.
+std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path, const std::string& id) {
+  StoredMap stored = loadMapFor(mapper, path, kFrame);
+  for (const DriveRecord& drive : stored.drives) {
+    if (drive.id != id) continue;
+    throw std::invalid_argument("the map in " + path + " holds drive '" + id +
+                                "' already; give other scans, or another name with --drive");
+  }
+  mapper.addMap(std::move(stored.map));
+  return stored.drives;
+}
+
 int mapSequence(const po::variables_map& given) {
   if (given["print-config"].as<bool>()) {
     std::cout << parameterYaml(tools::mapperConfig(given));
     return 0;
   }
   const auto states = parseStates(given["include"].as<std::string>());
-  if (given.count("output")) checkMapFileName(given["output"].as<std::string>());
+  if (given.count("output") && !isMapFileName(given["output"].as<std::string>())) {
+    checkMapFileName(given["output"].as<std::string>());
+  }
   for (const char* file : {"output", "report"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
+  DriveLog drive(driveId(given, sequence, first, last), sequence.folder());
+  std::vector<DriveRecord> drives;
+  if (given.count("resume")) drives = resume(mapper, given["resume"].as<std::string>(), drive.record().id);
 
   std::vector<ScanReport> scans;
   std::size_t refused = 0;
   for (std::size_t i = first; i < last; ++i) {
     try {
-      scans.push_back({sequence.name(i), mapper.integrate(sequence.read(i).scan())});
+      const Scan scan = sequence.read(i).scan();
+      scans.push_back({sequence.name(i), mapper.integrate(scan)});
+      drive.addScan(scan.stamp, mapper);
     } catch (const ScanRefused& refusal) {
       // Report the first refusal and count the others, which mostly have the same reason.
       if (refused++ == 0)
@@ -61,8 +99,15 @@ int mapSequence(const po::variables_map& given) {
     }
     tools::showProgress(scans.size(), last - first, progressText(scans.back()));
   }
-  if (given.count("output"))
-    exportMap(given["output"].as<std::string>(), mapper.map(), mapper.classes(), states);
+  if (given.count("output")) {
+    const std::string output = given["output"].as<std::string>();
+    if (isMapFileName(output)) {
+      if (drive.record().scans > 0) drives.push_back(drive.record());
+      saveMap(output, mapInfoOf(mapper, kFrame), drives, mapper.map());
+    } else {
+      exportMap(output, mapper.map(), mapper.classes(), states);
+    }
+  }
   if (given.count("report")) writeTextFile(given["report"].as<std::string>(), reportJson(mapper, scans));
   std::cout << summaryText(mapper, scans);
   if (refused > 0) {

@@ -30,6 +30,7 @@ LIBRARIES = {
     'simd': ('immintrin.h',),
     'beams/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
     'mapping/semantic_mapper.cpp': ('malloc.h',),
+    'store': ('sqlite3.h', 'zlib.h'),
     'io': ('pcl/', 'yaml-cpp/'),
     'evaluation': ('nlohmann/',),
     'simulation': ('yaml-cpp/',),

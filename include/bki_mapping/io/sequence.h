@@ -36,6 +36,7 @@ class Sequence {
 
   /// Number of scans that exist; the index `i` below runs over these, without gaps.
   std::size_t size() const { return poses_.size(); }
+  const std::string& folder() const { return folder_; }
   /// File name of a scan without its extension.
   const std::string& name(std::size_t i) const { return names_[i]; }
   /// The number in the file name.

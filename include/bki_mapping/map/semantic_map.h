@@ -113,6 +113,8 @@ class SemanticMap {
   /// Adds the evidence of another map, so that this one holds the posterior of both sets of scans.
   /// @throws std::invalid_argument if the resolution, the prior or the number of classes differs.
   void add(const SemanticMap& other);
+  /// @throws std::invalid_argument if add() would.
+  void checkAddable(const SemanticMap& other) const;
 
   /// Memory of all blocks and of the index [bytes], including what is shared with snapshots.
   std::size_t bytes() const;

@@ -36,6 +36,11 @@ class SemanticMapper {
   /// or occlusion marks, which depend on the order of scans.
   ScanStats withdraw(const Scan& scan);
 
+  /// Adds another map, as of a file: the map is then the same to the bit as if the scans of both had been
+  /// integrated here.
+  /// @throws std::invalid_argument as SemanticMap::add, std::bad_alloc; the map is then unchanged.
+  void addMap(SemanticMap other);
+
   /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
   /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start
   /// (Changes::kAtStart); the settings are then unchanged.
@@ -69,6 +74,7 @@ class SemanticMapper {
 
   const SemanticMap& map() const { return map_; }
   const ClassTable& classes() const { return *classes_; }
+  const std::shared_ptr<const ClassTable>& sharedClasses() const { return classes_; }
   const MapperConfig& config() const { return config_; }
 
  private:
@@ -80,6 +86,7 @@ class SemanticMapper {
   ScanStats add(const Scan& scan, bool withdraws);
   /// Cleans up after a failure: recounts the map's bytes, and frees the working memory, which may be large.
   void recover() noexcept;
+  void countBlockBytes() noexcept;
   void setGains();
 
   MapperConfig config_;

@@ -18,6 +18,11 @@ class MapFileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+/// Another process, or another place in this one, has the file open.
+class MapFileInUse : public MapFileError {
+ public:
+  using MapFileError::MapFileError;
+};
 
 /// A unit of evidence is 2^-kUnitExponent.
 constexpr int kUnitExponent = 16;

@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""Reads a map file (.bkm) with SQLite and NumPy alone: a reader to start from, and a test of docs/map_file.md."""
+import pathlib
+import sqlite3
+import sys
+import zlib
+
+import numpy
+
+
+def read_planes(file, part=0):
+    """Yields for each plane the index of its block, the id of its class (255: free), and its evidence as an array
+    [z, y, x]: without the prior, in the kernel's unit."""
+    database = sqlite3.connect(pathlib.Path(file).absolute().as_uri() + '?mode=ro', uri=True)
+    (application,), (version,) = (database.execute(f'PRAGMA {name}').fetchone() for name in ('application_id', 'user_version'))
+    if application != 0x424b494d or version != 1:
+        raise ValueError(f'{file} is no map of version 1')
+    exponent, = database.execute('SELECT unit_exponent FROM map').fetchone()
+    for z, y, x, blocks, planes, content in database.execute(
+            'SELECT z, y, x, blocks, planes, content FROM tile WHERE part = ? ORDER BY z, y, x', (part,)):
+        lengths, position = numpy.frombuffer(content, '<u4', 6), 24
+
+        def section(number, size):
+            nonlocal position
+            data = content[position:position + lengths[number]]
+            position += lengths[number]
+            return numpy.frombuffer(data if len(data) == size else zlib.decompress(data), numpy.uint8)
+        listed = section(0, 4 * blocks + planes)
+        numbers, counts, marked = listed[:2 * blocks].view('<u2'), listed[2 * blocks:3 * blocks], listed[3 * blocks:4 * blocks]
+        masks = numpy.unpackbits(section(1, 64 * (int(marked.sum()) + planes)), bitorder='little').reshape(-1, 512)
+        masks = masks[int(marked.sum()):].astype(bool)
+        size = int(masks.sum())
+        units = numpy.zeros(masks.shape, '<i4')
+        units[masks] = numpy.stack([section(byte, size) for byte in range(2, 6)], axis=1).copy().view('<i4').ravel()
+        for block, label, plane in zip(numpy.repeat(numbers, counts), listed[4 * blocks:], units):
+            index = 8 * x + block % 8, 8 * y + block // 8 % 8, 8 * z + block // 64
+            yield tuple(map(int, index)), int(label), plane.reshape(8, 8, 8) / 2.0 ** exponent
+
+
+if __name__ == '__main__':
+    for block, label, evidence in read_planes(sys.argv[1]):
+        print(*block, label, evidence.sum())

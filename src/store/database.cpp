@@ -1,0 +1,240 @@
+#include "store/database.h"
+
+#include <sqlite3.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <new>
+#include <utility>
+
+#include "core/atomic_file.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
+
+[[noreturn]] void fail(const std::string& path, sqlite3* database, int code) {
+  const int system_error = database ? sqlite3_system_errno(database) : 0;
+  const std::string reason = system_error ? std::strerror(system_error) : sqlite3_errstr(code);
+  switch (code & 0xff) {
+    case SQLITE_NOMEM:
+      throw std::bad_alloc();
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw MapFileInUse(path + kBusy);
+    case SQLITE_NOTADB:
+      throw MapFileError(path + " is not a map of bki_mapping; give the name of a .bkm file");
+    case SQLITE_CANTOPEN:
+      throw MapFileError(path + " cannot be opened: " + reason + "; check name and rights");
+    case SQLITE_FULL:
+    case SQLITE_READONLY:
+      throw MapFileError(writeFailure(path, sqlite3_errstr(code)).what());
+    case SQLITE_IOERR:
+      if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_SHORT_READ) {
+        throw MapFileError(path + " cannot be read: " + reason + "; check the disk");
+      }
+      throw MapFileError(writeFailure(path, reason).what());
+    default:
+      throw damaged(path, database ? sqlite3_errmsg(database) : sqlite3_errstr(code));
+  }
+}
+
+sqlite3_file* fileOf(sqlite3* database) {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database, "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  return file;
+}
+
+/// Sets what an application that opens files of strangers should: see sqlite.org/security.html.
+void distrust(sqlite3* database) {
+  constexpr std::pair<int, int> kSettings[] = {{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                               {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                               {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0},
+                                               {SQLITE_DBCONFIG_ENABLE_VIEW, 0},
+                                               {SQLITE_DBCONFIG_DQS_DDL, 0},
+                                               {SQLITE_DBCONFIG_DQS_DML, 0},
+                                               {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0}};
+  for (const auto& [setting, value] : kSettings) {
+    sqlite3_db_config(database, setting, value, static_cast<int*>(nullptr));
+  }
+  constexpr std::pair<int, int> kLimits[] = {
+      {SQLITE_LIMIT_LENGTH, 300'000'000},  // more than the largest tile
+      {SQLITE_LIMIT_SQL_LENGTH, 4096},    {SQLITE_LIMIT_COLUMN, 32},
+      {SQLITE_LIMIT_EXPR_DEPTH, 20},      {SQLITE_LIMIT_COMPOUND_SELECT, 3},
+      {SQLITE_LIMIT_VDBE_OP, 25'000},     {SQLITE_LIMIT_FUNCTION_ARG, 8},
+      {SQLITE_LIMIT_ATTACHED, 0},         {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 50},
+      {SQLITE_LIMIT_VARIABLE_NUMBER, 32}, {SQLITE_LIMIT_TRIGGER_DEPTH, 1},
+      {SQLITE_LIMIT_WORKER_THREADS, 0}};
+  for (const auto& [limit, value] : kLimits) sqlite3_limit(database, limit, value);
+}
+
+}  // namespace
+
+MapFileError damaged(const std::string& path, const std::string& what) {
+  return MapFileError(path + " is damaged (" + what + "); use another copy of it");
+}
+
+void Database::Close::operator()(sqlite3* database) const {
+  sqlite3_close_v2(database);
+}
+
+Database::Database(const std::string& path, Mode mode, const std::string& name) : name_(name) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    throw MapFileError(name_ + " is no regular file; give the name of a .bkm file");
+  }
+  sqlite3* opened = nullptr;
+  // Absolute paths have no special meaning, as "file:x" or ":memory:" have.
+  const std::string absolute = std::filesystem::absolute(path).string();
+  const int code = sqlite3_open_v2(absolute.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX,
+                                   mode == Mode::kNew ? "unix-none" : nullptr);
+  database_.reset(opened);
+  if (code != SQLITE_OK) fail(name_, opened, code);
+  sqlite3_extended_result_codes(opened, 1);
+  harden(mode);
+}
+
+void Database::harden(Mode mode) {
+  run("PRAGMA mmap_size = 0");
+  run("PRAGMA temp_store = MEMORY");
+  if (mode == Mode::kNew) {  // SQLite's defences would keep the journal on
+    run("PRAGMA journal_mode = OFF");
+    run("PRAGMA synchronous = OFF");
+  }
+  distrust(database_.get());
+  run("PRAGMA cell_size_check = ON");
+  if (mode == Mode::kRead) run("PRAGMA query_only = ON");
+  if (mode == Mode::kUpdate) {
+    run("PRAGMA locking_mode = EXCLUSIVE");
+    run("PRAGMA synchronous = EXTRA");
+  }
+}
+
+Database::Header Database::header() const {
+  Header header{};
+  sqlite3_file* const file = fileOf(database_.get());
+  const int code = file->pMethods->xRead(file, header.data(), static_cast<int>(header.size()), 0);
+  if (code == SQLITE_IOERR_SHORT_READ) fail(name_, nullptr, SQLITE_NOTADB);
+  if (code != SQLITE_OK) fail(name_, database_.get(), code);
+  return header;
+}
+
+std::int64_t Database::fileSize() const {
+  sqlite3_file* const file = fileOf(database_.get());
+  sqlite3_int64 size = 0;
+  const int code = file->pMethods->xFileSize(file, &size);
+  if (code != SQLITE_OK) fail(name_, database_.get(), code);
+  return size;
+}
+
+void Database::run(const char* sql) {
+  const int code = sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) fail(name_, database_.get(), code);
+}
+
+std::int64_t Database::integerOf(const char* sql) const {
+  Statement statement = prepare(sql);
+  if (!statement.step()) throw damaged(name_, "a row is missing");
+  return statement.integer(0);
+}
+
+int Database::changes() const {
+  return sqlite3_changes(database_.get());
+}
+
+void Database::rollBack() noexcept {
+  if (!sqlite3_get_autocommit(database_.get())) {
+    sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+}
+
+void Statement::Finalize::operator()(sqlite3_stmt* statement) const {
+  sqlite3_finalize(statement);
+}
+
+Statement::Statement(const std::string& path, sqlite3* database, const char* sql)
+    : path_(path), database_(database) {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v2(database, sql, -1, &statement, nullptr);
+  statement_.reset(statement);
+  check(code);
+}
+
+void Statement::check(int code) const {
+  if (code != SQLITE_OK) fail(path_, database_, code);
+}
+
+bool Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) return true;
+  if (code != SQLITE_DONE) fail(path_, database_, code);
+  return false;
+}
+
+void Statement::reset() noexcept {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+void Statement::bind(int parameter, std::int64_t value) {
+  check(sqlite3_bind_int64(statement_.get(), parameter + 1, value));
+}
+
+void Statement::bind(int parameter, double value) {
+  check(sqlite3_bind_double(statement_.get(), parameter + 1, value));
+}
+
+void Statement::bind(int parameter, const std::string& value) {
+  check(sqlite3_bind_text64(statement_.get(), parameter + 1, value.data(), value.size(), SQLITE_TRANSIENT,
+                            SQLITE_UTF8));
+}
+
+void Statement::bindNull(int parameter) {
+  check(sqlite3_bind_null(statement_.get(), parameter + 1));
+}
+
+void Statement::bindBytes(int parameter, const std::string& bytes) {
+  check(sqlite3_bind_blob64(statement_.get(), parameter + 1, bytes.data(), bytes.size(), SQLITE_STATIC));
+}
+
+std::int64_t Statement::integer(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_INTEGER) {
+    throw damaged(path_, "a value is no integer");
+  }
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+double Statement::real(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_FLOAT) {
+    throw damaged(path_, "a value is no real number");
+  }
+  return sqlite3_column_double(statement_.get(), column);
+}
+
+std::string Statement::text(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_TEXT) {
+    throw damaged(path_, "a value is no text");
+  }
+  const auto* const text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+  if (!text) throw std::bad_alloc();
+  return {text, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+bool Statement::isNull(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+Statement::Bytes Statement::bytes(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_BLOB) {
+    throw damaged(path_, "a value is no blob");
+  }
+  const auto* const data = static_cast<const unsigned char*>(sqlite3_column_blob(statement_.get(), column));
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+  if (!data && size > 0) throw std::bad_alloc();
+  return {data, size};
+}
+
+}  // namespace bki_mapping

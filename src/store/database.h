@@ -1,0 +1,99 @@
+/// @file SQLite, hardened against hostile files, with errors in one sentence.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "bki_mapping/store/map_info.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace bki_mapping {
+
+/// A prepared statement. Columns and parameters are counted from 0.
+class Statement {
+ public:
+  /// Runs to the next row. @return false after the last one. @throws MapFileError.
+  bool step();
+  /// Prepares to run again, with all parameters unbound.
+  void reset() noexcept;
+
+  void bind(int parameter, std::int64_t value);
+  void bind(int parameter, double value);
+  void bind(int parameter, const std::string& value);
+  void bindNull(int parameter);
+  /// @param bytes must stay until the next reset().
+  void bindBytes(int parameter, const std::string& bytes);
+
+  // Values of the present row. @throws MapFileError that the file is damaged if the type is another one.
+  std::int64_t integer(int column) const;
+  double real(int column) const;
+  std::string text(int column) const;
+  bool isNull(int column) const;
+  /// A view that is valid until the next step() or reset().
+  struct Bytes {
+    const unsigned char* data;
+    std::size_t size;
+  };
+  Bytes bytes(int column) const;
+
+ private:
+  friend class Database;
+  Statement(const std::string& path, sqlite3* database, const char* sql);
+  void check(int code) const;
+
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  std::string path_;
+  sqlite3* database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+/// An SQLite database whose content is not trusted.
+class Database {
+ public:
+  enum class Mode {
+    kRead,    ///< many at the same time
+    kUpdate,  ///< alone; changes are durable
+    kNew,     ///< an existing file of which nobody knows: without locks, journal and syncing
+  };
+  /// The first 100 bytes of the file.
+  using Header = std::array<unsigned char, 100>;
+
+  /// @param name what errors call the file. @throws MapFileError; also if another one has locked the file.
+  Database(const std::string& path, Mode mode, const std::string& name);
+  /// Likewise, named after its path.
+  Database(const std::string& path, Mode mode) : Database(path, mode, path) {}
+
+  const std::string& name() const { return name_; }
+  /// @throws MapFileError if the file is shorter.
+  Header header() const;
+  std::int64_t fileSize() const;
+  /// Runs a statement and ignores its rows.
+  void run(const char* sql);
+  Statement prepare(const char* sql) const { return {name_, database_.get(), sql}; }
+  /// The value of a statement with one row and column.
+  std::int64_t integerOf(const char* sql) const;
+  /// The number of rows that the last statement changed.
+  int changes() const;
+  /// Rolls an open transaction back, if there is one.
+  void rollBack() noexcept;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const;
+  };
+  void harden(Mode mode);
+
+  std::string name_;
+  std::unique_ptr<sqlite3, Close> database_;
+};
+
+/// "PATH is damaged (WHAT); take a copy of it ..."
+MapFileError damaged(const std::string& path, const std::string& what);
+
+}  // namespace bki_mapping

@@ -1,0 +1,419 @@
+#include "bki_mapping/store/map_file.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "core/atomic_file.h"
+#include "store/database.h"
+#include "store/records.h"
+#include "store/schema.h"
+#include "store/tile_codec.h"
+
+namespace bki_mapping {
+namespace {
+
+/// No voxel with a valid index, nor one beside it, lies in a tile farther out.
+constexpr int kMostTileIndex = (1 << 22) + 1;
+constexpr int kTileEdge = Region::kEdge * kBlockEdge;
+static_assert(GridGeometry::kMaxCoordinate == double{1 << 22} * kTileEdge);
+
+constexpr char kSelectEntry[] = "SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list ";
+
+/// What the library writes into MapInfo::program.
+constexpr char kProgram[] = "bki_mapping " BKI_MAPPING_VERSION;
+
+TileEntry readEntry(const Statement& row, const std::string& name) {
+  const auto number = [&](int column, std::int64_t least, std::int64_t most) {
+    const std::int64_t value = row.integer(column);
+    if (value < least || value > most) throw damaged(name, "a number of a tile is out of range");
+    return static_cast<int>(value);
+  };
+  TileEntry entry;
+  entry.index.x = number(0, -kMostTileIndex, kMostTileIndex);
+  entry.index.y = number(1, -kMostTileIndex, kMostTileIndex);
+  entry.index.z = number(2, -kMostTileIndex, kMostTileIndex);
+  entry.blocks = number(3, 1, Region::kBlocks);
+  entry.planes = number(4, 0, Region::kBlocks * (static_cast<int>(kMaxClasses) + 1));
+  const std::int64_t checksum = row.integer(5);
+  if (checksum < 0 || checksum > 0xffffffff) throw damaged(name, "a checksum is out of range");
+  entry.checksum = static_cast<std::uint32_t>(checksum);
+  return entry;
+}
+
+void addTo(Totals& totals, const TileEntry& entry, int sign) {
+  totals.tiles += sign;
+  totals.blocks += sign * entry.blocks;
+  totals.planes += sign * entry.planes;
+  totals.checksums += sign * std::int64_t{entry.checksum};
+}
+
+std::string nameOf(const TileKey& key) {
+  return "tile (" + std::to_string(key.index.x) + ", " + std::to_string(key.index.y) + ", " +
+         std::to_string(key.index.z) + ") of part " + std::to_string(key.part);
+}
+
+void bindKey(Statement& statement, const TileKey& key) {
+  int parameter = 0;
+  for (const int number : {key.part, key.index.z, key.index.y, key.index.x}) {
+    statement.bind(parameter++, std::int64_t{number});
+  }
+}
+
+void checkSameShape(const SemanticMap& map, const MapInfo& info) {
+  if (map.geometry().resolution() == info.resolution && map.prior() == info.prior &&
+      map.classCount() == info.classes->size()) {
+    return;
+  }
+  throw std::invalid_argument(
+      "the resolution, prior or number of classes of the map in memory is not that of the file");
+}
+
+}  // namespace
+
+struct MapFile::State {
+  State(const std::string& path, Database::Mode mode, const std::string& name)
+      : database(path, mode, name), writable(mode != Database::Mode::kRead) {}
+
+  /// Reads and checks all but the content of the tiles.
+  void readAll() {
+    std::string table_name;
+    totals = readTotals(database);
+    Totals found;
+    const std::uint32_t map_row = readMapRow(database, info, table_name);
+    found.checksums += map_row;
+    std::vector<SemanticClass> classes = readClasses(database, totals.classes, found.checksums);
+    found.classes = static_cast<std::int64_t>(classes.size());
+    found.drives = static_cast<std::int64_t>(readDrives(database, totals.drives, found.checksums).size());
+    try {
+      info.classes = std::make_shared<const ClassTable>(table_name, std::move(classes));
+      checkInfo(info);
+    } catch (const std::invalid_argument& error) {
+      throw damaged(database.name(), error.what());
+    }
+    Statement select =
+        database.prepare("SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list");
+    while (select.step()) addTo(found, readEntry(select, database.name()), 1);
+    if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
+  }
+  TileCodec& tileCodec() {
+    if (!codec) codec = std::make_unique<TileCodec>(*info.classes);
+    return *codec;
+  }
+  std::int64_t checksumOf(const std::string& drive) {
+    Statement select = database.prepare("SELECT checksum FROM drive WHERE id = ?");
+    select.bind(0, drive);
+    return select.step() ? select.integer(0) : -1;
+  }
+
+  Database database;
+  bool writable;
+  MapInfo info;
+  Totals totals;
+  std::unique_ptr<TileCodec> codec;
+};
+
+MapFile::MapFile(std::unique_ptr<State> state) : state_(std::move(state)) {}
+MapFile::~MapFile() = default;
+MapFile::MapFile(MapFile&&) noexcept = default;
+MapFile& MapFile::operator=(MapFile&&) noexcept = default;
+
+MapFile::MapFile(const std::string& path, Access access) {
+  const auto mode = access == Access::kRead ? Database::Mode::kRead : Database::Mode::kUpdate;
+  state_ = std::make_unique<State>(path, mode, path);
+  Database& database = state_->database;
+  checkIdentity(database);
+  // Whoever updates holds the lock of the file from here on; who reads holds a lock that keeps others from
+  // updating.
+  if (access == Access::kUpdate) {
+    database.run("BEGIN EXCLUSIVE");
+    database.run("COMMIT");
+  } else {
+    database.run("BEGIN");
+  }
+  checkSchema(database);
+  state_->readAll();
+}
+
+MapFile MapFile::create(const std::string& path, const MapInfo& info) {
+  if (std::filesystem::exists(path)) {
+    throw MapFileError(path + " is there already; open it for update, or choose another name");
+  }
+  NewMapFile(path, info).commit();
+  return MapFile(path, Access::kUpdate);
+}
+
+const std::string& MapFile::path() const {
+  return state_->database.name();
+}
+
+const MapInfo& MapFile::info() const {
+  return state_->info;
+}
+
+MapFile::Size MapFile::size() const {
+  const Totals& totals = state_->totals;
+  return {static_cast<std::uint64_t>(totals.tiles), static_cast<std::uint64_t>(totals.blocks),
+          static_cast<std::uint64_t>(totals.planes), static_cast<std::uint64_t>(state_->database.fileSize())};
+}
+
+std::vector<DriveRecord> MapFile::drives() {
+  std::int64_t ignored = 0;
+  return readDrives(state_->database, state_->totals.drives, ignored);
+}
+
+std::vector<TileEntry> MapFile::tiles(int part) {
+  constexpr int kMost = kMostTileIndex;
+  return tilesIn({-kMost, -kMost, -kMost}, {kMost, kMost, kMost}, part);
+}
+
+std::vector<TileEntry> MapFile::tilesIn(const GridIndex& low, const GridIndex& high, int part) {
+  const std::string sql = std::string(kSelectEntry) +
+                          "WHERE part = ? AND z BETWEEN ? AND ? AND y BETWEEN ? AND ? AND x BETWEEN ? AND ? "
+                          "ORDER BY z, y, x";
+  Statement select = state_->database.prepare(sql.c_str());
+  int parameter = 0;
+  for (const int number : {part, low.z, high.z, low.y, high.y, low.x, high.x}) {
+    select.bind(parameter++, std::int64_t{number});
+  }
+  std::vector<TileEntry> entries;
+  while (select.step()) entries.push_back(readEntry(select, state_->database.name()));
+  return entries;
+}
+
+std::optional<TileEntry> MapFile::findTile(const TileKey& key) {
+  const std::string sql = std::string(kSelectEntry) + "WHERE part = ? AND z = ? AND y = ? AND x = ?";
+  Statement select = state_->database.prepare(sql.c_str());
+  bindKey(select, key);
+  if (!select.step()) return std::nullopt;
+  const TileEntry entry = readEntry(select, state_->database.name());
+  if (select.step()) throw damaged(state_->database.name(), nameOf(key) + " is there twice");
+  return entry;
+}
+
+bool MapFile::addTileTo(SemanticMap& map, const TileKey& key) {
+  checkSameShape(map, state_->info);
+  const std::optional<TileEntry> entry = findTile(key);
+  if (!entry) return false;
+  Statement select = state_->database.prepare(
+      "SELECT content FROM tile INDEXED BY tile_list WHERE part = ? AND z = ? AND y = ? AND x = ?");
+  bindKey(select, key);
+  if (!select.step()) throw damaged(state_->database.name(), nameOf(key) + " has no content");
+  const Statement::Bytes content = select.bytes(0);
+  const std::string fault = state_->tileCodec().unpack(key, *entry, content.data, content.size);
+  if (!fault.empty()) throw damaged(state_->database.name(), nameOf(key) + ": " + fault);
+  state_->tileCodec().addTo(map, key);
+  return true;
+}
+
+struct MapFile::Change::State {
+  MapFile::State& file;
+  Totals totals;
+  bool done = false;
+};
+
+MapFile::Change::Change(MapFile& file)
+    : state_(std::make_unique<State>(State{*file.state_, file.state_->totals})) {
+  file.state_->database.run("BEGIN");
+}
+
+MapFile::Change::Change(Change&&) noexcept = default;
+MapFile::Change::~Change() {
+  if (state_ && !state_->done) state_->file.database.rollBack();
+}
+
+MapFile::Change MapFile::change() {
+  if (!state_->writable) throw std::logic_error(state_->database.name() + " is open for reading only");
+  return Change(*this);
+}
+
+void MapFile::Change::eraseTile(const TileKey& key) {
+  MapFile::State& file = state_->file;
+  Statement select = file.database.prepare(
+      (std::string(kSelectEntry) + "WHERE part = ? AND z = ? AND y = ? AND x = ?").c_str());
+  bindKey(select, key);
+  if (!select.step()) return;
+  addTo(state_->totals, readEntry(select, file.database.name()), -1);
+  select.reset();
+  Statement erase = file.database.prepare("DELETE FROM tile WHERE part = ? AND z = ? AND y = ? AND x = ?");
+  bindKey(erase, key);
+  erase.step();
+}
+
+void MapFile::Change::writeTile(const SemanticMap& map, const TileKey& key) {
+  MapFile::State& file = state_->file;
+  checkSameShape(map, file.info);
+  if (key.part < 0) throw std::invalid_argument("the part of a tile is negative");
+  TileCodec& codec = file.tileCodec();
+  const TileEntry entry = codec.pack(map, key);
+  eraseTile(key);
+  if (entry.blocks == 0) return;
+  Statement insert = file.database.prepare("INSERT INTO tile VALUES (?,?,?,?,?,?,?,?)");
+  bindKey(insert, key);
+  insert.bind(4, std::int64_t{entry.blocks});
+  insert.bind(5, std::int64_t{entry.planes});
+  insert.bind(6, std::int64_t{entry.checksum});
+  insert.bindBytes(7, codec.packed());
+  insert.step();
+  addTo(state_->totals, entry, 1);
+}
+
+void MapFile::Change::eraseDrive(const std::string& id) {
+  MapFile::State& file = state_->file;
+  const std::int64_t checksum = file.checksumOf(id);
+  if (checksum < 0) return;
+  Statement erase = file.database.prepare("DELETE FROM drive WHERE id = ?");
+  erase.bind(0, id);
+  erase.step();
+  state_->totals.drives -= 1;
+  state_->totals.checksums -= checksum;
+}
+
+void MapFile::Change::putDrive(const DriveRecord& drive) {
+  checkDrive(drive);
+  eraseDrive(drive.id);
+  Statement insert = state_->file.database.prepare("INSERT INTO drive VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)");
+  state_->totals.checksums += writeDriveRow(insert, drive);
+  state_->totals.drives += 1;
+}
+
+void MapFile::Change::commit() {
+  MapFile::State& file = state_->file;
+  writeTotals(file.database, state_->totals);
+  file.database.run("COMMIT");
+  file.totals = state_->totals;
+  state_->done = true;
+}
+
+namespace {
+
+/// Keeps others from opening a file that is about to be replaced. A journal that a killed process left beside
+/// it is applied first, since it must not be taken for one of the new file.
+std::optional<Database> lockReplaced(const std::string& path) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    Database old(path, Database::Mode::kUpdate);
+    checkIdentity(old);
+    old.run("BEGIN EXCLUSIVE");
+    old.run("COMMIT");
+    return old;
+  } catch (const MapFileInUse&) {
+    throw;
+  } catch (const MapFileError&) {
+    return std::nullopt;  // no map, or a damaged one: replaced as any other file
+  }
+}
+
+/// Removes what SQLite would take for a part of a new file with this name.
+void removeLeftovers(const std::string& path) {
+  std::error_code ignored;
+  const std::string target = std::filesystem::weakly_canonical(path, ignored).string();
+  for (const char* suffix : {"-journal", "-wal", "-shm"}) std::filesystem::remove(target + suffix, ignored);
+}
+
+/// @param limit for the memory of a map of these tiles [bytes]; 0: none.
+void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, std::size_t limit) {
+  std::size_t bytes = 0;
+  for (const TileEntry& tile : tiles) {
+    bytes += static_cast<std::size_t>(tile.planes) * kBlockVoxels * sizeof(EvidenceUnits) +
+             static_cast<std::size_t>(tile.blocks) * (sizeof(Block) + kReferenceCountBytes);
+  }
+  if (limit == 0 || bytes <= limit) return;
+  throw MapFileError("the map in " + path + " takes " + std::to_string(bytes / 1'000'000) +
+                     " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
+                     " MB; raise the limit, or load a part of it");
+}
+
+}  // namespace
+
+struct NewMapFile::State {
+  State(const std::string& file_path, const MapInfo& info)
+      : path(file_path), replaced(lockReplaced(path)), atomic(path) {
+    auto state = std::make_unique<MapFile::State>(atomic.temporaryPath(), Database::Mode::kNew, path);
+    state->database.run("BEGIN");
+    createSchema(state->database);
+    state->totals.checksums += writeMapRow(state->database, info);
+    Statement insert = state->database.prepare("INSERT INTO class VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+    for (const SemanticClass& c : info.classes->classes()) {
+      state->totals.checksums += writeClassRow(insert, state->totals.classes++, c);
+    }
+    writeTotals(state->database, state->totals);
+    state->database.run("COMMIT");
+    state->info = info;
+    file = MapFile(std::move(state));
+  }
+
+  std::string path;
+  std::optional<Database> replaced;
+  AtomicFile atomic;
+  MapFile file{std::unique_ptr<MapFile::State>()};
+  std::optional<MapFile::Change> change;
+};
+
+NewMapFile::NewMapFile(const std::string& path, const MapInfo& given) {
+  MapInfo info = given;
+  info.program = kProgram;
+  checkInfo(info);
+  try {
+    state_ = std::make_unique<State>(path, info);
+  } catch (const MapFileError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    throw MapFileError(error.what());
+  }
+  state_->change.emplace(state_->file.change());
+}
+
+NewMapFile::~NewMapFile() = default;
+
+MapFile::Change& NewMapFile::content() {
+  return *state_->change;
+}
+
+void NewMapFile::commit() {
+  state_->change->commit();
+  state_->change.reset();
+  state_->file = MapFile(std::unique_ptr<MapFile::State>());
+  removeLeftovers(state_->path);
+  try {
+    state_->atomic.commit();
+  } catch (const std::runtime_error& error) {
+    throw MapFileError(error.what());
+  }
+}
+
+void saveMap(const std::string& path, const MapInfo& info, const std::vector<DriveRecord>& drives,
+             const SemanticMap& map) {
+  MapInfo of_map = info;
+  of_map.resolution = map.geometry().resolution();
+  of_map.prior = map.prior();
+  NewMapFile file(path, of_map);
+  for (const DriveRecord& drive : drives) file.content().putDrive(drive);
+  for (const GridIndex& tile : tilesOf(map)) file.content().writeTile(map, {tile});
+  file.commit();
+}
+
+StoredMap loadMap(const std::string& path, std::size_t memory_limit) {
+  MapFile file(path, MapFile::Access::kRead);
+  return readMap(file, memory_limit);
+}
+
+StoredMap readMap(MapFile& file, std::size_t memory_limit) {
+  StoredMap stored{file.info(), file.drives(), file.info().emptyMap()};
+  const std::vector<TileEntry> tiles = file.tiles();
+  checkMemory(file.path(), tiles, memory_limit);
+  for (const TileEntry& tile : tiles) file.addTileTo(stored.map, {tile.index});
+  return stored;
+}
+
+std::vector<GridIndex> tilesOf(const SemanticMap& map) {
+  std::vector<GridIndex> tiles;
+  for (const auto& [index, block] : map.entries()) {
+    const GridIndex tile = SemanticMap::regionOf(index);
+    if (tiles.empty() || tiles.back() != tile) tiles.push_back(tile);  // entries() goes region by region
+  }
+  std::sort(tiles.begin(), tiles.end());
+  return tiles;
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,62 @@
+#include "bki_mapping/store/map_info.h"
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+namespace bki_mapping {
+namespace {
+
+template <typename T>
+std::string textOf(const T& value) {
+  std::ostringstream text;
+  text.precision(17);
+  text << value;
+  return text.str();
+}
+
+template <typename T>
+void checkSame(const std::string& what, const std::string& name, const T& value,
+               const std::string& other_name, const T& other) {
+  if (value == other) return;
+  throw std::invalid_argument(what + " of " + name + " is " + textOf(value) + " and that of " + other_name +
+                              " is " + textOf(other) + "; maps can only be added if they agree");
+}
+
+/// Classes in the order of their ids, whatever their order in the table.
+std::vector<std::string> classNames(const ClassTable& table) {
+  std::vector<std::pair<ClassId, std::string>> sorted;
+  for (const SemanticClass& c : table.classes()) sorted.emplace_back(c.id, c.name);
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<std::string> names;
+  for (const auto& [id, name] : sorted) names.push_back(std::to_string(id) + " '" + name + "'");
+  return names;
+}
+
+}  // namespace
+
+SemanticMap MapInfo::emptyMap() const {
+  return {GridGeometry(resolution), prior, classes->size()};
+}
+
+bool DriveRecord::operator==(const DriveRecord& other) const {
+  const bool same_bounds = bounds.isEmpty()
+                               ? other.bounds.isEmpty()
+                               : bounds.min() == other.bounds.min() && bounds.max() == other.bounds.max();
+  return id == other.id && name == other.name && part == other.part && scans == other.scans &&
+         first_stamp == other.first_stamp && last_stamp == other.last_stamp && same_bounds;
+}
+
+void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,
+                   const MapInfo& other) {
+  checkSame("the resolution", name, info.resolution, other_name, other.resolution);
+  checkSame("the unit exponent", name, info.unit_exponent, other_name, other.unit_exponent);
+  checkSame("the prior", name, info.prior, other_name, other.prior);
+  const std::vector<std::string> names = classNames(*info.classes), others = classNames(*other.classes);
+  checkSame("the number of classes", name, names.size(), other_name, others.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    checkSame("class " + std::to_string(i), name, names[i], other_name, others[i]);
+  }
+}
+
+}  // namespace bki_mapping

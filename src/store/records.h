@@ -1,0 +1,134 @@
+/// @file The rows of a map file's tables, each described once for writing, reading and checksums.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "bki_mapping/store/map_file.h"
+#include "store/database.h"
+
+namespace bki_mapping {
+
+/// CRC-32 (that of zlib) of a row's values: integers and real numbers as 8 bytes, little-endian; texts as
+/// their length, an integer, and their bytes; nothing for NULL.
+class RowChecksum {
+ public:
+  void add(std::int64_t value);
+  void add(double value);
+  void add(const std::string& value);
+  std::uint32_t value() const { return value_; }
+
+ private:
+  std::uint32_t value_ = 0;
+};
+
+/// Binds the fields of a row, and the row's checksum after them.
+class RowWriter {
+ public:
+  explicit RowWriter(Statement& statement) : statement_(statement) {}
+
+  template <typename T>
+  void operator()(const T& field) {
+    if constexpr (std::is_integral_v<T>) {
+      put(static_cast<std::int64_t>(field));
+    } else {
+      put(field);
+    }
+  }
+  void operator()(const std::optional<double>& field) {
+    if (field) return put(*field);
+    statement_.bindNull(column_++);
+  }
+  /// @return the checksum.
+  std::uint32_t finish() {
+    statement_.bind(column_, std::int64_t{checksum_.value()});
+    return checksum_.value();
+  }
+
+ private:
+  template <typename T>
+  void put(const T& value) {
+    checksum_.add(value);
+    statement_.bind(column_++, value);
+  }
+
+  Statement& statement_;
+  RowChecksum checksum_;
+  int column_ = 0;
+};
+
+/// Reads the fields of a row, and compares the row's checksum after them.
+class RowReader {
+ public:
+  /// @param name of the file in errors.
+  RowReader(const Statement& statement, const std::string& name) : statement_(statement), name_(name) {}
+
+  template <typename T>
+  void operator()(T& field) {
+    if constexpr (std::is_integral_v<T>) {
+      const std::int64_t value = statement_.integer(column_++);
+      field = static_cast<T>(value);
+      if (static_cast<std::int64_t>(field) != value || (std::is_unsigned_v<T> && value < 0)) {
+        throw damaged(name_, "a number is out of range");
+      }
+      checksum_.add(value);
+    } else if constexpr (std::is_floating_point_v<T>) {
+      field = statement_.real(column_++);
+      checksum_.add(field);
+    } else {
+      field = statement_.text(column_++);
+      checksum_.add(field);
+    }
+  }
+  void operator()(std::optional<double>& field) {
+    field.reset();
+    if (statement_.isNull(column_)) {
+      ++column_;
+    } else {
+      (*this)(field.emplace());
+    }
+  }
+  /// @return the checksum. @throws MapFileError if it is wrong.
+  std::uint32_t finish() const;
+
+ private:
+  const Statement& statement_;
+  const std::string& name_;
+  RowChecksum checksum_;
+  int column_ = 0;
+};
+
+/// How many rows the other tables have, so that none can be lost unnoticed.
+struct Totals {
+  std::int64_t classes = 0, drives = 0, tiles = 0, blocks = 0, planes = 0;
+  /// Sum of the checksums of all rows of the other tables.
+  std::int64_t checksums = 0;
+
+  bool operator==(const Totals& o) const {
+    return classes == o.classes && drives == o.drives && tiles == o.tiles && blocks == o.blocks &&
+           planes == o.planes && checksums == o.checksums;
+  }
+};
+
+/// Each reads or writes one row: the columns in the order of the table. @return the row's checksum.
+std::uint32_t writeMapRow(Database& database, const MapInfo& info);
+std::uint32_t readMapRow(Database& database, MapInfo& info, std::string& table_name);
+std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const SemanticClass& c);
+std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
+void writeTotals(Database& database, const Totals& totals);
+Totals readTotals(Database& database);
+
+/// All rows of a table. @param expected number of rows. @param[in,out] checksums is added to.
+/// @throws MapFileError if there are other rows.
+std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected, std::int64_t& checksums);
+std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, std::int64_t& checksums);
+
+/// @throws std::invalid_argument in one sentence if a value is not allowed.
+void checkInfo(const MapInfo& info);
+void checkDrive(const DriveRecord& drive);
+
+}  // namespace bki_mapping

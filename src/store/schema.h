@@ -1,0 +1,23 @@
+/// @file The tables of a map file, and its versions.
+#pragma once
+
+#include <cstdint>
+
+#include "store/database.h"
+
+namespace bki_mapping {
+
+/// "BKIM", the application_id in the header of the file.
+constexpr std::int64_t kApplicationId = 0x424b494d;
+constexpr std::int64_t kFormatVersion = 1;
+
+/// Marks an empty database as a map file, and creates the tables.
+void createSchema(Database& database);
+
+/// Checks that a file is a map, before SQLite interprets any of it. @return the version of its format.
+/// @throws MapFileError if it is no map, or of a newer version.
+std::int64_t checkIdentity(const Database& database);
+/// Checks that the file is complete, and that its tables are those of kFormatVersion, and nothing else.
+void checkSchema(const Database& database);
+
+}  // namespace bki_mapping

@@ -1,0 +1,343 @@
+#include "store/tile_codec.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <limits>
+#include <new>
+#include <stdexcept>
+
+namespace bki_mapping {
+namespace {
+
+constexpr std::size_t kMaskBytes = kBlockVoxels / 8;
+/// Deflate's limit: a compressed byte stands for no more bytes than this.
+constexpr std::size_t kMostInflation = 1032;
+constexpr std::size_t kLengthBytes = 4;
+
+void append32(std::string& bytes, std::uint32_t value) {
+  for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xffu);
+}
+
+std::uint32_t read32(const unsigned char* bytes) {
+  return bytes[0] | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
+         std::uint32_t{bytes[3]} << 24;
+}
+
+unsigned char at(const std::string& bytes, std::size_t i) {
+  return static_cast<unsigned char>(bytes[i]);
+}
+
+Bytef* bytesOf(std::string& text) {
+  return reinterpret_cast<Bytef*>(text.data());
+}
+const Bytef* bytesOf(const std::string& text) {
+  return reinterpret_cast<const Bytef*>(text.data());
+}
+
+void appendMask(std::string& bytes, const Block::Occlusion& marks) {
+  for (std::size_t v = 0; v < kBlockVoxels; v += 8) {
+    unsigned byte = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) byte |= static_cast<unsigned>(marks[v + bit]) << bit;
+    bytes += static_cast<char>(byte);
+  }
+}
+
+Block::Occlusion readMask(const char* bytes) {
+  Block::Occlusion marks;
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    marks[v] = (static_cast<unsigned char>(bytes[v / 8]) >> v % 8 & 1) != 0;
+  }
+  return marks;
+}
+
+/// Fills a plane with the values of the voxels in a mask. @return the first value that is left.
+const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, EvidenceUnits* plane) {
+  for (std::size_t byte = 0; byte < kMaskBytes; ++byte, plane += 8) {
+    for (unsigned bits = static_cast<unsigned char>(mask[byte]), v = 0; v < 8; ++v, bits >>= 1) {
+      plane[v] = (bits & 1u) != 0 ? static_cast<EvidenceUnits>(*values) : 0;
+      values += bits & 1u;
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+/// The streams of zlib, which take a quarter of a megabyte to set up.
+struct TileCodec::Zlib {
+  Zlib() {
+    // Runs are all that repeats here: looking for longer matches costs time and gains nothing.
+    if (deflateInit2(&packing, 1, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
+      throw std::bad_alloc();
+    }
+    if (inflateInit(&unpacking) != Z_OK) {
+      deflateEnd(&packing);
+      throw std::bad_alloc();
+    }
+  }
+  ~Zlib() {
+    deflateEnd(&packing);
+    inflateEnd(&unpacking);
+  }
+  Zlib(const Zlib&) = delete;
+  Zlib& operator=(const Zlib&) = delete;
+
+  z_stream packing{}, unpacking{};
+};
+
+TileCodec::TileCodec(const ClassTable& classes) : zlib_(std::make_unique<Zlib>()) {
+  for (const SemanticClass& c : classes.classes()) allowed_[c.id] = true;
+  allowed_[kFreeClass] = true;
+}
+
+TileCodec::~TileCodec() = default;
+
+void TileCodec::clear() {
+  for (std::string* piece : {&numbers_, &plane_counts_, &marked_, &classes_, &marks_, &evidence_masks_}) {
+    piece->clear();
+  }
+  values_.clear();
+  packed_.clear();
+  blocks_ = 0;
+}
+
+bool TileCodec::takePlane(const EvidenceUnits* units) {
+  const std::size_t before = values_.size(), masks_before = evidence_masks_.size();
+  values_.resize(before + kBlockVoxels);
+  evidence_masks_.resize(masks_before + kMaskBytes);
+  std::uint32_t* next = values_.data() + before;
+  for (std::size_t byte = 0; byte < kMaskBytes; ++byte) {
+    unsigned mask = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      const EvidenceUnits value = units[8 * byte + bit];
+      *next = static_cast<std::uint32_t>(value);
+      next += value != 0;
+      mask |= static_cast<unsigned>(value != 0) << bit;
+    }
+    evidence_masks_[masks_before + byte] = static_cast<char>(mask);
+  }
+  const auto after = static_cast<std::size_t>(next - values_.data());
+  values_.resize(after);
+  if (after == before) evidence_masks_.resize(masks_before);
+  return after != before;
+}
+
+void TileCodec::splitValues() {
+  for (std::size_t byte = 0; byte < 4; ++byte) {
+    std::string& section = sections_[kByte0 + byte];
+    section.resize(values_.size());
+    char* const out = section.data();
+    for (std::size_t i = 0; i < values_.size(); ++i) out[i] = static_cast<char>(values_[i] >> 8 * byte);
+  }
+}
+
+void TileCodec::joinValues() {
+  values_.resize(sections_[kByte0].size());
+  const Bytef* const bytes[] = {bytesOf(sections_[kByte0]), bytesOf(sections_[kByte1]),
+                                bytesOf(sections_[kByte2]), bytesOf(sections_[kByte3])};
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    values_[i] = bytes[0][i] | std::uint32_t{bytes[1][i]} << 8 | std::uint32_t{bytes[2][i]} << 16 |
+                 std::uint32_t{bytes[3][i]} << 24;
+  }
+}
+
+std::uint32_t TileCodec::checksum(const TileKey& key, const TileEntry& entry) const {
+  std::string head;
+  for (const int number : {key.part, key.index.x, key.index.y, key.index.z, entry.blocks, entry.planes}) {
+    append32(head, static_cast<std::uint32_t>(number));
+  }
+  uLong sum = crc32_z(0, bytesOf(head), head.size());
+  for (const std::string& section : sections_) sum = crc32_z(sum, bytesOf(section), section.size());
+  return static_cast<std::uint32_t>(sum);
+}
+
+void TileCodec::appendPacked(Section section) {
+  const std::string& bytes = sections_[section];
+  const auto length = [&](std::size_t size) {
+    for (unsigned i = 0; i < kLengthBytes; ++i) {
+      packed_[section * kLengthBytes + i] = static_cast<char>(size >> 8 * i & 0xff);
+    }
+  };
+  const std::size_t before = packed_.size();
+  if (section != kList && !bytes.empty()) {
+    z_stream& stream = zlib_->packing;
+    deflateReset(&stream);
+    packed_.resize(before + bytes.size() - 1);  // no better than stored otherwise
+    stream.next_in = const_cast<Bytef*>(bytesOf(bytes));
+    stream.avail_in = static_cast<uInt>(bytes.size());
+    stream.next_out = bytesOf(packed_) + before;
+    stream.avail_out = static_cast<uInt>(bytes.size() - 1);
+    if (deflate(&stream, Z_FINISH) == Z_STREAM_END) {
+      packed_.resize(before + stream.total_out);
+      length(stream.total_out);
+      return;
+    }
+    packed_.resize(before);
+  }
+  packed_ += bytes;
+  length(bytes.size());
+}
+
+TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
+  clear();
+  const Region region(key.index);
+  TileEntry entry{key.index};
+  for (int number = 0; number < Region::kBlocks; ++number) {
+    const Block* const block = map.find(region.blockIndex(number));
+    if (!block) continue;
+    int planes = 0;
+    for (std::size_t p = 0; p < block->classes().size(); ++p) {
+      const ClassId id = block->classes()[p];
+      if (!allowed_[id]) {
+        throw std::invalid_argument("the map has evidence for class " + std::to_string(id) +
+                                    ", which is not in the class table");
+      }
+      if (!takePlane(block->plane(p))) continue;
+      classes_ += static_cast<char>(id);
+      ++planes;
+    }
+    const bool marked = block->occlusion().any();
+    if (planes == 0 && !marked) continue;
+    if (marked) appendMask(marks_, block->occlusion());
+    numbers_ += static_cast<char>(number & 0xff);
+    numbers_ += static_cast<char>(number >> 8);
+    plane_counts_ += static_cast<char>(planes);
+    marked_ += static_cast<char>(marked);
+    ++entry.blocks;
+    entry.planes += planes;
+  }
+  if (entry.blocks == 0) return entry;
+  sections_[kList] = numbers_ + plane_counts_ + marked_ + classes_;
+  sections_[kMasks] = marks_ + evidence_masks_;
+  splitValues();
+  entry.checksum = checksum(key, entry);
+  packed_.assign(kSections * kLengthBytes, '\0');
+  for (std::size_t section = 0; section < kSections; ++section) appendPacked(static_cast<Section>(section));
+  return entry;
+}
+
+std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked) const {
+  const std::string& list = sections_[kList];
+  const auto blocks = static_cast<std::size_t>(entry.blocks);
+  std::size_t next_class = 4 * blocks;
+  int last_number = -1;
+  marked = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const int number = at(list, 2 * b) | at(list, 2 * b + 1) << 8;
+    if (number <= last_number || number >= Region::kBlocks) return "its blocks are out of order";
+    last_number = number;
+    const std::size_t planes = at(list, 2 * blocks + b), marks = at(list, 3 * blocks + b);
+    if (marks > 1 || planes + marks == 0) return "a block is empty";
+    marked += marks;
+    if (planes > list.size() - next_class) return "planes are missing";
+    for (std::size_t p = next_class; p < next_class + planes; ++p) {
+      if (p > next_class && at(list, p) <= at(list, p - 1)) return "its planes are out of order";
+      if (!allowed_[at(list, p)]) return "it has a class that is not in the class table";
+    }
+    next_class += planes;
+  }
+  return next_class == list.size() ? "" : "planes are left over";
+}
+
+std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
+                              std::size_t size) {
+  clear();
+  constexpr std::size_t kHead = kSections * kLengthBytes;
+  if (size < kHead) return "it is too short";
+  const unsigned char* next = bytes + kHead;
+  std::size_t left = size - kHead;
+  const auto take = [&](Section section, std::size_t wanted) -> std::string {
+    const std::size_t length = read32(bytes + section * kLengthBytes);
+    std::string& content = sections_[section];
+    if (length > left || length > wanted || (section == kList && length != wanted)) {
+      return "a length is wrong";
+    }
+    if (wanted > kMostInflation * (length + 1)) return "a length is wrong";
+    content.resize(wanted);
+    if (length == wanted) {
+      std::copy(next, next + length, content.begin());
+    } else {
+      z_stream& stream = zlib_->unpacking;
+      inflateReset(&stream);
+      stream.next_in = const_cast<Bytef*>(next);
+      stream.avail_in = static_cast<uInt>(length);
+      stream.next_out = bytesOf(content);
+      stream.avail_out = static_cast<uInt>(wanted);
+      if (inflate(&stream, Z_FINISH) != Z_STREAM_END || stream.avail_in > 0 || stream.avail_out > 0) {
+        return "it cannot be decompressed";
+      }
+    }
+    next += length;
+    left -= length;
+    return "";
+  };
+
+  if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
+  std::string fault =
+      take(kList, 4 * static_cast<std::size_t>(entry.blocks) + static_cast<std::size_t>(entry.planes));
+  std::size_t marked = 0;
+  if (fault.empty()) fault = checkList(entry, marked);
+  if (fault.empty()) fault = take(kMasks, kMaskBytes * (marked + static_cast<std::size_t>(entry.planes)));
+  if (!fault.empty()) return fault;
+  std::size_t values = 0;
+  for (std::size_t begin = 0; begin < sections_[kMasks].size(); begin += kMaskBytes) {
+    std::size_t bits = 0;
+    for (std::size_t i = begin; i < begin + kMaskBytes; ++i) {
+      bits += static_cast<std::size_t>(__builtin_popcount(at(sections_[kMasks], i)));
+    }
+    if (bits == 0) return "a plane is empty";
+    if (begin >= kMaskBytes * marked) values += bits;
+  }
+  for (std::size_t section = kByte0; section < kSections && fault.empty(); ++section) {
+    fault = take(static_cast<Section>(section), values);
+  }
+  if (!fault.empty()) return fault;
+  if (left > 0) return "bytes are left over";
+  if (checksum(key, entry) != entry.checksum) return "its checksum is wrong";
+  joinValues();
+  constexpr auto kLeast = static_cast<std::uint32_t>(std::numeric_limits<EvidenceUnits>::min());
+  for (const std::uint32_t value : values_) {
+    if (value == 0 || value == kLeast) return "a value is out of range";
+  }
+  blocks_ = entry.blocks;
+  return "";
+}
+
+void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
+  const Region region(key.index);
+  const std::string &list = sections_[kList], &masks = sections_[kMasks];
+  const auto blocks = static_cast<std::size_t>(blocks_);
+  const std::size_t marked =
+      static_cast<std::size_t>(std::count(list.begin() + static_cast<std::ptrdiff_t>(3 * blocks),
+                                          list.begin() + static_cast<std::ptrdiff_t>(4 * blocks), '\1'));
+  const char *marks = masks.data(), *mask = marks + kMaskBytes * marked;
+  const std::uint32_t* value = values_.data();
+  std::array<EvidenceUnits, kBlockVoxels> plane;
+  std::size_t next_class = 4 * blocks;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const BlockIndex index = region.blockIndex(at(list, 2 * b) | at(list, 2 * b + 1) << 8);
+    const bool is_new = !map.find(index);
+    Block& block = map.getOrAllocate(index);
+    const std::size_t planes = at(list, 2 * blocks + b);
+    if (is_new) block.reserve(planes);
+    for (std::size_t p = 0; p < planes; ++p, ++next_class, mask += kMaskBytes) {
+      if (is_new) {
+        block.change(at(list, next_class), [&](EvidenceUnits* units) {
+          value = fillPlane(mask, value, units);
+          return true;
+        });
+      } else {
+        value = fillPlane(mask, value, plane.data());
+        block.add(at(list, next_class), plane.data());
+      }
+    }
+    if (at(list, 3 * blocks + b) != 0) {
+      block.setOcclusion(block.occlusion() | readMask(marks));
+      marks += kMaskBytes;
+    }
+    if (block.empty()) map.erase(index);  // negative evidence may have undone all of it
+  }
+}
+
+}  // namespace bki_mapping
