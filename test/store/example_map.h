@@ -1,0 +1,80 @@
+/// @file The map in test/store/data/version_1.bkm, as write_example_map makes it: a bit of everything that a
+/// map file can hold, from formulas that any language can repeat.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/store/map_file.h"
+
+namespace bki_mapping {
+
+inline MapInfo exampleInfo() {
+  std::vector<SemanticClass> classes(3);
+  classes[0] = {0, "unlabelled", {0, 0, 0}, {}, true, true, false, false, true, std::nullopt};
+  classes[1] = {40, "Stra\u00dfe", {128, 64, 255}, {40, 60, 4000000000u}, false, false, false, true, false,
+                {}};
+  classes[2] = {253, "car", {0, 0, 142}, {10, 252}, false, false, true, false, false, 2.5};
+  MapInfo info;
+  info.resolution = 0.25;
+  info.prior = 0.001;
+  info.frame = "map";
+  info.classes = std::make_shared<ClassTable>("example", classes);
+  info.parameters = "resolution: 0.25\nfree_space:\n  mode: line\n";
+  return info;
+}
+
+/// The evidence of a drive: that of drive 0 is in the sum only, that of drive 1 also has a part of its own.
+inline SemanticMap exampleMap(int drive) {
+  SemanticMap map = exampleInfo().emptyMap();
+  std::vector<EvidenceUnits> plane(kBlockVoxels);
+  const auto add = [&](const BlockIndex& block, ClassId id, auto&& units_of) {
+    for (std::size_t v = 0; v < plane.size(); ++v) {
+      plane[v] = units_of(static_cast<std::uint32_t>(v));
+    }
+    map.getOrAllocate(block).add(id, plane.data());
+  };
+  const auto only = [](std::uint32_t voxel, EvidenceUnits units) {
+    return [=](std::uint32_t v) { return v == voxel ? units : 0; };
+  };
+  if (drive == 1) {
+    add({{0, 0, 0}}, 40, [](std::uint32_t v) { return static_cast<EvidenceUnits>(v); });
+    add({{-1, -1, -1}}, kFreeClass, only(511, -7));
+    add({{-1, -1, -1}}, kFreeClass, only(0, kMostUnits));
+    return map;
+  }
+  add({{0, 0, 0}}, 40, only(3, kMostUnits));                // stops there with the other drive's 3
+  add({{-1, -1, -1}}, kFreeClass, only(511, -kMostUnits));  // likewise
+  add({{1, 0, 0}}, 40, [](std::uint32_t) { return 65536; });
+  add({{1, 0, 0}}, 0, only(100, -1));
+  for (const ClassId id :
+       {ClassId{0}, ClassId{40}, ClassId{253}}) {  // incompressible: it fills several pages
+    add({{7, 7, 7}}, id, [&](std::uint32_t v) {
+      std::uint32_t mixed = (512u * id + v + 1u) * 2654435761u;
+      mixed = (mixed ^ mixed >> 15) * 2246822519u;
+      return static_cast<EvidenceUnits>((mixed ^ mixed >> 13) % 4294967295u - 2147483647u);
+    });
+  }
+  Block::Occlusion marks;
+  for (std::size_t v = 0; v < marks.size(); v += 3) marks[v] = true;
+  map.getOrAllocate({{8, 0, -8}}).setOcclusion(marks);
+  return map;
+}
+
+inline std::vector<DriveRecord> exampleDrives() {
+  DriveRecord first, second;
+  first.id = "3f1c";
+  first.name = "to the east";
+  first.scans = 271;
+  first.first_stamp = 1'700'000'000'000'000'001;
+  first.last_stamp = 1'700'000'027'000'000'000;
+  first.bounds = {Eigen::Vector3d(-2.0, -2.0, -16.0), Eigen::Vector3d(18.0, 16.0, 16.0)};
+  second.id = "9e02";
+  second.part = 1;  // without name, scans and bounds
+  return {first, second};
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,156 @@
+// Files of version 1 open for ever. What test/store/data/version_1.bkm holds was computed from the formulas
+// in example_map.h by a program that shares no code with this one; test/store/read_map_test.py compares the
+// same numbers.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "bki_mapping/store/map_file.h"
+#include "reference/content.h"
+#include "store/example_map.h"
+#include "store/map_maker.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
+
+SemanticMap readPart(MapFile& file, int part) {
+  SemanticMap map = file.info().emptyMap();
+  for (const TileEntry& tile : file.tiles(part)) EXPECT_TRUE(file.addTileTo(map, {tile.index, part}));
+  return map;
+}
+
+/// CRC-32 over all planes in the order of block (x, then y, then z) and class: x, y, z, class and the units,
+/// 4 bytes each, little-endian.
+uLong checksumOf(const SemanticMap& map) {
+  std::map<std::array<std::int32_t, 4>, const EvidenceUnits*> planes;
+  for (const auto& [index, block] : map.entries()) {
+    for (std::size_t p = 0; p < block->classes().size(); ++p) {
+      planes[{index.x, index.y, index.z, block->classes()[p]}] = block->plane(p);
+    }
+  }
+  uLong sum = 0;
+  for (const auto& [key, units] : planes) {
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(key.data()), sizeof key);
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(units), kBlockVoxels * sizeof(EvidenceUnits));
+  }
+  return sum;
+}
+
+EvidenceUnits unitsAt(const SemanticMap& map, const BlockIndex& block, ClassId id, std::size_t voxel) {
+  return map.find(block)->evidence(id)[voxel];
+}
+
+TEST(Version1, HoldsItsEvidence) {
+  MapFile file(kFile, MapFile::Access::kRead);
+  const SemanticMap map = readPart(file, 0), part = readPart(file, 1);
+  EXPECT_EQ(map.size(), 5u);
+  EXPECT_EQ(checksumOf(map), 0x5f49333bu);
+  EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 2), 2);
+  EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 2147483647);
+  EXPECT_EQ(unitsAt(map, {{-1, -1, -1}}, kFreeClass, 511), -2147483647);
+  EXPECT_EQ(unitsAt(map, {{1, 0, 0}}, 0, 100), -1);
+  EXPECT_EQ(unitsAt(map, {{7, 7, 7}}, 253, 1), 333336240);
+  EXPECT_EQ(part.size(), 2u);
+  EXPECT_EQ(checksumOf(part), 0x9b41d26fu);
+  EXPECT_EQ(unitsAt(part, {{-1, -1, -1}}, kFreeClass, 511), -7);
+  const Block* const marked = map.find({{8, 0, -8}});
+  ASSERT_NE(marked, nullptr);
+  EXPECT_TRUE(marked->classes().empty());
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) ASSERT_EQ(marked->occlusion()[v], v % 3 == 0) << v;
+}
+
+TEST(Version1, HoldsWhatTheMapIsAbout) {
+  MapFile file(kFile, MapFile::Access::kRead);
+  const MapInfo& info = file.info();
+  EXPECT_EQ(info.resolution, 0.25);
+  EXPECT_EQ(info.prior, 0.001);
+  EXPECT_EQ(info.unit_exponent, 16);
+  EXPECT_EQ(info.frame, "map");
+  EXPECT_EQ(info.parameters, "resolution: 0.25\nfree_space:\n  mode: line\n");
+  EXPECT_EQ(info.program, "bki_mapping 0.1.0");
+  EXPECT_EQ(info.classes->name(), "example");
+  ASSERT_EQ(info.classes->size(), 3u);
+  const SemanticClass &unlabelled = info.classes->classes()[0], &street = info.classes->classes()[1],
+                      &car = info.classes->classes()[2];
+  EXPECT_EQ(unlabelled.id, 0);
+  EXPECT_EQ(unlabelled.name, "unlabelled");
+  EXPECT_TRUE(unlabelled.unlabelled && unlabelled.any_raw && unlabelled.ignored);
+  EXPECT_FALSE(unlabelled.dynamic || unlabelled.ground || unlabelled.free_gain);
+  EXPECT_TRUE(unlabelled.raw.empty());
+  EXPECT_EQ(street.id, 40);
+  EXPECT_EQ(street.name, "Stra\303\237e");
+  EXPECT_EQ(street.color, (std::array<std::uint8_t, 3>{128, 64, 255}));
+  EXPECT_EQ(street.raw, (std::vector<std::uint32_t>{40, 60, 4000000000u}));
+  EXPECT_TRUE(street.ground);
+  EXPECT_FALSE(street.unlabelled || street.any_raw || street.dynamic || street.ignored || street.free_gain);
+  EXPECT_EQ(car.id, 253);
+  EXPECT_TRUE(car.dynamic);
+  EXPECT_EQ(car.free_gain, 2.5);
+
+  const std::vector<DriveRecord> drives = file.drives();
+  ASSERT_EQ(drives.size(), 2u);
+  EXPECT_EQ(drives[0].id, "3f1c");
+  EXPECT_EQ(drives[0].name, "to the east");
+  EXPECT_EQ(drives[0].part, 0);
+  EXPECT_EQ(drives[0].scans, 271u);
+  EXPECT_EQ(drives[0].first_stamp, 1700000000000000001u);
+  EXPECT_EQ(drives[0].last_stamp, 1700000027000000000u);
+  EXPECT_EQ(drives[0].bounds.min(), Eigen::Vector3d(-2.0, -2.0, -16.0));
+  EXPECT_EQ(drives[0].bounds.max(), Eigen::Vector3d(18.0, 16.0, 16.0));
+  EXPECT_EQ(drives[1].id, "9e02");
+  EXPECT_EQ(drives[1].part, 1);
+  EXPECT_TRUE(drives[1].bounds.isEmpty());
+}
+
+// What write_example_map would write today reads as what it wrote then.
+TEST(Version1, IsWhatTheFormulasSay) {
+  SemanticMap sum = exampleMap(0);
+  sum.add(exampleMap(1));
+  MapFile file(kFile, MapFile::Access::kRead);
+  EXPECT_EQ(reference::contentOf(readPart(file, 0)), reference::contentOf(sum));
+  EXPECT_EQ(reference::contentOf(readPart(file, 1)), reference::contentOf(exampleMap(1)));
+  EXPECT_TRUE(file.drives() == exampleDrives());
+  EXPECT_NO_THROW(checkSameGrid("file", file.info(), "formulas", exampleInfo()));
+}
+
+TEST(Version1, IsUpdatedByThisVersion) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::filesystem::copy_file(kFile, path);
+  std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  {
+    MapFile file(path, MapFile::Access::kUpdate);
+    MapFile::Change change = file.change();
+    change.writeTile(exampleMap(1), {{0, 0, 0}});
+    change.eraseDrive("3f1c");
+    change.commit();
+  }
+  MapFile file(path, MapFile::Access::kRead);
+  EXPECT_EQ(file.drives().size(), 1u);
+  const SemanticMap map = readPart(file, 0);
+  EXPECT_EQ(map.size(), 3u);
+  EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 3);
+}
+
+TEST(Version1, IsRefusedAsANewerVersion) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::filesystem::copy_file(kFile, path);
+  std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\2');
+  for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
+    EXPECT_EQ(
+        sentenceOf([&] { MapFile(path, access); }),
+        path +
+            " was written by a newer version of bki_mapping (format 2, this one knows formats up to 1); "
+            "use that version or a later one");
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping
