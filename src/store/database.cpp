@@ -14,6 +14,13 @@
 namespace bki_mapping {
 namespace {
 
+/// SQLite counts the steps of its virtual machine in portions of this size.
+constexpr int kStepsAtOnce = 1000;
+/// A row takes more than 60 bytes, with that of its index, and less than 30 steps to be read.
+constexpr double kStepsPerByte = 0.5;
+/// SQLite keeps up to 2 MB of a change in memory.
+constexpr std::int64_t kMostUnwritten = 4'000'000;
+
 constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
 
 [[noreturn]] void fail(const std::string& path, sqlite3* database, int code) {
@@ -25,6 +32,8 @@ constexpr char kBusy[] = " is open in another place; close it there, or work on 
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw MapFileInUse(path + kBusy);
+    case SQLITE_INTERRUPT:
+      throw damaged(path, "its pages contain each other");
     case SQLITE_NOTADB:
       throw MapFileError(path + " is not a map of bki_mapping; give the name of a .bkm file");
     case SQLITE_CANTOPEN:
@@ -81,7 +90,8 @@ void Database::Close::operator()(sqlite3* database) const {
   sqlite3_close_v2(database);
 }
 
-Database::Database(const std::string& path, Mode mode, const std::string& name) : name_(name) {
+Database::Database(const std::string& path, Mode mode, const std::string& name)
+    : name_(name), mode_(mode), work_(std::make_unique<Work>()) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     throw MapFileError(name_ + " is no regular file; give the name of a .bkm file");
@@ -94,23 +104,39 @@ Database::Database(const std::string& path, Mode mode, const std::string& name) 
   database_.reset(opened);
   if (code != SQLITE_OK) fail(name_, opened, code);
   sqlite3_extended_result_codes(opened, 1);
-  harden(mode);
+  harden();
 }
 
-void Database::harden(Mode mode) {
+void Database::harden() {
+  const auto count = [](void* work) {
+    return static_cast<int>((static_cast<Work*>(work)->steps -= kStepsAtOnce) < 0);
+  };
+  sqlite3_progress_handler(database_.get(), kStepsAtOnce, count, work_.get());
   run("PRAGMA mmap_size = 0");
   run("PRAGMA temp_store = MEMORY");
-  if (mode == Mode::kNew) {  // SQLite's defences would keep the journal on
+  if (mode_ == Mode::kNew) {  // SQLite's defences would keep the journal on
     run("PRAGMA journal_mode = OFF");
     run("PRAGMA synchronous = OFF");
   }
   distrust(database_.get());
   run("PRAGMA cell_size_check = ON");
-  if (mode == Mode::kRead) run("PRAGMA query_only = ON");
-  if (mode == Mode::kUpdate) {
+  if (mode_ == Mode::kRead) run("PRAGMA query_only = ON");
+}
+
+void Database::lock() {
+  if (mode_ == Mode::kUpdate) {
     run("PRAGMA locking_mode = EXCLUSIVE");
     run("PRAGMA synchronous = EXTRA");
+    run("BEGIN EXCLUSIVE");
+    run("COMMIT");
+  } else {
+    run("BEGIN");
+    run("PRAGMA schema_version");
   }
+}
+
+void Database::limitWork() const {
+  work_->steps = static_cast<std::int64_t>(kStepsPerByte * static_cast<double>(mostContent()));
 }
 
 Database::Header Database::header() const {
@@ -130,19 +156,19 @@ std::int64_t Database::fileSize() const {
   return size;
 }
 
+std::int64_t Database::mostContent() const {
+  return fileSize() + kMostUnwritten;
+}
+
+Statement Database::prepare(const char* sql) const {
+  limitWork();
+  return {name_, database_.get(), sql};
+}
+
 void Database::run(const char* sql) {
+  limitWork();
   const int code = sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) fail(name_, database_.get(), code);
-}
-
-std::int64_t Database::integerOf(const char* sql) const {
-  Statement statement = prepare(sql);
-  if (!statement.step()) throw damaged(name_, "a row is missing");
-  return statement.integer(0);
-}
-
-int Database::changes() const {
-  return sqlite3_changes(database_.get());
 }
 
 void Database::rollBack() noexcept {

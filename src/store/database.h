@@ -64,22 +64,25 @@ class Database {
   /// The first 100 bytes of the file.
   using Header = std::array<unsigned char, 100>;
 
-  /// @param name what errors call the file. @throws MapFileError; also if another one has locked the file.
+  /// Opens a file, but reads nothing of it. @param name what errors call the file. @throws MapFileError.
   Database(const std::string& path, Mode mode, const std::string& name);
   /// Likewise, named after its path.
   Database(const std::string& path, Mode mode) : Database(path, mode, path) {}
+
+  /// Takes the lock of the mode, for as long as the file is open; with kRead in a transaction that never
+  /// ends. What a killed process left of a change is undone. @throws MapFileError; MapFileInUse if another
+  /// one has locked the file.
+  void lock();
 
   const std::string& name() const { return name_; }
   /// @throws MapFileError if the file is shorter.
   Header header() const;
   std::int64_t fileSize() const;
+  /// The rows of a sound database take no more bytes than this, those of a change not yet written included.
+  std::int64_t mostContent() const;
   /// Runs a statement and ignores its rows.
   void run(const char* sql);
-  Statement prepare(const char* sql) const { return {name_, database_.get(), sql}; }
-  /// The value of a statement with one row and column.
-  std::int64_t integerOf(const char* sql) const;
-  /// The number of rows that the last statement changed.
-  int changes() const;
+  Statement prepare(const char* sql) const;
   /// Rolls an open transaction back, if there is one.
   void rollBack() noexcept;
 
@@ -87,9 +90,18 @@ class Database {
   struct Close {
     void operator()(sqlite3* database) const;
   };
-  void harden(Mode mode);
+  /// How much a statement may still compute.
+  struct Work {
+    std::int64_t steps;
+  };
+  void harden();
+  /// Gives the next statement as many steps as it can need in a sound file of this size: pages that contain
+  /// each other would keep SQLite busy for ever.
+  void limitWork() const;
 
   std::string name_;
+  Mode mode_;
+  std::unique_ptr<Work> work_;  // SQLite has its address
   std::unique_ptr<sqlite3, Close> database_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "core/atomic_file.h"
@@ -18,7 +19,18 @@ constexpr int kMostTileIndex = (1 << 22) + 1;
 constexpr int kTileEdge = Region::kEdge * kBlockEdge;
 static_assert(GridGeometry::kMaxCoordinate == double{1 << 22} * kTileEdge);
 
-constexpr char kSelectEntry[] = "SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list ";
+// Statements that read the list of tiles. They begin with the columns of readEntry().
+constexpr char kSelectList[] =
+    "SELECT x, y, z, blocks, planes, checksum, part FROM tile INDEXED BY tile_list";
+constexpr char kSelectRange[] =
+    "SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list WHERE part = ? AND z BETWEEN ? "
+    "AND ? AND y BETWEEN ? AND ? AND x BETWEEN ? AND ? ORDER BY z, y, x";
+constexpr char kSelectEntry[] =
+    "SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list WHERE part = ? AND z = ? AND "
+    "y = ? AND x = ?";
+constexpr char kSelectTile[] =
+    "SELECT x, y, z, blocks, planes, checksum, content FROM tile INDEXED BY tile_list WHERE part = ? AND "
+    "z = ? AND y = ? AND x = ?";
 
 /// What the library writes into MapInfo::program.
 constexpr char kProgram[] = "bki_mapping " BKI_MAPPING_VERSION;
@@ -41,11 +53,16 @@ TileEntry readEntry(const Statement& row, const std::string& name) {
   return entry;
 }
 
-void addTo(Totals& totals, const TileEntry& entry, int sign) {
+void addTo(Totals& totals, int part, const TileEntry& entry, int sign) {
+  RowChecksum checksum;
+  for (const int number : {part, entry.index.z, entry.index.y, entry.index.x, entry.blocks, entry.planes}) {
+    checksum.add(std::int64_t{number});
+  }
+  checksum.add(std::int64_t{entry.checksum});
   totals.tiles += sign;
   totals.blocks += sign * entry.blocks;
   totals.planes += sign * entry.planes;
-  totals.checksums += sign * std::int64_t{entry.checksum};
+  totals.checksums += sign * std::int64_t{checksum.value()};
 }
 
 std::string nameOf(const TileKey& key) {
@@ -79,6 +96,7 @@ struct MapFile::State {
   void readAll() {
     std::string table_name;
     totals = readTotals(database);
+    checkTotals();
     Totals found;
     const std::uint32_t map_row = readMapRow(database, info, table_name);
     found.checksums += map_row;
@@ -91,10 +109,37 @@ struct MapFile::State {
     } catch (const std::invalid_argument& error) {
       throw damaged(database.name(), error.what());
     }
-    Statement select =
-        database.prepare("SELECT x, y, z, blocks, planes, checksum FROM tile INDEXED BY tile_list");
-    while (select.step()) addTo(found, readEntry(select, database.name()), 1);
+    readList(found);
     if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
+  }
+  /// Checks the order of the list, without which tiles are not found.
+  void readList(Totals& found) {
+    Statement select = database.prepare(kSelectList);
+    std::pair<int, GridIndex> last{-1, {}};
+    while (found.tiles <= totals.tiles && select.step()) {
+      const TileEntry entry = readEntry(select, database.name());
+      const std::int64_t part = select.integer(6);
+      if (part < 0 || part > std::numeric_limits<int>::max()) {
+        throw damaged(database.name(), "the part of a tile is out of range");
+      }
+      const std::pair<int, GridIndex> key(static_cast<int>(part), entry.index);
+      if (!(last < key)) throw damaged(database.name(), "its list of tiles is out of order");
+      last = key;
+      addTo(found, key.first, entry, 1);
+    }
+  }
+  /// Refuses numbers that a file of this size cannot have: they bound the memory that its map takes.
+  void checkTotals() const {
+    const std::int64_t size = database.fileSize();
+    bool too_many = totals.classes > static_cast<std::int64_t>(kMaxClasses);
+    for (const std::int64_t count :
+         {totals.classes, totals.drives, totals.tiles, totals.blocks, totals.planes}) {
+      too_many |= count < 0 || count > size;
+    }
+    // Lists of blocks and planes are not compressed.
+    if (too_many || 4 * totals.blocks + totals.planes > size) {
+      throw damaged(database.name(), "it claims more content than it has room for");
+    }
   }
   TileCodec& tileCodec() {
     if (!codec) codec = std::make_unique<TileCodec>(*info.classes);
@@ -123,14 +168,15 @@ MapFile::MapFile(const std::string& path, Access access) {
   state_ = std::make_unique<State>(path, mode, path);
   Database& database = state_->database;
   checkIdentity(database);
-  // Whoever updates holds the lock of the file from here on; who reads holds a lock that keeps others from
-  // updating.
-  if (access == Access::kUpdate) {
-    database.run("BEGIN EXCLUSIVE");
-    database.run("COMMIT");
-  } else {
-    database.run("BEGIN");
+  try {
+    database.lock();
+  } catch (const MapFileInUse&) {
+    throw;
+  } catch (const MapFileError&) {
+    checkComplete(database);  // says more of a file that is cut off than SQLite does
+    throw;
   }
+  checkComplete(database);
   checkSchema(database);
   state_->readAll();
 }
@@ -168,10 +214,7 @@ std::vector<TileEntry> MapFile::tiles(int part) {
 }
 
 std::vector<TileEntry> MapFile::tilesIn(const GridIndex& low, const GridIndex& high, int part) {
-  const std::string sql = std::string(kSelectEntry) +
-                          "WHERE part = ? AND z BETWEEN ? AND ? AND y BETWEEN ? AND ? AND x BETWEEN ? AND ? "
-                          "ORDER BY z, y, x";
-  Statement select = state_->database.prepare(sql.c_str());
+  Statement select = state_->database.prepare(kSelectRange);
   int parameter = 0;
   for (const int number : {part, low.z, high.z, low.y, high.y, low.x, high.x}) {
     select.bind(parameter++, std::int64_t{number});
@@ -182,25 +225,20 @@ std::vector<TileEntry> MapFile::tilesIn(const GridIndex& low, const GridIndex& h
 }
 
 std::optional<TileEntry> MapFile::findTile(const TileKey& key) {
-  const std::string sql = std::string(kSelectEntry) + "WHERE part = ? AND z = ? AND y = ? AND x = ?";
-  Statement select = state_->database.prepare(sql.c_str());
+  Statement select = state_->database.prepare(kSelectEntry);
   bindKey(select, key);
   if (!select.step()) return std::nullopt;
-  const TileEntry entry = readEntry(select, state_->database.name());
-  if (select.step()) throw damaged(state_->database.name(), nameOf(key) + " is there twice");
-  return entry;
+  return readEntry(select, state_->database.name());
 }
 
 bool MapFile::addTileTo(SemanticMap& map, const TileKey& key) {
   checkSameShape(map, state_->info);
-  const std::optional<TileEntry> entry = findTile(key);
-  if (!entry) return false;
-  Statement select = state_->database.prepare(
-      "SELECT content FROM tile INDEXED BY tile_list WHERE part = ? AND z = ? AND y = ? AND x = ?");
+  Statement select = state_->database.prepare(kSelectTile);
   bindKey(select, key);
-  if (!select.step()) throw damaged(state_->database.name(), nameOf(key) + " has no content");
-  const Statement::Bytes content = select.bytes(0);
-  const std::string fault = state_->tileCodec().unpack(key, *entry, content.data, content.size);
+  if (!select.step()) return false;
+  const TileEntry entry = readEntry(select, state_->database.name());
+  const Statement::Bytes content = select.bytes(6);
+  const std::string fault = state_->tileCodec().unpack(key, entry, content.data, content.size);
   if (!fault.empty()) throw damaged(state_->database.name(), nameOf(key) + ": " + fault);
   state_->tileCodec().addTo(map, key);
   return true;
@@ -229,11 +267,10 @@ MapFile::Change MapFile::change() {
 
 void MapFile::Change::eraseTile(const TileKey& key) {
   MapFile::State& file = state_->file;
-  Statement select = file.database.prepare(
-      (std::string(kSelectEntry) + "WHERE part = ? AND z = ? AND y = ? AND x = ?").c_str());
+  Statement select = file.database.prepare(kSelectEntry);
   bindKey(select, key);
   if (!select.step()) return;
-  addTo(state_->totals, readEntry(select, file.database.name()), -1);
+  addTo(state_->totals, key.part, readEntry(select, file.database.name()), -1);
   select.reset();
   Statement erase = file.database.prepare("DELETE FROM tile WHERE part = ? AND z = ? AND y = ? AND x = ?");
   bindKey(erase, key);
@@ -255,7 +292,7 @@ void MapFile::Change::writeTile(const SemanticMap& map, const TileKey& key) {
   insert.bind(6, std::int64_t{entry.checksum});
   insert.bindBytes(7, codec.packed());
   insert.step();
-  addTo(state_->totals, entry, 1);
+  addTo(state_->totals, key.part, entry, 1);
 }
 
 void MapFile::Change::eraseDrive(const std::string& id) {
@@ -294,8 +331,7 @@ std::optional<Database> lockReplaced(const std::string& path) {
   try {
     Database old(path, Database::Mode::kUpdate);
     checkIdentity(old);
-    old.run("BEGIN EXCLUSIVE");
-    old.run("COMMIT");
+    old.lock();
     return old;
   } catch (const MapFileInUse&) {
     throw;
@@ -402,7 +438,10 @@ StoredMap readMap(MapFile& file, std::size_t memory_limit) {
   StoredMap stored{file.info(), file.drives(), file.info().emptyMap()};
   const std::vector<TileEntry> tiles = file.tiles();
   checkMemory(file.path(), tiles, memory_limit);
-  for (const TileEntry& tile : tiles) file.addTileTo(stored.map, {tile.index});
+  for (const TileEntry& tile : tiles) {
+    if (!file.addTileTo(stored.map, {tile.index}))
+      throw damaged(file.path(), nameOf({tile.index}) + " is missing");
+  }
   return stored;
 }
 

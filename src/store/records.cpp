@@ -2,11 +2,13 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 #include "store/schema.h"
 
@@ -90,6 +92,23 @@ bool isGood(double value) {
   return std::isfinite(value) && value > 0.0;
 }
 
+/// Calls visit(RowReader&) for each row of a table. SQLite does not sort them: in a hostile file the same row
+/// may come again and again, and sorting takes all rows into memory.
+template <typename Visit>
+void readRows(Database& database, const std::string& table, std::int64_t expected, Visit&& visit) {
+  Statement select = database.prepare(("SELECT * FROM " + table).c_str());
+  std::int64_t rows = 0, text_left = database.mostContent();
+  for (; rows <= expected && select.step(); ++rows) {
+    RowReader row(select, database.name());
+    visit(row);
+    text_left -= row.textSize();
+    if (text_left < 0) throw damaged(database.name(), "rows of the table '" + table + "' share their texts");
+  }
+  if (rows != expected) {
+    throw damaged(database.name(), "the table '" + table + "' has another number of rows than it should");
+  }
+}
+
 void checkText(const std::string& what, const std::string& text) {
   if (text.size() <= kLongestText && text.find('\0') == std::string::npos) return;
   throw std::invalid_argument(what + " of a map file is longer than 1 MB, or has a zero byte");
@@ -154,23 +173,18 @@ std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const Sema
 }
 
 std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected, std::int64_t& checksums) {
-  Statement select = database.prepare("SELECT * FROM class ORDER BY position");
-  std::vector<SemanticClass> classes;
-  while (select.step()) {
-    SemanticClass c;
-    std::int64_t position = 0;
+  std::vector<std::pair<std::int64_t, SemanticClass>> rows;
+  readRows(database, "class", expected, [&](RowReader& row) {
+    auto& [position, c] = rows.emplace_back();
     std::string raw;
-    RowReader row(select, database.name());
     visitClass(row, c, position, raw);
     checksums += row.finish();
     c.raw = parseRaw(raw, database.name());
     if (c.free_gain && !isGood(*c.free_gain)) throw damaged(database.name(), "a gain is out of range");
-    classes.push_back(std::move(c));
-    if (static_cast<std::int64_t>(classes.size()) > expected) break;
-  }
-  if (static_cast<std::int64_t>(classes.size()) != expected) {
-    throw damaged(database.name(), "the table 'class' has another number of rows than it should");
-  }
+  });
+  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<SemanticClass> classes;
+  for (auto& row : rows) classes.push_back(std::move(row.second));
   return classes;
 }
 
@@ -190,26 +204,21 @@ std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive) {
 }
 
 std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, std::int64_t& checksums) {
-  Statement select = database.prepare("SELECT * FROM drive ORDER BY id");
   std::vector<DriveRecord> drives;
-  while (select.step()) {
-    DriveRecord drive;
+  readRows(database, "drive", expected, [&](RowReader& row) {
+    DriveRecord& drive = drives.emplace_back();
     Corner low, high;
-    RowReader row(select, database.name());
     visitDrive(row, drive, low, high);
     checksums += row.finish();
     for (int i = 0; i < 3; ++i) {
       drive.bounds.min()[i] = low[static_cast<std::size_t>(i)];
       drive.bounds.max()[i] = high[static_cast<std::size_t>(i)];
     }
-    if (!drives.empty() && drives.back().id >= drive.id) {
-      throw damaged(database.name(), "a drive is there twice");
-    }
-    drives.push_back(std::move(drive));
-    if (static_cast<std::int64_t>(drives.size()) > expected) break;
-  }
-  if (static_cast<std::int64_t>(drives.size()) != expected) {
-    throw damaged(database.name(), "the table 'drive' has another number of rows than it should");
+  });
+  std::sort(drives.begin(), drives.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+  const auto same = [](const DriveRecord& a, const DriveRecord& b) { return a.id == b.id; };
+  if (std::adjacent_find(drives.begin(), drives.end(), same) != drives.end()) {
+    throw damaged(database.name(), "a drive is there twice");
   }
   return drives;
 }

@@ -81,6 +81,7 @@ class RowReader {
       checksum_.add(field);
     } else {
       field = statement_.text(column_++);
+      text_size_ += static_cast<std::int64_t>(field.size());
       checksum_.add(field);
     }
   }
@@ -94,11 +95,14 @@ class RowReader {
   }
   /// @return the checksum. @throws MapFileError if it is wrong.
   std::uint32_t finish() const;
+  /// Of all texts of the row [bytes].
+  std::int64_t textSize() const { return text_size_; }
 
  private:
   const Statement& statement_;
   const std::string& name_;
   RowChecksum checksum_;
+  std::int64_t text_size_ = 0;
   int column_ = 0;
 };
 
@@ -122,7 +126,8 @@ std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
 void writeTotals(Database& database, const Totals& totals);
 Totals readTotals(Database& database);
 
-/// All rows of a table. @param expected number of rows. @param[in,out] checksums is added to.
+/// All rows of a table, sorted by position or id. @param expected number of rows. @param[in,out] checksums is
+/// added to.
 /// @throws MapFileError if there are other rows.
 std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected, std::int64_t& checksums);
 std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, std::int64_t& checksums);

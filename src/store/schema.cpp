@@ -72,7 +72,7 @@ std::int64_t checkIdentity(const Database& database) {
   return version;
 }
 
-void checkSchema(const Database& database) {
+void checkComplete(const Database& database) {
   const Database::Header header = database.header();
   const std::int64_t page = bigEndian(header, kPageSize, 2) == 1 ? 65536 : bigEndian(header, kPageSize, 2);
   const std::int64_t size = bigEndian(header, kPageCount, 4) * page;
@@ -80,6 +80,9 @@ void checkSchema(const Database& database) {
     throw damaged(database.name(),
                   "it has " + std::to_string(database.fileSize()) + " bytes of " + std::to_string(size));
   }
+}
+
+void checkSchema(const Database& database) {
   Statement select = database.prepare("SELECT type, name, sql FROM sqlite_master ORDER BY name");
   for (const SchemaEntry& entry : kSchema) {
     if (!select.step() || select.text(0) != entry.type || select.text(1) != entry.name ||

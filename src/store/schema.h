@@ -17,7 +17,9 @@ void createSchema(Database& database);
 /// Checks that a file is a map, before SQLite interprets any of it. @return the version of its format.
 /// @throws MapFileError if it is no map, or of a newer version.
 std::int64_t checkIdentity(const Database& database);
-/// Checks that the file is complete, and that its tables are those of kFormatVersion, and nothing else.
+/// Checks that no part is missing at the end of a file.
+void checkComplete(const Database& database);
+/// Checks that the tables are those of kFormatVersion, and nothing else.
 void checkSchema(const Database& database);
 
 }  // namespace bki_mapping

@@ -1,0 +1,62 @@
+/// @file All that a map file says, to be compared.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/store/map_file.h"
+#include "reference/content.h"
+
+namespace bki_mapping {
+
+struct FileContent {
+  std::string info;  ///< the rows of the tables `map` and `class`
+  std::vector<DriveRecord> drives;
+  std::map<int, std::map<GridIndex, std::string>> parts;  ///< as reference::contentOf
+
+  bool operator==(const FileContent& other) const {
+    return info == other.info && drives == other.drives && parts == other.parts;
+  }
+};
+
+inline std::string textOf(const MapInfo& info) {
+  std::ostringstream text;
+  text.precision(17);
+  text << info.resolution << '|' << info.prior << '|' << info.unit_exponent << '|' << info.frame << '|'
+       << info.parameters << '|' << info.program << '|' << info.classes->name();
+  for (const SemanticClass& c : info.classes->classes()) {
+    text << '\n'
+         << int{c.id} << '|' << c.name << '|' << c.any_raw << c.unlabelled << c.dynamic << c.ground
+         << c.ignored;
+    for (const int channel : c.color) text << '|' << channel;
+    for (const std::uint32_t raw : c.raw) text << '|' << raw;
+    if (c.free_gain) text << '|' << *c.free_gain;
+  }
+  return text.str();
+}
+
+inline SemanticMap readPart(MapFile& file, int part) {
+  SemanticMap map = file.info().emptyMap();
+  for (const TileEntry& tile : file.tiles(part)) EXPECT_TRUE(file.addTileTo(map, {tile.index, part}));
+  return map;
+}
+
+/// Reads all of a file: part 0, and those of the drives.
+inline FileContent contentOf(MapFile& file) {
+  FileContent content{textOf(file.info()), file.drives(), {}};
+  std::set<int> parts{0};
+  for (const DriveRecord& drive : content.drives) parts.insert(drive.part);
+  for (const int part : parts) content.parts[part] = reference::contentOf(readPart(file, part));
+  return content;
+}
+inline FileContent contentOf(const std::string& path) {
+  MapFile file(path, MapFile::Access::kRead);
+  return contentOf(file);
+}
+
+}  // namespace bki_mapping
