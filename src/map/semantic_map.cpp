@@ -54,6 +54,10 @@ void SemanticMap::dropIfEmpty(const BlockIndex& block) noexcept {
     spare_regions_.push_back(std::move(regions_[position].region));
   }
   region_position_.erase(regionOf(block));
+  removeRegion(position);
+}
+
+void SemanticMap::removeRegion(std::uint32_t position) noexcept {
   if (position + 1 != regions_.size()) {
     regions_[position] = std::move(regions_.back());
     region_position_.set(regions_[position].region->index(), position);
@@ -125,10 +129,42 @@ void SemanticMap::clear() noexcept {
   region_bytes_ = spare_bytes_ = 0;
 }
 
+std::vector<GridIndex> SemanticMap::regions() const {
+  std::vector<GridIndex> indices;
+  indices.reserve(regions_.size());
+  for (const SharedRegion& region : regions_) indices.push_back(region.region->index());
+  return indices;
+}
+
+SemanticMap SemanticMap::emptyLikeThis() const {
+  SemanticMap empty(geometry_, prior_, class_count_);
+  empty.free_gains_ = free_gains_;
+  empty.gain_persistence_ = gain_persistence_;
+  return empty;
+}
+
+SemanticMap SemanticMap::takeRegion(const GridIndex& index) {
+  SemanticMap taken = emptyLikeThis();
+  const std::uint32_t position = region_position_.find(index);
+  if (position == kNoPosition) return taken;
+  // Allocate first, so that nothing after it can fail. What the taken map erases, it may keep to reuse.
+  const std::size_t blocks = regions_[position].region->size(), bytes = regions_[position].region->bytes();
+  taken.regions_.reserve(1);
+  taken.spare_regions_.reserve(1);
+  taken.spare_blocks_.reserve(blocks);
+  taken.region_position_.insert(index, 0);
+  taken.regions_.push_back(std::move(regions_[position]));
+  taken.size_ = blocks;
+  taken.region_bytes_ = bytes;
+  region_position_.erase(index);
+  removeRegion(position);
+  size_ -= blocks;
+  region_bytes_ -= bytes;
+  return taken;
+}
+
 SemanticMap SemanticMap::snapshot() {
-  SemanticMap copy(geometry_, prior_, class_count_);
-  copy.free_gains_ = free_gains_;
-  copy.gain_persistence_ = gain_persistence_;
+  SemanticMap copy = emptyLikeThis();
   copy.region_position_ = region_position_;
   copy.size_ = size_;
   copy.region_bytes_ = region_bytes_;
@@ -147,6 +183,18 @@ void SemanticMap::checkAddable(const SemanticMap& other) const {
 
 void SemanticMap::add(const SemanticMap& other) {
   checkAddable(other);
+  try {  // allocates all that the sum takes
+    for (const Entry& entry : other.entries()) {
+      Block& block = getOrAllocate(entry.index);
+      block.reserve(block.newClassesOf(*entry.block));
+    }
+  } catch (...) {
+    for (const Entry& entry : other.entries()) {
+      const Block* const block = find(entry.index);
+      if (block && block->empty()) erase(entry.index);
+    }
+    throw;
+  }
   for (const Entry& entry : other.entries()) {
     Block& block = getOrAllocate(entry.index);
     const auto& classes = entry.block->classes();

@@ -173,22 +173,28 @@ void SemanticMapper::countBlockBytes() noexcept {
   for (const auto& [index, block] : map_.entries()) block_bytes_ += block->bytes();
 }
 
-void SemanticMapper::addMap(SemanticMap other) {
-  map_.checkAddable(other);
-  if (map_.size() == 0) {
-    map_ = std::move(other);
-  } else {
-    const SemanticMap before = map_.snapshot();
-    try {
-      map_.add(other);
-    } catch (...) {
-      map_ = before;
-      countBlockBytes();
-      throw;
+void SemanticMapper::addMap(const SemanticMap& other) {
+  const auto bytesThere = [&] {
+    std::size_t bytes = 0;
+    for (const auto& [index, ignored] : other.entries()) {
+      if (const Block* const block = map_.find(index)) bytes += block->bytes();
     }
+    return bytes;
+  };
+  const std::size_t before = bytesThere();
+  try {
+    map_.add(other);
+  } catch (...) {
+    countBlockBytes();  // planes may have been reserved
+    throw;
   }
-  setGains();
-  countBlockBytes();
+  block_bytes_ += bytesThere() - before;
+}
+
+SemanticMap SemanticMapper::takeRegion(const GridIndex& region) {
+  SemanticMap taken = map_.takeRegion(region);
+  for (const auto& [index, block] : taken.entries()) block_bytes_ -= block->bytes();
+  return taken;
 }
 
 SemanticMapper::Pipeline& SemanticMapper::pipeline() {

@@ -82,8 +82,8 @@ void distrust(sqlite3* database) {
 
 }  // namespace
 
-MapFileError damaged(const std::string& path, const std::string& what) {
-  return MapFileError(path + " is damaged (" + what + "); use another copy of it");
+MapFileDamaged damaged(const std::string& path, const std::string& what) {
+  return MapFileDamaged(path + " is damaged (" + what + "); use another copy of it");
 }
 
 void Database::Close::operator()(sqlite3* database) const {

@@ -106,6 +106,6 @@ class Database {
 };
 
 /// "PATH is damaged (WHAT); take a copy of it ..."
-MapFileError damaged(const std::string& path, const std::string& what);
+MapFileDamaged damaged(const std::string& path, const std::string& what);
 
 }  // namespace bki_mapping

@@ -208,6 +208,19 @@ std::vector<DriveRecord> MapFile::drives() {
   return readDrives(state_->database, state_->totals.drives, ignored);
 }
 
+std::vector<int> MapFile::parts() {
+  Statement next = state_->database.prepare("SELECT min(part) FROM tile INDEXED BY tile_list WHERE part > ?");
+  std::vector<int> parts;
+  for (std::int64_t last = -1;;) {
+    next.bind(0, last);
+    if (!next.step() || next.isNull(0)) return parts;
+    last = next.integer(0);
+    if (last > std::numeric_limits<int>::max()) throw damaged(path(), "the part of a tile is out of range");
+    parts.push_back(static_cast<int>(last));
+    next.reset();
+  }
+}
+
 std::vector<TileEntry> MapFile::tiles(int part) {
   constexpr int kMost = kMostTileIndex;
   return tilesIn({-kMost, -kMost, -kMost}, {kMost, kMost, kMost}, part);
@@ -429,6 +442,19 @@ void saveMap(const std::string& path, const MapInfo& info, const std::vector<Dri
   file.commit();
 }
 
+void copyMap(MapFile& file, const std::string& path) {
+  NewMapFile copy(path, file.info());
+  for (const DriveRecord& drive : file.drives()) copy.content().putDrive(drive);
+  for (const int part : file.parts()) {
+    for (const TileEntry& tile : file.tiles(part)) {
+      SemanticMap map = file.info().emptyMap();
+      file.addTileTo(map, {tile.index, part});
+      copy.content().writeTile(map, {tile.index, part});
+    }
+  }
+  copy.commit();
+}
+
 StoredMap loadMap(const std::string& path, std::size_t memory_limit) {
   MapFile file(path, MapFile::Access::kRead);
   return readMap(file, memory_limit);
@@ -445,12 +471,20 @@ StoredMap readMap(MapFile& file, std::size_t memory_limit) {
   return stored;
 }
 
-std::vector<GridIndex> tilesOf(const SemanticMap& map) {
-  std::vector<GridIndex> tiles;
-  for (const auto& [index, block] : map.entries()) {
-    const GridIndex tile = SemanticMap::regionOf(index);
-    if (tiles.empty() || tiles.back() != tile) tiles.push_back(tile);  // entries() goes region by region
+void checkFits(const MapFile& file, const MapInfo& own) {
+  if (!own.frame.empty() && file.info().frame != own.frame) {
+    throw MapFileError("the map in " + file.path() + " is in frame '" + file.info().frame +
+                       "', and the mapper maps in '" + own.frame + "'; set frame_id to the frame of the map");
   }
+  try {
+    checkSameGrid(file.path(), file.info(), "the mapper", own);
+  } catch (const std::invalid_argument& difference) {
+    throw MapFileError(difference.what());
+  }
+}
+
+std::vector<GridIndex> tilesOf(const SemanticMap& map) {
+  std::vector<GridIndex> tiles = map.regions();
   std::sort(tiles.begin(), tiles.end());
   return tiles;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <sstream>
-#include <vector>
 
 namespace bki_mapping {
 namespace {
@@ -45,6 +44,18 @@ bool DriveRecord::operator==(const DriveRecord& other) const {
                                : bounds.min() == other.bounds.min() && bounds.max() == other.bounds.max();
   return id == other.id && name == other.name && part == other.part && scans == other.scans &&
          first_stamp == other.first_stamp && last_stamp == other.last_stamp && same_bounds;
+}
+
+void DriveRecord::addScan(std::uint64_t stamp, const GridGeometry& geometry,
+                          const std::vector<GridIndex>& touched) {
+  first_stamp = scans == 0 ? stamp : std::min(first_stamp, stamp);
+  last_stamp = std::max(last_stamp, stamp);
+  ++scans;
+  for (const GridIndex& block : touched) {
+    const Eigen::Vector3d low = geometry.blockOrigin({block});
+    bounds.extend(low);
+    bounds.extend(low + Eigen::Vector3d::Constant(geometry.blockSize()));
+  }
 }
 
 void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,

@@ -61,7 +61,7 @@ std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path,
     throw std::invalid_argument("the map in " + path + " holds drive '" + id +
                                 "' already; give other scans, or another name with --drive");
   }
-  mapper.addMap(std::move(stored.map));
+  mapper.addMap(stored.map);
   return stored.drives;
 }
 
@@ -80,9 +80,11 @@ int mapSequence(const po::variables_map& given) {
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
-  DriveLog drive(driveId(given, sequence, first, last), sequence.folder());
+  DriveRecord drive;
+  drive.id = driveId(given, sequence, first, last);
+  drive.name = sequence.folder();
   std::vector<DriveRecord> drives;
-  if (given.count("resume")) drives = resume(mapper, given["resume"].as<std::string>(), drive.record().id);
+  if (given.count("resume")) drives = resume(mapper, given["resume"].as<std::string>(), drive.id);
 
   std::vector<ScanReport> scans;
   std::size_t refused = 0;
@@ -90,7 +92,7 @@ int mapSequence(const po::variables_map& given) {
     try {
       const Scan scan = sequence.read(i).scan();
       scans.push_back({sequence.name(i), mapper.integrate(scan)});
-      drive.addScan(scan.stamp, mapper);
+      drive.addScan(scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
     } catch (const ScanRefused& refusal) {
       // Report the first refusal and count the others, which mostly have the same reason.
       if (refused++ == 0)
@@ -102,7 +104,7 @@ int mapSequence(const po::variables_map& given) {
   if (given.count("output")) {
     const std::string output = given["output"].as<std::string>();
     if (isMapFileName(output)) {
-      if (drive.record().scans > 0) drives.push_back(drive.record());
+      if (drive.scans > 0) drives.push_back(drive);
       saveMap(output, mapInfoOf(mapper, kFrame), drives, mapper.map());
     } else {
       exportMap(output, mapper.map(), mapper.classes(), states);

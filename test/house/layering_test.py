@@ -75,7 +75,8 @@ class Layering(unittest.TestCase):
                 starts = re.search(r'std::thread\b(?!::)|#pragma omp', file.read())
             if starts:
                 self.assertIn(relative, ('parallel/thread_pool.h', 'parallel/thread_pool.cpp', 'ros/mapping_server.h', 'ros/mapping_server.cpp',
-                                     'ros/publisher_set.h', 'ros/publisher_set.cpp'))
+                                     'ros/publisher_set.h', 'ros/publisher_set.cpp', 'store/tile_store.h',
+                                     'store/tile_store.cpp'))
 
     def test_only_the_vocabulary_knows_instruction_sets(self):
         instructions = re.compile(r'\b_mm\d*_\w+|\b__m(64|128|256|512)|__SSE|__AVX|__ARM|__aarch64|__builtin_cpu_supports')

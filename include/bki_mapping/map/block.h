@@ -75,6 +75,12 @@ class Block {
     planes_.reserve(planes_.size() + further_classes * kBlockVoxels);  // exactly: doubling would waste planes
   }
 
+  /// The number of classes of which another block has a plane, and this one has not.
+  std::size_t newClassesOf(const Block& other) const {
+    return static_cast<std::size_t>(std::count_if(other.classes_.begin(), other.classes_.end(),
+                                                  [&](ClassId id) { return !has(id, positionOf(id)); }));
+  }
+
   /// Returns unused memory that reserve() took, unless memory is too short to move the planes.
   void shrink() noexcept {
     if (planes_.capacity() > planes_.size()) planes_.shrink_to_fit();

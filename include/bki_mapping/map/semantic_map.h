@@ -32,6 +32,11 @@ class SemanticMap {
       : geometry_(geometry), prior_(prior), class_count_(class_count) {
     free_gains_.fill(1.0f);
   }
+  // Copies would not know that they share blocks: snapshot() makes one.
+  SemanticMap(const SemanticMap&) = delete;
+  SemanticMap& operator=(const SemanticMap&) = delete;
+  SemanticMap(SemanticMap&&) = default;
+  SemanticMap& operator=(SemanticMap&&) = default;
 
   const GridGeometry& geometry() const { return geometry_; }
   double prior() const { return prior_; }
@@ -86,6 +91,12 @@ class SemanticMap {
   void clear() noexcept;
 
   static GridIndex regionOf(const BlockIndex& block) { return Region::regionOf(block); }
+  /// The regions in which the map has blocks, in unspecified order.
+  std::vector<GridIndex> regions() const;
+  bool hasRegion(const GridIndex& region) const { return region_position_.find(region) != kNoPosition; }
+  /// Moves the blocks of a region to a map of their own, which has the same settings. Copies no block.
+  /// @return an empty map if this one has no such region. @throws std::bad_alloc; the map is then unchanged.
+  SemanticMap takeRegion(const GridIndex& region);
 
   /// Calls visit(index) for every block within `radius` of a point, and for some farther ones. The cost
   /// depends on the number of blocks near the point, not on the size of the map.
@@ -111,7 +122,8 @@ class SemanticMap {
   }
 
   /// Adds the evidence of another map, so that this one holds the posterior of both sets of scans.
-  /// @throws std::invalid_argument if the resolution, the prior or the number of classes differs.
+  /// @throws std::invalid_argument if the resolution, the prior or the number of classes differs,
+  /// std::bad_alloc; the map is then unchanged.
   void add(const SemanticMap& other);
   /// @throws std::invalid_argument if add() would.
   void checkAddable(const SemanticMap& other) const;
@@ -132,6 +144,10 @@ class SemanticMap {
   Region& writableRegion(const BlockIndex& block);
   /// Erases the region of a block if it is empty.
   void dropIfEmpty(const BlockIndex& block) noexcept;
+  /// Removes a region from the index.
+  void removeRegion(std::uint32_t position) noexcept;
+  /// A map with the same settings, and no blocks.
+  SemanticMap emptyLikeThis() const;
 
   GridGeometry geometry_;
   double prior_;

@@ -39,7 +39,10 @@ class SemanticMapper {
   /// Adds another map, as of a file: the map is then the same to the bit as if the scans of both had been
   /// integrated here.
   /// @throws std::invalid_argument as SemanticMap::add, std::bad_alloc; the map is then unchanged.
-  void addMap(SemanticMap other);
+  void addMap(const SemanticMap& other);
+
+  /// Moves a region of the map to a map of its own (SemanticMap::takeRegion).
+  SemanticMap takeRegion(const GridIndex& region);
 
   /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
   /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start

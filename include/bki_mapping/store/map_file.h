@@ -62,6 +62,8 @@ class MapFile {
   Size size() const;
   /// Sorted by id.
   std::vector<DriveRecord> drives();
+  /// The parts that have tiles, sorted.
+  std::vector<int> parts();
   /// All tiles of a part, sorted by index (z, then y, then x). Reads no content.
   std::vector<TileEntry> tiles(int part = 0);
   /// The tiles from `low` to `high`, both included. The cost grows with the tiles in the range along z.
@@ -141,12 +143,20 @@ struct StoredMap {
 void saveMap(const std::string& path, const MapInfo& info, const std::vector<DriveRecord>& drives,
              const SemanticMap& map);
 
+/// Copies a map file, all parts of it, to another one by NewMapFile. @throws as NewMapFile, MapFileError.
+void copyMap(MapFile& file, const std::string& path);
+
 /// Reads a whole map (part 0) and checks every byte of it.
 /// @param memory_limit for the map [bytes]; 0: none. @throws MapFileError, also if the map would exceed the
 /// limit, then before its memory is taken; std::bad_alloc.
 StoredMap loadMap(const std::string& path, std::size_t memory_limit = 0);
 /// The same of an open file.
 StoredMap readMap(MapFile& file, std::size_t memory_limit = 0);
+
+/// Checks that what is mapped elsewhere can be added to the map in a file: same frame and same grid.
+/// @param own what the other map is; without a frame, any is right.
+/// @throws MapFileError in one sentence with the file and both values.
+void checkFits(const MapFile& file, const MapInfo& own);
 
 /// The tiles in which a map has blocks, sorted by index.
 std::vector<GridIndex> tilesOf(const SemanticMap& map);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_geometry.h"
@@ -17,6 +18,11 @@ namespace bki_mapping {
 class MapFileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+/// What a map file holds is not what was written.
+class MapFileDamaged : public MapFileError {
+ public:
+  using MapFileError::MapFileError;
 };
 /// Another process, or another place in this one, has the file open.
 class MapFileInUse : public MapFileError {
@@ -54,6 +60,9 @@ struct DriveRecord {
   Eigen::AlignedBox3d bounds;                     ///< of the voxels that it saw, map frame [m]; may be empty
 
   bool operator==(const DriveRecord& other) const;
+
+  /// Counts a scan. @param stamp of the scan [ns]. @param touched the blocks that it touched.
+  void addScan(std::uint64_t stamp, const GridGeometry& geometry, const std::vector<GridIndex>& touched);
 };
 
 /// Checks that maps can be added: same resolution, unit, prior, and classes with the same ids and names.

@@ -1,0 +1,379 @@
+#include "bki_mapping/store/map_keeper.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <new>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "store/tile_store.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr double kEverything = std::numeric_limits<double>::infinity();
+
+/// How much of a scan's time adding tiles from the file may take, beyond one tile.
+constexpr std::chrono::milliseconds kArrivalTime(2);
+
+/// Parts of memory_limit: above the first, the window shrinks until the map takes the second; below the
+/// third, it grows again.
+constexpr double kTooMuch = 0.85, kEnough = 0.7, kLittle = 0.5;
+
+/// While so much waits to be written [bytes], tiles stay in memory: they would only wait, too.
+constexpr std::size_t kMostWaiting = 256 << 20;
+
+/// Parts of a tile's edge: how far the sensor moves until tiles are loaded and given away, and how far beyond
+/// the window a tile stays, so that a sensor that goes to and fro does not keep the disk busy.
+constexpr double kStep = 0.25, kMargin = 0.5;
+
+enum class Here {
+  kWhole,    ///< all evidence is in memory; the file's is out of date
+  kPart,     ///< the file has evidence, and memory some more
+  kLoading,  ///< likewise, and the file's has been asked for
+  kDamaged   ///< likewise, but the file's cannot be read; memory keeps the rest
+};
+
+struct Tile {
+  Here here = Here::kWhole;
+  bool changed = false;      ///< memory has evidence that is not in the file
+  TileStore::Call load = 0;  ///< whose answer is waited for
+};
+
+MapFile openOrCreate(const std::string& path, const MapInfo& info) {
+  if (!std::filesystem::exists(path)) return MapFile::create(path, info);
+  MapFile file(path, MapFile::Access::kUpdate);
+  checkFits(file, info);
+  return file;
+}
+
+}  // namespace
+
+struct MapKeeper::State {
+  State(SemanticMapper& of, MapFile file, const DriveRecord& first_drive)
+      : mapper(of),
+        path(file.path()),
+        drive(first_drive),
+        edge(Region::kEdge * of.map().geometry().blockSize()) {
+    for (const DriveRecord& known : file.drives()) drives.insert(known.id);
+    if (!drives.insert(drive.id).second) {
+      throw std::invalid_argument("the map in " + path + " holds drive '" + drive.id +
+                                  "' already; give the new drive another id");
+    }
+    for (const TileEntry& tile : file.tiles()) stored.insert(tile.index);
+    store = std::make_unique<TileStore>(std::move(file));
+  }
+
+  /// From the window's centre to the nearest point of a tile, along the axis on which it is farthest [m].
+  double distance(const GridIndex& tile) const {
+    const Eigen::Array3d low = edge * Eigen::Array3d(tile.x, tile.y, tile.z);
+    const Eigen::Array3d centre = window.centre.array();
+    return (low - centre).max(centre - (low + edge)).maxCoeff();
+  }
+  double reachNow() const { return std::min(0.5 * window.edge, reach); }
+
+  /// The tiles in the file that are within a distance.
+  std::vector<GridIndex> storedWithin(double limit) const {
+    std::vector<GridIndex> tiles;
+    const Eigen::Array3d low = ((window.centre.array() - limit) / edge).floor();
+    const Eigen::Array3d high = ((window.centre.array() + limit) / edge).floor();
+    if (!((high - low + 1.0).tail<2>().prod() < static_cast<double>(stored.size()))) {
+      std::copy_if(stored.begin(), stored.end(), std::back_inserter(tiles),
+                   [&](const GridIndex& tile) { return distance(tile) <= limit; });
+      return tiles;
+    }
+    const Eigen::Array3i first = low.cast<int>(), last = high.cast<int>();
+    for (int z = first.z(); z <= last.z(); ++z) {
+      for (int y = first.y(); y <= last.y(); ++y) {
+        for (auto tile = stored.lower_bound({first.x(), y, z});
+             tile != stored.end() && tile->z == z && tile->y == y && tile->x <= last.x(); ++tile) {
+          tiles.push_back(*tile);
+        }
+      }
+    }
+    return tiles;
+  }
+
+  void noteChange(const GridIndex& tile) {
+    const auto [known, added] = here.try_emplace(tile);
+    if (added && stored.count(tile) > 0) {
+      known->second.here = Here::kPart;
+      must_sweep = true;
+    }
+    known->second.changed = true;
+  }
+
+  void noteStored(const GridIndex& tile, bool is_stored) {
+    if (is_stored) {
+      stored.insert(tile);
+    } else {
+      stored.erase(tile);
+    }
+  }
+
+  void noteMoved(const SemanticMap& blocks) {
+    for (const auto& [index, block] : blocks.entries()) moved.push_back(index);
+  }
+
+  void load(const GridIndex& tile) {
+    Tile& entry = here[tile];
+    entry.here = Here::kLoading;
+    entry.load = store->load(tile);
+  }
+
+  void take(const TileStore::Arrival& arrival) {
+    using Kind = TileStore::Arrival::Kind;
+    if (arrival.call <= reset_call) return;
+    const auto known = here.find(arrival.tile);
+    const bool awaited =
+        known != here.end() && known->second.here == Here::kLoading && known->second.load == arrival.call;
+    if (arrival.kind != Kind::kReturned && !awaited) return;
+    mapper.addMap(arrival.map);
+    noteMoved(arrival.map);
+    if (arrival.kind == Kind::kLoaded) {
+      known->second.here = Here::kWhole;
+    } else {
+      here[arrival.tile] = {Here::kDamaged, true, 0};
+      damaged.insert(arrival.tile);
+    }
+  }
+
+  /// Adds to the map what has arrived. @param all even if that takes long.
+  void takeArrivals(bool all) {
+    for (TileStore::Arrival& arrival : store->takeArrivals()) arrivals.push_back(std::move(arrival));
+    const auto end = std::chrono::steady_clock::now() + kArrivalTime;
+    while (!arrivals.empty()) {
+      try {
+        take(arrivals.front());
+      } catch (const std::bad_alloc&) {
+        return;  // until there is memory again
+      }
+      arrivals.pop_front();
+      if (!all && std::chrono::steady_clock::now() > end) return;
+    }
+  }
+
+  bool writes() const { return store->fault().empty() && store->waitingBytes() < kMostWaiting; }
+  bool mayLeave(const Tile& tile) const { return tile.here != Here::kDamaged && (!tile.changed || writes()); }
+
+  using TileIterator = std::map<GridIndex, Tile>::iterator;
+  TileIterator giveAway(TileIterator entry) {
+    const auto& [index, tile] = *entry;
+    SemanticMap map = mapper.takeRegion(index);
+    noteMoved(map);
+    if (tile.here != Here::kWhole) {
+      if (map.size() > 0) store->add(index, std::move(map));
+    } else if (tile.changed) {
+      noteStored(index, map.size() > 0);
+      store->replace(index, std::move(map));
+    }
+    return here.erase(entry);
+  }
+
+  void sweep() {
+    must_sweep = false;
+    swept_at = window.centre;
+    const double limit = reachNow();
+    for (auto entry = here.begin(); entry != here.end();) {
+      const bool leaves = distance(entry->first) > limit + kMargin * edge;
+      entry = leaves && mayLeave(entry->second) ? giveAway(entry) : std::next(entry);
+    }
+    for (const GridIndex& tile : storedWithin(limit + kStep * edge)) {
+      const auto known = here.find(tile);
+      if (known == here.end() || known->second.here == Here::kPart) load(tile);
+    }
+  }
+
+  double memoryLimit() const {
+    const double limit = 1e6 * mapper.config().memory_limit;
+    return limit > 0.0 ? limit : kEverything;
+  }
+
+  /// Gives away the farthest tiles until the map takes less memory [bytes]. The window shrinks to what is
+  /// left. @return whether any was given away.
+  bool shrinkTo(double bytes) {
+    std::vector<std::pair<double, GridIndex>> tiles;
+    for (const auto& [index, tile] : here) {
+      if (mayLeave(tile)) tiles.emplace_back(distance(index), index);
+    }
+    std::sort(tiles.begin(), tiles.end());
+    bool any = false;
+    for (; !tiles.empty() && static_cast<double>(mapper.mapBytes()) > bytes; tiles.pop_back()) {
+      const auto& [from_centre, index] = tiles.back();
+      if (from_centre <= 0.0) break;  // the sensor is in it
+      reach = std::max(0.0, std::min(reach, from_centre - (kMargin + kStep) * edge));
+      giveAway(here.find(index));
+      any = true;
+    }
+    return any;
+  }
+
+  void keepWithinMemory() {
+    const double limit = memoryLimit();
+    const auto bytes = static_cast<double>(mapper.mapBytes());
+    if (bytes > kTooMuch * limit) {
+      shrinkTo(kEnough * limit);
+    } else if (reach < kEverything && bytes < kLittle * limit && must_sweep) {
+      reach += kMargin * edge;
+      if (reach >= 0.5 * window.edge) reach = kEverything;
+    }
+  }
+
+  SemanticMapper& mapper;
+  std::string path;
+  DriveRecord drive;
+  double edge;                   ///< of a tile [m]
+  std::set<std::string> drives;  ///< ids of all in the map
+  std::unique_ptr<TileStore> store;
+  std::deque<TileStore::Arrival> arrivals;
+  std::map<GridIndex, Tile> here;           ///< the tiles that are in memory, or will be
+  std::set<GridIndex> stored;               ///< the tiles that the file has when all is written
+  std::set<GridIndex> damaged;              ///< the tiles of the file that cannot be read
+  Window window;                            ///< at the last moveTo()
+  Eigen::Vector3d swept_at{0.0, 0.0, 0.0};  ///< centre of the window at the last sweep
+  bool must_sweep = true;                   ///< whatever the window does
+  double reach = kEverything;               ///< what memory_limit leaves of the half of window.edge [m]
+  TileStore::Call reset_call = 0;           ///< the last reset; answers to earlier calls are of no use
+  std::vector<GridIndex> moved;             ///< blocks that arrived or left, for the next moveTo()
+  bool closed = false;
+};
+
+MapKeeper::MapKeeper(SemanticMapper& mapper, const std::string& path, const MapInfo& info,
+                     const DriveRecord& drive)
+    : state_(std::make_unique<State>(mapper, openOrCreate(path, info), drive)) {
+  if (mapper.map().size() > 0) throw std::logic_error("the map of the mapper is not empty");
+}
+
+MapKeeper::~MapKeeper() {
+  close();
+}
+
+void MapKeeper::addScan(std::uint64_t stamp) {
+  State& s = *state_;
+  const std::vector<GridIndex>& touched = s.mapper.touchedBlocks();
+  s.drive.addScan(stamp, s.mapper.map().geometry(), touched);
+  std::set<GridIndex> tiles;
+  for (const GridIndex& block : touched) tiles.insert(SemanticMap::regionOf({block}));
+  for (const GridIndex& tile : tiles) s.noteChange(tile);
+}
+
+std::vector<GridIndex> MapKeeper::moveTo(const Window& window) {
+  State& s = *state_;
+  s.must_sweep |= window.edge != s.window.edge;
+  s.window = window;
+  s.takeArrivals(false);
+  const double moved = (window.centre - s.swept_at).cwiseAbs().maxCoeff();
+  s.must_sweep |= moved > kStep * s.edge;
+  s.keepWithinMemory();
+  if (s.must_sweep) s.sweep();
+  return std::exchange(s.moved, {});
+}
+
+bool MapKeeper::makeRoom() {
+  return state_->shrinkTo(kLittle * state_->memoryLimit());
+}
+
+std::vector<GridIndex> MapKeeper::waitForTiles() {
+  state_->store->waitForTrial();
+  state_->takeArrivals(true);
+  return std::exchange(state_->moved, {});
+}
+
+std::future<void> MapKeeper::save() {
+  State& s = *state_;
+  s.takeArrivals(true);
+  std::vector<GridIndex> copies;
+  for (auto entry = s.here.begin(); entry != s.here.end();) {
+    auto& [index, tile] = *entry;
+    if (!tile.changed || tile.here == Here::kDamaged) {
+      ++entry;
+    } else if (tile.here == Here::kWhole) {
+      copies.push_back(index);
+      s.noteStored(index, s.mapper.map().hasRegion(index));
+      tile.changed = false;
+      ++entry;
+    } else {  // the file adds the parts; the whole comes back if the tile is in the window
+      entry = s.giveAway(entry);
+    }
+  }
+  std::future<void> saved = s.store->save(s.mapper.snapshot(), std::move(copies), s.drive);
+  s.sweep();
+  return saved;
+}
+
+std::future<void> MapKeeper::saveTo(const std::string& path) {
+  save();
+  return state_->store->copyTo(path);
+}
+
+void MapKeeper::reset(const DriveRecord& drive) {
+  State& s = *state_;
+  s.reset_call = s.store->clear();
+  s.arrivals.clear();
+  s.here.clear();
+  s.stored.clear();
+  s.damaged.clear();
+  s.moved.clear();
+  s.mapper.reset();
+  s.drive = drive;
+  s.drives = {drive.id};
+  s.reach = kEverything;
+}
+
+void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives) {
+  State& s = *state_;
+  s.mapper.map().checkAddable(other);
+  for (const DriveRecord& drive : drives) {
+    if (s.drives.count(drive.id) > 0) {
+      throw std::invalid_argument("drive '" + drive.id + "' is in the map in " + s.path + " already");
+    }
+  }
+  for (const GridIndex& tile : other.regions()) {
+    SemanticMap part = other.takeRegion(tile);
+    if (s.here.count(tile) > 0) {
+      s.mapper.addMap(part);
+      s.noteMoved(part);
+      s.noteChange(tile);
+    } else {
+      s.stored.insert(tile);
+      s.store->add(tile, std::move(part));
+    }
+  }
+  for (const DriveRecord& drive : drives) {
+    s.drives.insert(drive.id);
+    s.store->putDrive(drive);
+  }
+  s.must_sweep = true;
+}
+
+std::string MapKeeper::fault() const {
+  const std::string fault = state_->store->fault();
+  if (!fault.empty() || state_->damaged.empty()) return fault;
+  return state_->path + " is damaged in " + std::to_string(state_->damaged.size()) +
+         " tiles, which cannot be read; they stay as they are, and what is mapped there is lost at the end; "
+         "use another copy of the file";
+}
+
+std::size_t MapKeeper::waitingBytes() const {
+  return state_->store->waitingBytes();
+}
+
+const std::string& MapKeeper::path() const {
+  return state_->path;
+}
+
+std::string MapKeeper::close() {
+  State& s = *state_;
+  if (std::exchange(s.closed, true)) return "";
+  save();
+  const std::string lost = s.store->close();
+  s.takeArrivals(true);
+  return lost.empty() ? fault() : lost;
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,249 @@
+#include "store/tile_store.h"
+
+#include <iterator>
+#include <memory>
+#include <new>
+#include <utility>
+
+#include "parallel/yield_to_others.h"
+
+namespace bki_mapping {
+namespace {
+
+/// A change of the file takes jobs until they hold so much memory [bytes].
+constexpr std::size_t kChangeBytes = 64 << 20;
+
+/// std::function wants to be copied, and maps cannot be.
+std::shared_ptr<SemanticMap> shared(SemanticMap map) {
+  return std::make_shared<SemanticMap>(std::move(map));
+}
+
+}  // namespace
+
+TileStore::TileStore(MapFile file, std::chrono::milliseconds retry)
+    : file_(std::move(file)), retry_(retry), thread_([this] { run(); }) {}
+
+TileStore::~TileStore() {
+  close();
+}
+
+TileStore::Call TileStore::load(const GridIndex& tile) {
+  const auto work = [this, tile](MapFile& file, MapFile::Change&, Call call) {
+    Arrival arrival{Arrival::Kind::kLoaded, tile, file.info().emptyMap(), call};
+    try {
+      file.addTileTo(arrival.map, {tile});
+    } catch (const MapFileDamaged&) {
+      arrival.kind = Arrival::Kind::kDamaged;
+    }
+    arrive(std::move(arrival));
+    return false;
+  };
+  return enqueue({work});
+}
+
+void TileStore::replace(const GridIndex& tile, SemanticMap map) {
+  const std::size_t bytes = map.bytes();
+  const auto work = [tile, map = shared(std::move(map))](MapFile&, MapFile::Change& change, Call) {
+    change.writeTile(*map, {tile});
+    return true;
+  };
+  enqueue({work, bytes});
+}
+
+void TileStore::add(const GridIndex& tile, SemanticMap map) {
+  const std::size_t bytes = map.bytes();
+  const auto work = [this, tile, map = shared(std::move(map))](MapFile& file, MapFile::Change& change,
+                                                               Call call) {
+    SemanticMap sum = map->snapshot();
+    try {
+      file.addTileTo(sum, {tile});
+    } catch (const MapFileDamaged&) {
+      arrive({Arrival::Kind::kReturned, tile, std::move(sum), call});
+      return false;
+    }
+    change.writeTile(sum, {tile});
+    return true;
+  };
+  enqueue({work, bytes});
+}
+
+std::future<void> TileStore::save(SemanticMap snapshot, std::vector<GridIndex> tiles,
+                                  const DriveRecord& drive) {
+  const auto work = [map = shared(std::move(snapshot)), tiles = std::move(tiles), drive](
+                        MapFile&, MapFile::Change& change, Call) {
+    for (const GridIndex& tile : tiles) change.writeTile(*map, {tile});
+    if (drive.scans > 0) change.putDrive(drive);
+    return true;
+  };
+  std::promise<void> durable;
+  std::future<void> future = durable.get_future();
+  enqueue({work, 0, std::move(durable)});  // the memory of a snapshot is mostly that of the map
+  return future;
+}
+
+TileStore::Call TileStore::clear() {
+  const auto work = [](MapFile& file, MapFile::Change& change, Call) {
+    for (const int part : file.parts()) {
+      for (const TileEntry& tile : file.tiles(part)) change.eraseTile({tile.index, part});
+    }
+    for (const DriveRecord& drive : file.drives()) change.eraseDrive(drive.id);
+    return true;
+  };
+  return enqueue({work, 0, std::nullopt, true});
+}
+
+void TileStore::changeTiles(std::vector<GridIndex> tiles, std::function<void(SemanticMap&)> change_tile) {
+  const auto work = [this, tiles = std::move(tiles), change_tile = std::move(change_tile)](
+                        MapFile& file, MapFile::Change& change, Call call) {
+    for (const GridIndex& tile : tiles) {
+      SemanticMap map = file.info().emptyMap();
+      try {
+        if (!file.addTileTo(map, {tile})) continue;
+      } catch (const MapFileDamaged&) {
+        arrive({Arrival::Kind::kReturned, tile, std::move(map), call});
+        continue;
+      }
+      change_tile(map);
+      change.writeTile(map, {tile});
+    }
+    return true;
+  };
+  enqueue({work});
+}
+
+void TileStore::putDrive(const DriveRecord& drive) {
+  const auto work = [drive](MapFile&, MapFile::Change& change, Call) {
+    change.putDrive(drive);
+    return true;
+  };
+  enqueue({work});
+}
+
+std::future<void> TileStore::copyTo(const std::string& path) {
+  auto done = std::make_shared<std::promise<void>>();
+  const auto work = [path, done](MapFile& file, MapFile::Change&, Call) {
+    try {
+      copyMap(file, path);
+      done->set_value();
+    } catch (...) {
+      done->set_exception(std::current_exception());
+    }
+    return false;
+  };
+  enqueue({work, 0, std::nullopt, true});
+  return done->get_future();
+}
+
+std::vector<TileStore::Arrival> TileStore::takeArrivals() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(arrivals_, {});
+}
+
+void TileStore::waitForTrial() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const Call called = called_;
+  const std::size_t failures = failures_;
+  tried_.wait(lock, [&] { return ended_ >= called || failures_ > failures || closing_; });
+}
+
+std::string TileStore::fault() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return fault_;
+}
+
+std::size_t TileStore::waitingBytes() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return waiting_bytes_;
+}
+
+std::string TileStore::close() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closing_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  file_.reset();
+  if (jobs_.empty()) return "";
+  return fault_ + "; what was not yet written to the map file is lost";
+}
+
+TileStore::Call TileStore::enqueue(Job job) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  waiting_bytes_ += job.bytes;
+  jobs_.push_back(std::move(job));
+  wake_.notify_all();
+  return ++called_;
+}
+
+void TileStore::arrive(Arrival arrival) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  arrivals_.push_back(std::move(arrival));
+}
+
+void TileStore::run() {
+  yieldToOthers();
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [this] { return closing_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
+    const bool last_trial = closing_;
+    if (tryJobs(lock)) continue;
+    if (last_trial) break;
+    wake_.wait_for(lock, retry_, [this] { return closing_; });
+  }
+  for (Job& job : jobs_) {
+    if (job.durable) job.durable->set_exception(std::make_exception_ptr(MapFileError(fault_)));
+  }
+}
+
+bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
+  // References to elements of a deque stay valid when others are appended.
+  std::vector<Job*> jobs;
+  std::size_t bytes = 0;
+  Call call = ended_;
+  for (Job& job : jobs_) {
+    if (!jobs.empty() && (job.first || bytes + job.bytes > kChangeBytes)) break;
+    jobs.push_back(&job);
+    bytes += job.bytes;
+  }
+  lock.unlock();
+  std::string fault;
+  try {
+    MapFile::Change change = file_->change();
+    bool any = false;
+    for (Job* job : jobs) {
+      ++call;
+      if (job->done) continue;
+      job->done = !job->work(*file_, change, call);
+      any |= !job->done;
+    }
+    if (any) change.commit();
+  } catch (const std::bad_alloc&) {
+    fault = "the computer's memory does not suffice to write to " + file_->path();
+  } catch (const std::exception& error) {
+    fault = error.what();
+  }
+  for (Job* job : jobs) {
+    if (fault.empty() && job->durable) job->durable->set_value();
+  }
+  lock.lock();
+  fault_ = fault;
+  std::vector<Job> ended;
+  if (fault.empty()) {
+    const auto end = jobs_.begin() + static_cast<std::ptrdiff_t>(jobs.size());
+    ended.assign(std::make_move_iterator(jobs_.begin()), std::make_move_iterator(end));
+    jobs_.erase(jobs_.begin(), end);
+    waiting_bytes_ -= bytes;
+    ended_ += jobs.size();
+  } else {
+    ++failures_;
+  }
+  tried_.notify_all();
+  lock.unlock();
+  ended.clear();  // frees the maps while others may call
+  lock.lock();
+  return fault.empty();
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,406 @@
+// A map that is partly in memory and partly in a file is the map that would be in memory, to the bit.
+#include "bki_mapping/store/map_keeper.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "reference/content.h"
+#include "reference/scenes.h"
+#include "store/map_maker.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+using reference::contentOf;
+
+constexpr double kWindow = 60.0;  // [m]; the scans reach 25 m
+
+MapperConfig configOf(const std::string& mode = "line", double memory_limit = 0.0) {
+  MapperConfig config;
+  config.resolution = 0.5;
+  config.free_space.mode = mode;
+  config.free_space.extent = FreeSpaceExtent::kObserved;
+  config.memory_limit = memory_limit;
+  config.threads = 2;
+  return config;
+}
+
+/// A scan of a sensor at a place [m].
+Scan scanAt(double x, double y, std::uint64_t stamp) {
+  std::mt19937_64 random(stamp);
+  std::uniform_real_distribution<double> angle(-3.1, 3.1), range(2.0, 25.0), height(-2.0, 2.0);
+  Scan scan;
+  scan.stamp = stamp;
+  scan.origin = {x, y, 0.3};
+  for (int p = 0; p < 150; ++p) {
+    const double a = angle(random), r = range(random);
+    scan.points.push_back(Eigen::Vector3d(r * std::cos(a), r * std::sin(a), height(random)).cast<float>());
+    scan.labels.push_back(10u * (1 + p % 2));
+  }
+  return scan;
+}
+
+/// Out, round a loop, and back over the same ground.
+std::vector<Scan> drive() {
+  std::vector<Scan> scans;
+  const auto add = [&](double x, double y) { scans.push_back(scanAt(x, y, scans.size() + 1)); };
+  for (double x = 0.0; x < 200.0; x += 4.0) add(x, 0.0);
+  for (double y = 0.0; y < 120.0; y += 4.0) add(200.0, y);
+  for (double y = 120.0; y > 0.0; y -= 4.0) add(200.0 - y / 4.0, y);
+  for (double x = 200.0; x > -20.0; x -= 4.0) add(x, 1.0);
+  return scans;
+}
+
+MapInfo infoOfMapper(const SemanticMapper& mapper) {
+  MapInfo info = infoOf();
+  info.resolution = mapper.map().geometry().resolution();
+  info.prior = mapper.map().prior();
+  info.classes = mapper.sharedClasses();
+  return info;
+}
+
+DriveRecord newDrive(const std::string& id) {
+  DriveRecord drive;
+  drive.id = id;
+  return drive;
+}
+
+/// A mapper whose map is kept in a file.
+struct Kept {
+  Kept(const std::string& path, const std::string& id, const MapperConfig& config = configOf())
+      : mapper(config, reference::smallTable()), keeper(mapper, path, infoOfMapper(mapper), newDrive(id)) {}
+
+  void integrate(const Scan& scan, double window = kWindow) {
+    mapper.integrate(scan);
+    keeper.addScan(scan.stamp);
+    keeper.moveTo({scan.origin, window});
+    most_bytes = std::max(most_bytes, mapper.mapBytes());
+  }
+
+  SemanticMapper mapper;
+  MapKeeper keeper;
+  std::size_t most_bytes = 0;
+};
+
+std::map<GridIndex, std::string> contentOfAll(const std::vector<Scan>& scans,
+                                              const MapperConfig& config = configOf()) {
+  SemanticMapper mapper(config, reference::smallTable());
+  for (const Scan& scan : scans) mapper.integrate(scan);
+  return contentOf(mapper.map());
+}
+
+std::map<GridIndex, std::string> contentIn(const std::string& path) {
+  return contentOf(loadMap(path).map);
+}
+
+/// Equality, without megabytes of print where it fails.
+testing::AssertionResult same(const std::map<GridIndex, std::string>& a,
+                              const std::map<GridIndex, std::string>& b) {
+  std::size_t missing = 0, different = 0, more = a.size();
+  for (const auto& [index, content] : b) {
+    const auto other = a.find(index);
+    missing += other == a.end();
+    more -= other != a.end();
+    different += other != a.end() && other->second != content;
+  }
+  if (missing + different + more == 0) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "of " << b.size() << " blocks " << missing << " are missing, "
+                                     << different << " different, and " << more << " too many";
+}
+
+TEST(MapKeeper, AWindowChangesNoBit) {
+  const TemporaryFolder folder;
+  for (const std::string mode : {"line", "uniform", "none"}) {
+    const std::string path = folder / (mode + ".bkm");
+    Kept kept(path, "a", configOf(mode));
+    const std::vector<Scan> scans = drive();
+    std::size_t most = 0;
+    for (const Scan& scan : scans) {
+      kept.integrate(scan);
+      most = std::max(most, kept.mapper.map().size());
+    }
+    EXPECT_EQ(kept.keeper.close(), "");
+    const auto expected = contentOfAll(scans, configOf(mode));
+    EXPECT_LT(most, expected.size() / 2) << "the window left most of the map in memory";
+    EXPECT_TRUE(same(contentIn(path), expected)) << mode;
+    ASSERT_EQ(loadMap(path).drives.size(), 1u);
+    EXPECT_EQ(loadMap(path).drives[0].scans, scans.size());
+  }
+}
+
+TEST(MapKeeper, WhatComesBackIsInMemory) {
+  const TemporaryFolder folder;
+  Kept kept(folder / "map.bkm", "a");
+  const std::vector<Scan> scans = drive();
+  for (const Scan& scan : scans) kept.integrate(scan);
+  const MapKeeper::Window window{scans.back().origin, kWindow};
+  kept.keeper.moveTo(window);
+  kept.keeper.waitForTiles();
+  const auto all = contentOfAll(scans);
+  std::size_t near = 0;
+  for (const auto& [index, content] : all) {
+    const GridGeometry& geometry = kept.mapper.map().geometry();
+    const double distance = (geometry.blockCentre({index}) - window.centre).cwiseAbs().maxCoeff();
+    if (distance > 0.5 * kWindow) continue;
+    ++near;
+    ASSERT_TRUE(kept.mapper.map().find({index}));
+  }
+  EXPECT_GT(near, 100u);
+  for (const auto& [index, content] : contentOf(kept.mapper.map())) {
+    const auto known = all.find(index);
+    ASSERT_TRUE(known != all.end());
+    if (((kept.mapper.map().geometry().blockCentre({index}) - window.centre).cwiseAbs().maxCoeff()) < 25.0) {
+      EXPECT_TRUE(known->second == content);
+    }
+  }
+}
+
+TEST(MapKeeper, TellsWhichBlocksCameAndWent) {
+  const TemporaryFolder folder;
+  Kept kept(folder / "map.bkm", "a");
+  std::set<GridIndex> shown;  // what one who follows the changes takes for the map
+  const auto follow = [&](const std::vector<GridIndex>& changed) {
+    for (const GridIndex& index : changed) {
+      if (kept.mapper.map().find({index})) {
+        shown.insert(index);
+      } else {
+        shown.erase(index);
+      }
+    }
+  };
+  std::size_t n = 0;
+  for (const Scan& scan : drive()) {
+    kept.mapper.integrate(scan);
+    follow(kept.mapper.touchedBlocks());
+    kept.keeper.addScan(scan.stamp);
+    if (++n % 40 == 0) kept.keeper.save();
+    follow(kept.keeper.moveTo({scan.origin, kWindow}));
+    if (n % 10 == 0) follow(kept.keeper.waitForTiles());
+    std::set<GridIndex> expected;
+    for (const auto& [index, block] : kept.mapper.map().entries()) expected.insert(index);
+    ASSERT_TRUE(shown == expected) << "after scan " << n;
+  }
+}
+
+TEST(MapKeeper, ContinuesAMap) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm", copy = folder / "copy.bkm";
+  const std::vector<Scan> scans = drive();
+  const std::size_t pieces = 4;
+  for (std::size_t piece = 0; piece < pieces; ++piece) {
+    Kept kept(path, "drive " + std::to_string(piece));
+    for (std::size_t i = scans.size() * piece / pieces; i < scans.size() * (piece + 1) / pieces; ++i) {
+      kept.integrate(scans[i]);
+      if (i % 30 == 0) kept.keeper.save();
+    }
+    kept.keeper.saveTo(copy).get();
+  }
+  EXPECT_TRUE(same(contentIn(path), contentOfAll(scans)));
+  EXPECT_TRUE(same(contentIn(copy), contentOfAll(scans)));
+  EXPECT_EQ(loadMap(path).drives.size(), pieces);
+  EXPECT_THROW(Kept(path, "drive 2"), std::invalid_argument);
+}
+
+TEST(MapKeeper, LoadsAWholeMap) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::vector<Scan> scans = drive();
+  scans.resize(60);
+  {
+    Kept kept(path, "a");
+    for (const Scan& scan : scans) kept.integrate(scan);
+  }
+  Kept kept(path, "b");
+  kept.keeper.moveTo({});
+  EXPECT_FALSE(kept.keeper.waitForTiles().empty());
+  EXPECT_TRUE(same(contentOf(kept.mapper.map()), contentOfAll(scans)));
+}
+
+TEST(MapKeeper, SavedIsWhatTheFileHoldsWhateverComesThen) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm", killed = folder / "killed.bkm";
+  const std::vector<Scan> scans = drive();
+  Kept kept(path, "a");
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    kept.integrate(scans[i]);
+    if (i != 120) continue;
+    kept.keeper.save().get();
+    // A copy of the file and its journal is what a killed process leaves.
+    std::filesystem::copy_file(path, killed);
+    EXPECT_TRUE(same(contentIn(killed), contentOfAll({scans.begin(), scans.begin() + 121})));
+  }
+}
+
+TEST(MapKeeper, KeepsWithinMemory) {
+  const TemporaryFolder folder;
+  const std::vector<Scan> scans = drive();
+  Kept plain(folder / "plain.bkm", "a"), limited(folder / "limited.bkm", "a", configOf("line", 6.0));
+  for (const Scan& scan : scans) plain.integrate(scan, 1000.0);
+  for (const Scan& scan : scans) {
+    try {
+      limited.integrate(scan, 1000.0);
+    } catch (const ScanRefused&) {
+      ASSERT_TRUE(limited.keeper.makeRoom());
+      limited.integrate(scan, 1000.0);
+    }
+  }
+  EXPECT_GT(plain.most_bytes, 12'000'000u);
+  EXPECT_LT(limited.most_bytes, 6'000'000u);
+  EXPECT_EQ(limited.keeper.close(), "");
+  EXPECT_TRUE(same(contentIn(folder / "limited.bkm"), contentOfAll(scans)));
+}
+
+TEST(MapKeeper, AddsMapsAndForgetsThem) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  const std::vector<Scan> scans = drive();
+  const std::vector<Scan> first(scans.begin(), scans.begin() + 60), second(scans.begin() + 60, scans.end());
+  const auto mapOf = [](const std::vector<Scan>& some) {
+    SemanticMapper mapper(configOf(), reference::smallTable());
+    for (const Scan& scan : some) mapper.integrate(scan);
+    return mapper.snapshot();
+  };
+  Kept kept(path, "a");
+  for (const Scan& scan : first) kept.integrate(scan);
+  kept.keeper.addMap(mapOf(second), {driveOf("b")});
+  EXPECT_THROW(kept.keeper.addMap(mapOf(second), {driveOf("c"), driveOf("b")}), std::invalid_argument);
+  kept.keeper.save().get();
+  const std::string sum = folder / "sum.bkm";
+  kept.keeper.saveTo(sum).get();
+  EXPECT_TRUE(same(contentIn(sum), contentOfAll(scans)));
+  EXPECT_EQ(loadMap(sum).drives.size(), 2u);
+
+  kept.keeper.reset(newDrive("d"));
+  EXPECT_EQ(kept.mapper.map().size(), 0u);
+  for (const Scan& scan : second) kept.integrate(scan);
+  EXPECT_EQ(kept.keeper.close(), "");
+  EXPECT_TRUE(same(contentIn(path), contentOfAll(second)));
+  ASSERT_EQ(loadMap(path).drives.size(), 1u);
+  EXPECT_EQ(loadMap(path).drives[0].id, "d");
+}
+
+/// While it lives, files of this process cannot grow.
+class FullDisk {
+ public:
+  explicit FullDisk(std::size_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(MapKeeper, GoesOnWhenTheDiskIsFull) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  const std::vector<Scan> scans = drive();
+  {
+    Kept kept(path, "a");
+    std::future<void> saved;
+    {
+      const FullDisk full(300'000);
+      for (std::size_t i = 0; i < 100; ++i) kept.integrate(scans[i]);
+      saved = kept.keeper.save();
+      for (int i = 0; i < 500 && kept.keeper.fault().empty(); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      }
+      EXPECT_NE(kept.keeper.fault().find(path), std::string::npos) << kept.keeper.fault();
+      EXPECT_EQ(saved.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+      EXPECT_FALSE(kept.keeper.makeRoom());
+    }
+    saved.get();  // is tried again
+    for (std::size_t i = 100; i < scans.size(); ++i) kept.integrate(scans[i]);
+  }
+  EXPECT_TRUE(same(contentIn(path), contentOfAll(scans)));
+}
+
+TEST(MapKeeper, SaysWhatIsLostWhenTheDiskStaysFull) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  const std::vector<Scan> scans = drive();
+  Kept kept(path, "a");
+  for (std::size_t i = 0; i < 20; ++i) kept.integrate(scans[i]);
+  kept.keeper.save().get();
+  const FullDisk full(std::filesystem::file_size(path));
+  for (std::size_t i = 20; i < 40; ++i) kept.integrate(scans[i]);
+  const std::string lost = kept.keeper.close();
+  EXPECT_NE(lost.find(path), std::string::npos) << lost;
+  EXPECT_NE(lost.find("lost"), std::string::npos) << lost;
+  EXPECT_TRUE(same(contentIn(path), contentOfAll({scans.begin(), scans.begin() + 20})));
+}
+
+TEST(MapKeeper, LeavesADamagedTileAsItIs) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  const std::vector<Scan> scans = drive();
+  const std::vector<Scan> some(scans.begin(), scans.begin() + 50);
+  {
+    Kept kept(path, "a");
+    for (const Scan& scan : some) kept.integrate(scan);
+  }
+  // Most bytes of the file are the content of tiles.
+  std::string bytes;
+  {
+    std::ifstream file(path, std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(file), {});
+  }
+  const std::size_t middle = bytes.size() / 2;
+  bytes[middle] = static_cast<char>(bytes[middle] ^ 0x10);
+  std::ofstream(path, std::ios::binary) << bytes;
+  std::vector<GridIndex> damaged;
+  {
+    MapFile file(path, MapFile::Access::kRead);
+    SemanticMap ignored = file.info().emptyMap();
+    for (const TileEntry& tile : file.tiles()) {
+      try {
+        file.addTileTo(ignored, {tile.index});
+      } catch (const MapFileDamaged&) {
+        damaged.push_back(tile.index);
+      }
+    }
+  }
+  ASSERT_EQ(damaged.size(), 1u);
+  Kept kept(path, "b");
+  for (const Scan& scan : some) kept.integrate(scan);
+  kept.keeper.moveTo({some.back().origin, kWindow});
+  kept.keeper.waitForTiles();
+  for (const Scan& scan : some) kept.integrate(scan);
+  const std::string fault = kept.keeper.close();
+  EXPECT_NE(fault.find("damaged"), std::string::npos) << fault;
+
+  // All else is there three times, and the tile is as it was.
+  std::vector<Scan> thrice = some;
+  thrice.insert(thrice.end(), some.begin(), some.end());
+  thrice.insert(thrice.end(), some.begin(), some.end());
+  const auto all = contentOfAll(thrice);
+  MapFile file(path, MapFile::Access::kRead);
+  SemanticMap rest = file.info().emptyMap();
+  std::size_t unread = 0;
+  for (const TileEntry& tile : file.tiles()) {
+    if (tile.index == damaged[0]) {
+      EXPECT_THROW(file.addTileTo(rest, {tile.index}), MapFileDamaged);
+      ++unread;
+    } else {
+      file.addTileTo(rest, {tile.index});
+    }
+  }
+  EXPECT_EQ(unread, 1u);
+  auto expected = all;
+  for (auto entry = expected.begin(); entry != expected.end();) {
+    entry = SemanticMap::regionOf({entry->first}) == damaged[0] ? expected.erase(entry) : std::next(entry);
+  }
+  EXPECT_TRUE(same(contentOf(rest), expected));
+}
+
+}  // namespace
+}  // namespace bki_mapping
