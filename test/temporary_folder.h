@@ -10,8 +10,8 @@ namespace bki_mapping {
 
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "bki_mapping_XXXXXX").string();
+  explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
+    std::string pattern = (parent / "bki_mapping_XXXXXX").string();
     path_ = mkdtemp(pattern.data());
   }
   ~TemporaryFolder() { std::filesystem::remove_all(path_); }
@@ -28,5 +28,11 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// A parent for folders in memory, where syncing takes no time.
+inline std::filesystem::path memoryFolder() {
+  const char* const folder = "/dev/shm";
+  return access(folder, W_OK | X_OK) == 0 ? folder : std::filesystem::temp_directory_path();
+}
 
 }  // namespace bki_mapping

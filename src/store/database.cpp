@@ -21,6 +21,7 @@ constexpr double kStepsPerByte = 0.5;
 /// SQLite keeps up to 2 MB of a change in memory.
 constexpr std::int64_t kMostUnwritten = 4'000'000;
 
+constexpr std::size_t kLongestQuote = 300;
 constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
 
 [[noreturn]] void fail(const std::string& path, sqlite3* database, int code) {
@@ -83,7 +84,12 @@ void distrust(sqlite3* database) {
 }  // namespace
 
 MapFileDamaged damaged(const std::string& path, const std::string& what) {
-  return MapFileDamaged(path + " is damaged (" + what + "); use another copy of it");
+  // It may quote the file: nobody wants to read much of it, nor to have a terminal obey it.
+  std::string quoted = what.substr(0, kLongestQuote);
+  for (char& c : quoted) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+  }
+  return MapFileDamaged(path + " is damaged (" + quoted + "); use another copy of it");
 }
 
 void Database::Close::operator()(sqlite3* database) const {

@@ -214,6 +214,11 @@ std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, s
       drive.bounds.min()[i] = low[static_cast<std::size_t>(i)];
       drive.bounds.max()[i] = high[static_cast<std::size_t>(i)];
     }
+    try {
+      checkDrive(drive);
+    } catch (const std::invalid_argument& error) {
+      throw damaged(database.name(), error.what());
+    }
   });
   std::sort(drives.begin(), drives.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
   const auto same = [](const DriveRecord& a, const DriveRecord& b) { return a.id == b.id; };

@@ -3,8 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <map>
-#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -46,12 +47,19 @@ inline SemanticMap readPart(MapFile& file, int part) {
   return map;
 }
 
-/// Reads all of a file: part 0, and those of the drives.
+inline std::string readFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+inline void writeFile(const std::string& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+/// Reads all of a file.
 inline FileContent contentOf(MapFile& file) {
   FileContent content{textOf(file.info()), file.drives(), {}};
-  std::set<int> parts{0};
-  for (const DriveRecord& drive : content.drives) parts.insert(drive.part);
-  for (const int part : parts) content.parts[part] = reference::contentOf(readPart(file, part));
+  for (const int part : file.parts()) content.parts[part] = reference::contentOf(readPart(file, part));
   return content;
 }
 inline FileContent contentOf(const std::string& path) {
