@@ -376,8 +376,8 @@ void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, s
 }  // namespace
 
 struct NewMapFile::State {
-  State(const std::string& file_path, const MapInfo& info)
-      : path(file_path), replaced(lockReplaced(path)), atomic(path) {
+  State(const std::string& file_path, const MapInfo& info, bool is_locked)
+      : path(file_path), replaced(is_locked ? std::nullopt : lockReplaced(path)), atomic(path) {
     auto state = std::make_unique<MapFile::State>(atomic.temporaryPath(), Database::Mode::kNew, path);
     state->database.run("BEGIN");
     createSchema(state->database);
@@ -399,12 +399,12 @@ struct NewMapFile::State {
   std::optional<MapFile::Change> change;
 };
 
-NewMapFile::NewMapFile(const std::string& path, const MapInfo& given) {
+NewMapFile::NewMapFile(const std::string& path, const MapInfo& given, const MapFile* replaced) {
   MapInfo info = given;
   info.program = kProgram;
   checkInfo(info);
   try {
-    state_ = std::make_unique<State>(path, info);
+    state_ = std::make_unique<State>(path, info, replaced != nullptr);
   } catch (const MapFileError&) {
     throw;
   } catch (const std::runtime_error& error) {
@@ -437,7 +437,10 @@ void saveMap(const std::string& path, const MapInfo& info, const std::vector<Dri
   of_map.resolution = map.geometry().resolution();
   of_map.prior = map.prior();
   NewMapFile file(path, of_map);
-  for (const DriveRecord& drive : drives) file.content().putDrive(drive);
+  for (DriveRecord drive : drives) {
+    drive.part = 0;
+    file.content().putDrive(drive);
+  }
   for (const GridIndex& tile : tilesOf(map)) file.content().writeTile(map, {tile});
   file.commit();
 }
@@ -462,6 +465,7 @@ StoredMap loadMap(const std::string& path, std::size_t memory_limit) {
 
 StoredMap readMap(MapFile& file, std::size_t memory_limit) {
   StoredMap stored{file.info(), file.drives(), file.info().emptyMap()};
+  for (DriveRecord& drive : stored.drives) drive.part = 0;
   const std::vector<TileEntry> tiles = file.tiles();
   checkMemory(file.path(), tiles, memory_limit);
   for (const TileEntry& tile : tiles) {

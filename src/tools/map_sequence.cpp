@@ -52,6 +52,17 @@ std::string driveId(const po::variables_map& given, const Sequence& sequence, st
   return folder.filename().string() + "/" + sequence.name(first) + "-" + sequence.name(last - 1);
 }
 
+/// Says that drives which a map keeps apart are only in the sum of the continued one.
+void warnOfParts(const std::string& path) {
+  for (const DriveRecord& drive : MapFile(path, MapFile::Access::kRead).drives()) {
+    if (drive.part == 0) continue;
+    std::cerr << "warning: " << path
+              << " keeps drives apart, and the continued map does not; to keep them, map the "
+                 "scans by themselves, and add them with merge_maps --keep-drives\n";
+    return;
+  }
+}
+
 /// Loads the map to be continued. @return the drives in it. @throws std::invalid_argument if `id` is among
 /// them.
 std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path, const std::string& id) {
@@ -84,7 +95,11 @@ int mapSequence(const po::variables_map& given) {
   drive.id = driveId(given, sequence, first, last);
   drive.name = sequence.folder();
   std::vector<DriveRecord> drives;
-  if (given.count("resume")) drives = resume(mapper, given["resume"].as<std::string>(), drive.id);
+  if (given.count("resume")) {
+    const std::string path = given["resume"].as<std::string>();
+    drives = resume(mapper, path, drive.id);
+    if (given.count("output")) warnOfParts(path);
+  }
 
   std::vector<ScanReport> scans;
   std::size_t refused = 0;

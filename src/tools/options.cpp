@@ -39,13 +39,18 @@ std::size_t count(const po::variables_map& given, const std::string& name) {
 }
 
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
-                                         po::options_description options) {
+                                         po::options_description options, const std::string& positional) {
   options.add_options()("help,h", "print this help");
+  po::options_description all = options;
+  po::positional_options_description words;
+  if (!positional.empty()) {
+    all.add_options()(positional.c_str(), po::value<std::vector<std::string>>());
+    words.add(positional.c_str(), -1);
+  }
   auto given = std::make_unique<po::variables_map>();
   try {
     const int style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
-    const auto parsed =
-        po::command_line_parser(argc, argv).options(options).positional({}).style(style).run();
+    const auto parsed = po::command_line_parser(argc, argv).options(all).positional(words).style(style).run();
     po::store(parsed, *given);
     if (given->count("help")) {
       std::cout << what << "\n\n" << options;

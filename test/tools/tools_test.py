@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """The programs that need no ROS, called as a user calls them."""
 import array
+import contextlib
 import csv
 import json
 import os
 import re
 import shutil
-import struct
+import sqlite3
 import stat
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -47,9 +49,9 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('map_sequence', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
-            self.assertGreater(len(options), 4, program)
+            self.assertGreater(len(options), 2, program)
             for option in options:
                 self.assertIn(option, rows[program], program)
 
@@ -359,6 +361,58 @@ class Tools(unittest.TestCase):
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--report', good, '--output',
                    '/no/such/map.ply')
         self.assertFalse(os.path.exists(good))
+
+    def map_of(self, name, first, scans):
+        path = self.path(name)
+        made = call('map_sequence', '--sequence', self.drive, '--first', str(first), '--scans', str(scans), '--output', path)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        return path
+
+    def tiles_of(self, path, part=0):
+        """The tiles of a part of a map file, packed."""
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            return dict(((z, y, x), content) for z, y, x, content in database.execute(
+                'SELECT z, y, x, content FROM tile WHERE part = ?', (part,)))
+
+    def succeeds(self, program, *arguments):
+        result = call(program, *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def test_merging_equals_mapping_in_one_run(self):
+        whole, kept, merged = self.map_of('whole.bkm', 0, 4), self.path('kept.bkm'), self.path('merged.bkm')
+        front, back = self.map_of('front.bkm', 0, 2), self.map_of('back.bkm', 2, 2)
+        result = self.succeeds('merge_maps', back, front, '--output', kept, '--keep-drives')
+        self.assertEqual(self.tiles_of(kept), self.tiles_of(whole))
+        self.assertRegex(result.stdout, r'kept.bkm: 2 drives, \d+ blocks in \d+ tiles\n$')
+        result = self.succeeds('merge_maps', kept, back, '--output', merged, '--without', 'drive/000000-000001')
+        self.assertEqual(self.tiles_of(merged), self.tiles_of(back))
+        self.assertIn("drive 'drive/000002-000003' is in more than one map, and counts once\n", result.stdout)
+        more = self.succeeds('map_sequence', '--sequence', self.drive, '--drive', 'more', '--resume', kept, '--output', merged)
+        self.assertIn('keeps drives apart, and the continued map does not', more.stderr)
+
+    def test_moving_maps(self):
+        a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
+        self.assertEqual(self.succeeds('merge_maps', a, '--transform', f'{a}=0.3,-1.2,3,90', '--output', there).stderr, '')
+        self.assertNotEqual(self.tiles_of(there), self.tiles_of(a))
+        self.succeeds('merge_maps', there, '--transform', f'{there}=1.2,0.3,-3,-90', '--output', back)
+        self.assertEqual(self.tiles_of(back), self.tiles_of(a))
+        self.assertIn('which is approximate', self.succeeds('merge_maps', a, '--transform', f'{a}=0,0,0,30', '--output',
+                                                            there).stderr)
+
+    def test_what_cannot_be_merged(self):
+        a, output = self.map_of('a.bkm', 0, 1), ('--output', self.path('never.bkm'))
+        self.fails('the maps to be merged are missing', 'merge_maps', *output)
+        self.fails('--output FILE.bkm is missing', 'merge_maps', a)
+        self.fails('must end in .bkm', 'merge_maps', a, '--output', self.path('map.ply'))
+        self.fails("'drive/000000-000000'", 'merge_maps', a, '--without', 'x', *output)
+        for place in ('0,0,0,0', f'{a}=', f'{a}=0,0,0', f'{a}=0,0,0,0,0', f'{a}=0,0,0,', f'{a}=0,0,x,0', f'{a}=0,0,0,9 0'):
+            self.fails(f'--transform {place} is not of the form', 'merge_maps', a, '--transform', place, *output)
+        self.fails('is not finite', 'merge_maps', a, '--transform', f'{a}=0,0,nan,0', *output)
+        self.fails('names b.bkm, which is none of the maps', 'merge_maps', a, '--transform', 'b.bkm=0,0,0,0', *output)
+        self.fails('given twice', 'merge_maps', a, *(2 * ('--transform', f'{a}=0,0,0,0')), *output)
+        self.fails('cannot be opened', 'merge_maps', a, self.path('missing.bkm'), *output)
+        self.assertFalse(os.path.exists(output[1]))
 
     def test_occupancy_table_maps_everything_as_one_class(self):
         report = self.path('one.json')

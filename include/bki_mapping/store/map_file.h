@@ -13,8 +13,8 @@
 namespace bki_mapping {
 
 /// The tile of 8 x 8 x 8 blocks with an index, as Region::regionOf gives it, in one part of the file.
-/// Part 0 is the map, the sum of all drives. The other parts hold the evidence of single drives
-/// (DriveRecord::part).
+/// Part 0 is the map, the sum of all drives. Each of the other parts holds the evidence of one drive alone,
+/// or of several that cannot be told apart (DriveRecord::part).
 struct TileKey {
   GridIndex index;
   int part = 0;
@@ -115,9 +115,10 @@ class MapFile {
 class NewMapFile {
  public:
   /// @param info MapInfo::program is set by the library.
+  /// @param replaced the map at `path`, if it is open for update here; it must not be used after commit().
   /// @throws MapFileError if the file cannot be written, MapFileInUse if it is open in another place,
   /// std::invalid_argument if the info is invalid.
-  NewMapFile(const std::string& path, const MapInfo& info);
+  NewMapFile(const std::string& path, const MapInfo& info, const MapFile* replaced = nullptr);
   ~NewMapFile();
 
   /// What to write into the file. Its commit() must not be called.
@@ -130,15 +131,15 @@ class NewMapFile {
   std::unique_ptr<State> state_;
 };
 
-/// A whole map in memory.
+/// A whole map in memory: the sum of all drives, without the parts of single ones.
 struct StoredMap {
   MapInfo info;
-  std::vector<DriveRecord> drives;
+  std::vector<DriveRecord> drives;  ///< all of part 0
   SemanticMap map;
 };
 
 /// Writes a map to a file by NewMapFile.
-/// @param info resolution and prior are taken from the map.
+/// @param info resolution and prior are taken from the map. @param drives their parts are set to 0.
 /// @throws as NewMapFile, and std::invalid_argument if a drive is invalid.
 void saveMap(const std::string& path, const MapInfo& info, const std::vector<DriveRecord>& drives,
              const SemanticMap& map);

@@ -53,7 +53,8 @@ struct MapInfo {
 struct DriveRecord {
   std::string id;    ///< unique to the drive, wherever it was recorded; not empty, at most 1 MB
   std::string name;  ///< for humans
-  /// The part of the file that holds the drive's evidence alone, > 0; 0: the evidence is in the sum only.
+  /// The part of the file that holds the drive's evidence, > 0, together with that of the other drives of the
+  /// same part; 0: the evidence is in the sum only.
   int part = 0;
   std::uint64_t scans = 0;
   std::uint64_t first_stamp = 0, last_stamp = 0;  ///< of the scans [ns], below 2^63

@@ -1,0 +1,51 @@
+/// @file Moves voxels from one grid to another.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <utility>
+
+#include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/store/map_merge.h"
+
+namespace bki_mapping {
+
+/// The tiles from `low` to `high`, both included.
+struct TileRange {
+  GridIndex low, high;
+};
+
+/// Takes the voxels of a map to those of another one with the same resolution.
+///
+/// Voxel (0, 0, 0) spans 0 to 1 on each axis, so that quarter turns about the origin take voxels to voxels:
+/// centre (x + 1/2, y + 1/2) goes to (-y - 1/2, x + 1/2), the centre of voxel (-y - 1, x).
+class GridTransform {
+ public:
+  /// @throws std::invalid_argument if the placement is not finite.
+  GridTransform(const MapPlacement& placement, double resolution);
+
+  /// Whether voxels go to voxels: each one to another, and none is lost.
+  bool exact() const { return exact_; }
+  bool identity() const { return exact_ && cos_ == 1.0 && shift_.isZero(0.0); }
+
+  /// The voxel of the map from which a voxel of the other map takes its evidence.
+  VoxelIndex sourceOf(const VoxelIndex& target) const;
+  /// Tiles that hold the sources of all voxels of a tile.
+  TileRange sourceTiles(const GridIndex& target) const;
+  /// Tiles that hold all voxels whose sources lie in a tile.
+  /// @throws std::invalid_argument if they are beyond GridGeometry::kMaxCoordinate.
+  TileRange targetTiles(const GridIndex& source) const;
+  /// The box about a turned and moved box [m]. Corners of voxels go to corners of voxels, to the bit, if the
+  /// transform is exact.
+  Eigen::AlignedBox3d apply(const Eigen::AlignedBox3d& box) const;
+
+ private:
+  Eigen::Vector3d forward(const Eigen::Vector3d& point) const;   ///< [voxels]
+  Eigen::Vector3d backward(const Eigen::Vector3d& point) const;  ///< [voxels]
+
+  double resolution_;
+  double cos_ = 1.0, sin_ = 0.0;
+  Eigen::Vector3d shift_;  ///< [voxels]
+  bool exact_;
+};
+
+}  // namespace bki_mapping

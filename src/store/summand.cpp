@@ -1,0 +1,175 @@
+#include "store/summand.h"
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <cstring>
+#include <map>
+
+namespace bki_mapping {
+namespace {
+
+/// Takes the evidence and the marks of a map from those of a sum that holds them.
+/// @return false if that is impossible, because the sum has stopped at the end of its range.
+bool subtract(SemanticMap& sum, const SemanticMap& other) {
+  bool possible = true;
+  for (const auto& [index, block] : other.entries()) {
+    Block& from = sum.getOrAllocate(index);
+    for (std::size_t p = 0; p < block->classes().size(); ++p) {
+      const EvidenceUnits* const units = block->plane(p);
+      from.change(block->classes()[p], [&](EvidenceUnits* plane) {
+        for (int v = 0; v < kBlockVoxels; ++v) {
+          if (units[v] == 0) continue;
+          possible = possible && plane[v] < kMostUnits && plane[v] > -kMostUnits;
+          const std::int64_t difference = std::int64_t{plane[v]} - units[v], most = kMostUnits;
+          plane[v] = static_cast<EvidenceUnits>(std::clamp(difference, -most, most));
+        }
+        return false;
+      });
+    }
+    from.setOcclusion(from.occlusion() & ~block->occlusion());
+    if (from.empty()) sum.erase(index);
+  }
+  return possible;
+}
+
+/// A block of the target, made of the voxels of other blocks.
+void gatherBlock(const SemanticMap& source, const GridTransform& transform, const BlockIndex& index,
+                 SemanticMap& target) {
+  struct Voxel {
+    const Block* block;
+    int offset;
+  };
+  std::array<Voxel, kBlockVoxels> voxels;
+  std::bitset<256> classes;
+  Block::Occlusion marks;
+  BlockIndex last_index{};
+  const Block* last = source.find(last_index);
+  bool any = false;
+  for (int v = 0; v < kBlockVoxels; ++v) {
+    const VoxelIndex from = transform.sourceOf(GridGeometry::voxelOf(index, v));
+    const BlockIndex block = GridGeometry::blockOf(from);
+    if (block != last_index) {
+      last_index = block;
+      last = source.find(block);
+    }
+    const int offset = GridGeometry::offsetInBlock(from);
+    voxels[static_cast<std::size_t>(v)] = {last, offset};
+    if (!last) continue;
+    any = true;
+    for (const ClassId id : last->classes()) classes[id] = true;
+    marks[static_cast<std::size_t>(v)] = last->occlusion()[static_cast<std::size_t>(offset)];
+  }
+  if (!any) return;
+  Block& block = target.getOrAllocate(index);
+  std::array<EvidenceUnits, kBlockVoxels> plane;
+  for (std::size_t id = 0; id < classes.size(); ++id) {
+    if (!classes[id]) continue;
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      const EvidenceUnits* const units =
+          voxels[v].block ? voxels[v].block->evidence(static_cast<ClassId>(id)) : nullptr;
+      plane[v] = units ? units[voxels[v].offset] : 0;
+    }
+    block.add(static_cast<ClassId>(id), plane.data());
+  }
+  block.setOcclusion(marks);
+  if (block.empty()) target.erase(index);
+}
+
+template <typename Visit>
+void forEachTile(const TileRange& range, Visit&& visit) {
+  for (int z = range.low.z; z <= range.high.z; ++z) {
+    for (int y = range.low.y; y <= range.high.y; ++y) {
+      for (int x = range.low.x; x <= range.high.x; ++x) visit(GridIndex{x, y, z});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<GridIndex> Summand::tiles() const {
+  std::vector<GridIndex> tiles;
+  for (const TileEntry& entry : source_->file.tiles(part_)) {
+    if (source_->transform.identity()) {
+      tiles.push_back(entry.index);
+    } else {
+      forEachTile(source_->transform.targetTiles(entry.index),
+                  [&](const GridIndex& tile) { tiles.push_back(tile); });
+    }
+  }
+  std::sort(tiles.begin(), tiles.end());
+  tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+  return tiles;
+}
+
+void Summand::addStored(SemanticMap& map, const GridIndex& tile) const {
+  MapFile& file = source_->file;
+  if (!file.addTileTo(map, {tile, part_})) return;
+  for (const int part : without_) {
+    SemanticMap other = file.info().emptyMap();
+    if (!file.addTileTo(other, {tile, part}) || subtract(map, other)) continue;
+    throw MapFileError(
+        "evidence in " + path() +
+        " has reached its greatest value, 32,768, so that drives cannot be told apart any more; "
+        "leave the drives that are kept apart in the map, and those of it out of other maps");
+  }
+}
+
+SemanticMap Summand::read(const GridIndex& tile) const {
+  SemanticMap evidence = source_->file.info().emptyMap();
+  const GridTransform& transform = source_->transform;
+  if (transform.identity()) {
+    addStored(evidence, tile);
+    return evidence;
+  }
+  SemanticMap stored = source_->file.info().emptyMap();
+  forEachTile(transform.sourceTiles(tile), [&](const GridIndex& source) { addStored(stored, source); });
+  if (stored.size() == 0) return evidence;
+  const Region region(tile);
+  for (int number = 0; number < Region::kBlocks; ++number) {
+    gatherBlock(stored, transform, region.blockIndex(number), evidence);
+  }
+  return evidence;
+}
+
+std::vector<Summand> summandsOf(const std::shared_ptr<PlacedFile>& source) {
+  std::map<int, std::set<std::string>> by_part;
+  std::set<std::string> all;
+  for (const DriveRecord& drive : source->file.drives()) {
+    by_part[drive.part].insert(drive.id);
+    all.insert(drive.id);
+  }
+  std::vector<Summand> summands;
+  if (all.empty()) {
+    if (source->file.tiles().empty()) return summands;
+    throw MapFileError(
+        source->file.path() +
+        " does not say which drives are in it, so that none of them can be known to count once; "
+        "map them again with a program that names its drives");
+  }
+  std::set<int> parts;
+  for (const auto& [part, drives] : by_part) {
+    if (part > 0) parts.insert(part);
+  }
+  for (const auto& [part, drives] : by_part) {
+    if (drives == all) continue;  // the sum, below
+    summands.emplace_back(source, drives, part, part == 0 ? parts : std::set<int>());
+  }
+  summands.emplace_back(source, all, 0);
+  return summands;
+}
+
+bool sameEvidence(const SemanticMap& a, const SemanticMap& b) {
+  if (a.size() != b.size()) return false;
+  for (const auto& [index, block] : a.entries()) {
+    const Block* const other = b.find(index);
+    if (!other || other->classes() != block->classes() || other->occlusion() != block->occlusion()) {
+      return false;
+    }
+    const std::size_t units = block->classes().size() * kBlockVoxels;
+    if (!std::equal(block->plane(0), block->plane(0) + units, other->plane(0))) return false;
+  }
+  return true;
+}
+
+}  // namespace bki_mapping
