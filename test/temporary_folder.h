@@ -19,6 +19,7 @@ class TemporaryFolder {
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  std::string path() const { return path_.string(); }
   std::size_t fileCount() const {
     std::size_t count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(path_)) count += entry.is_regular_file();

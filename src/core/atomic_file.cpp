@@ -102,16 +102,6 @@ void keepOwner(int file, const struct stat& old) {
   [[maybe_unused]] const int user = fchown(file, old.st_uid, static_cast<gid_t>(-1));
 }
 
-/// Makes a renaming durable. Reports only errors of the disk: where a file system or a folder does not
-/// support this, the file is complete all the same.
-void syncFolder(const std::string& path, const fs::path& folder) {
-  const int opened = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (opened < 0) return;
-  const int reason = fsync(opened) == 0 ? 0 : errno;
-  close(opened);
-  if (reason == EIO || reason == ENOSPC || reason == EDQUOT) throw writeFailure(path, std::strerror(reason));
-}
-
 }  // namespace
 
 std::runtime_error writeFailure(const std::string& path, const std::string& reason) {
@@ -168,7 +158,15 @@ void AtomicFile::commit() {
     throw writeFailure(path_, std::strerror(errno));
   }
   committed_ = true;
-  syncFolder(path_, folderOf(target_));
+  syncFolder(target_);
+}
+
+void syncFolder(const std::string& path) {
+  const int opened = open(folderOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return;
+  const int reason = fsync(opened) == 0 ? 0 : errno;
+  close(opened);
+  if (reason == EIO || reason == ENOSPC || reason == EDQUOT) throw writeFailure(path, std::strerror(reason));
 }
 
 void checkWritable(const std::string& path) {

@@ -38,6 +38,11 @@ class AtomicFile {
 /// An error with one sentence: the file, the reason, and the free space in its folder.
 std::runtime_error writeFailure(const std::string& path, const std::string& reason);
 
+/// Makes it durable that a file has got its name, or has lost it. Reports only errors of the disk: where a
+/// file system or a folder does not support this, files are complete all the same.
+/// @throws std::runtime_error as writeFailure.
+void syncFolder(const std::string& path);
+
 /// Checks that AtomicFile can be created, so that long work does not end in a result that cannot be written.
 /// @throws std::runtime_error as AtomicFile's constructor.
 void checkWritable(const std::string& path);

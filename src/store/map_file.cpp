@@ -353,11 +353,15 @@ std::optional<Database> lockReplaced(const std::string& path) {
   }
 }
 
-/// Removes what SQLite would take for a part of a new file with this name.
+/// Removes what SQLite would take for a part of a new file with this name: for good, before there is one.
 void removeLeftovers(const std::string& path) {
   std::error_code ignored;
   const std::string target = std::filesystem::weakly_canonical(path, ignored).string();
-  for (const char* suffix : {"-journal", "-wal", "-shm"}) std::filesystem::remove(target + suffix, ignored);
+  bool removed = false;
+  for (const char* suffix : {"-journal", "-wal", "-shm"}) {
+    removed |= std::filesystem::remove(target + suffix, ignored);
+  }
+  if (removed) syncFolder(target);
 }
 
 /// @param limit for the memory of a map of these tiles [bytes]; 0: none.
@@ -423,8 +427,8 @@ void NewMapFile::commit() {
   state_->change->commit();
   state_->change.reset();
   state_->file = MapFile(std::unique_ptr<MapFile::State>());
-  removeLeftovers(state_->path);
   try {
+    removeLeftovers(state_->path);
     state_->atomic.commit();
   } catch (const std::runtime_error& error) {
     throw MapFileError(error.what());
