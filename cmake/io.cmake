@@ -30,6 +30,8 @@ add_executable(simulate_drive src/tools/simulate_drive.cpp)
 bki_mapping_tool(simulate_drive)
 add_executable(merge_maps src/tools/merge_maps.cpp)
 bki_mapping_tool(merge_maps)
+add_executable(migrate_map src/tools/migrate_map.cpp)
+bki_mapping_tool(migrate_map)
 add_executable(benchmark_sequence benchmark/benchmark_sequence.cpp benchmark/curves.cpp)
 bki_mapping_tool(benchmark_sequence pcl_filters)
 find_package(benchmark QUIET)  # Google Benchmark: for developers

@@ -183,6 +183,16 @@ void Database::rollBack() noexcept {
   }
 }
 
+void Database::copyTo(Database& other) const {
+  sqlite3* const to = other.database_.get();
+  sqlite3_backup* const copying = sqlite3_backup_init(to, "main", database_.get(), "main");
+  if (!copying) fail(other.name_, to, sqlite3_extended_errcode(to));
+  constexpr int kAllPages = -1;
+  const int code = sqlite3_backup_step(copying, kAllPages);
+  sqlite3_backup_finish(copying);
+  if (code != SQLITE_DONE) fail(other.name_, to, code);
+}
+
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const {
   sqlite3_finalize(statement);
 }

@@ -85,6 +85,8 @@ class Database {
   Statement prepare(const char* sql) const;
   /// Rolls an open transaction back, if there is one.
   void rollBack() noexcept;
+  /// Copies all pages to an empty database. @throws MapFileError.
+  void copyTo(Database& other) const;
 
  private:
   struct Close {

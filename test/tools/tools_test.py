@@ -414,6 +414,15 @@ class Tools(unittest.TestCase):
         self.fails('cannot be opened', 'merge_maps', a, self.path('missing.bkm'), *output)
         self.assertFalse(os.path.exists(output[1]))
 
+    def test_migrating(self):
+        a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
+        self.assertIn('version 1, from version 1', self.succeeds('migrate_map', a, copy).stdout)
+        self.assertEqual(self.tiles_of(copy), self.tiles_of(a))
+        self.fails('is there already', 'migrate_map', a, copy)
+        self.fails('there must be two files', 'migrate_map', a)
+        self.fails('must end in .bkm', 'migrate_map', a, self.path('copy.db'))
+        self.fails('is not a map', 'migrate_map', os.path.join(self.drive, 'poses.txt'), self.path('never.bkm'))
+
     def test_occupancy_table_maps_everything_as_one_class(self):
         report = self.path('one.json')
         call('map_sequence', '--sequence', self.drive, '--classes', 'occupancy', '--report', report)

@@ -1,0 +1,80 @@
+#include "store/migration.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "bki_mapping/store/map_file.h"
+#include "core/atomic_file.h"
+#include "store/schema.h"
+
+namespace bki_mapping {
+namespace {
+
+/// All steps up to kFormatVersion. A new version brings the step that leads to it, and a file of the version
+/// before in test/store/data.
+const std::vector<MigrationStep>& allSteps() {
+  static const std::vector<MigrationStep> steps = {};
+  return steps;
+}
+
+/// Reads all of a file. @param name what errors call it.
+void checkAll(const std::string& path, const std::string& name) {
+  try {
+    MapFile file(path, MapFile::Access::kRead);
+    for (const int part : file.parts()) {
+      for (const TileEntry& tile : file.tiles(part)) {
+        SemanticMap map = file.info().emptyMap();
+        file.addTileTo(map, {tile.index, part});
+      }
+    }
+  } catch (const MapFileError& error) {
+    std::string text = error.what();
+    const std::size_t position = text.find(path);
+    if (position != std::string::npos) text.replace(position, path.size(), name);
+    throw MapFileError(text);
+  }
+}
+
+}  // namespace
+
+void migrate(Database& database, std::int64_t version, std::int64_t to,
+             const std::vector<MigrationStep>& steps) {
+  for (; version < to; ++version) {
+    const auto step =
+        std::find_if(steps.begin(), steps.end(), [&](const MigrationStep& s) { return s.from == version; });
+    if (step == steps.end()) {
+      throw std::logic_error("nothing leads from version " + std::to_string(version) +
+                             " of map files to the next");
+    }
+    step->run(database);
+    database.run(("PRAGMA user_version = " + std::to_string(version + 1)).c_str());
+  }
+}
+
+std::int64_t migrateMap(const std::string& old_path, const std::string& new_path) {
+  if (std::filesystem::exists(new_path)) {
+    throw MapFileError(new_path + " is there already; choose another name");
+  }
+  Database old(old_path, Database::Mode::kRead);
+  const std::int64_t version = checkIdentity(old);
+  old.lock();
+  checkComplete(old);
+  try {
+    AtomicFile file(new_path);
+    {
+      Database copy(file.temporaryPath(), Database::Mode::kNew, new_path);
+      old.copyTo(copy);
+      migrate(copy, version, kFormatVersion, allSteps());
+    }
+    checkAll(file.temporaryPath(), old_path);  // what is wrong with the copy is wrong with the original
+    file.commit();
+  } catch (const MapFileError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    throw MapFileError(error.what());
+  }
+  return version;
+}
+
+}  // namespace bki_mapping

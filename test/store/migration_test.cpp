@@ -1,0 +1,102 @@
+// Map files of older versions become such of the present one.
+#include "store/migration.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "reference/content.h"
+#include "store/map_maker.h"
+#include "store/schema.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+const std::string kVersion1 = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
+
+std::string bytesOf(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void change(const std::string& path, std::size_t position, char byte) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(static_cast<std::streamoff>(position));
+  file.put(byte);
+}
+
+TEST(Migration, CopiesAllOfVersion1) {
+  const TemporaryFolder folder;
+  const std::string before = bytesOf(kVersion1);
+  EXPECT_EQ(migrateMap(kVersion1, folder / "new.bkm"), 1);
+  EXPECT_TRUE(bytesOf(kVersion1) == before);
+  MapFile old(kVersion1, MapFile::Access::kRead), copy(folder / "new.bkm", MapFile::Access::kRead);
+  EXPECT_TRUE(old.drives() == copy.drives());
+  EXPECT_EQ(old.info().parameters, copy.info().parameters);
+  EXPECT_EQ(old.info().program, copy.info().program);
+  ASSERT_EQ(old.parts(), copy.parts());
+  ASSERT_GT(old.parts().size(), 1u);
+  for (const int part : old.parts()) {
+    SemanticMap a = old.info().emptyMap(), b = copy.info().emptyMap();
+    for (const TileEntry& tile : old.tiles(part)) old.addTileTo(a, {tile.index, part});
+    for (const TileEntry& tile : copy.tiles(part)) copy.addTileTo(b, {tile.index, part});
+    EXPECT_GT(a.size(), 0u);
+    EXPECT_TRUE(reference::contentOf(a) == reference::contentOf(b));
+  }
+  EXPECT_EQ(folder.fileCount(), 1u);
+}
+
+TEST(Migration, RefusesWhatItCannotRead) {
+  const TemporaryFolder folder;
+  const std::string old = folder / "old.bkm", output = folder / "new.bkm";
+  const auto fault = [&] { return sentenceOf([&] { migrateMap(old, output); }); };
+  EXPECT_NE(fault().find("cannot be opened"), std::string::npos) << fault();
+  std::filesystem::copy_file(kVersion1, old);
+  std::filesystem::permissions(old, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  constexpr std::size_t kVersionByte = 63;  // the last one of user_version
+  change(old, kVersionByte, kFormatVersion + 1);
+  EXPECT_NE(fault().find(old + " was written by a newer version of bki_mapping"), std::string::npos)
+      << fault();
+  change(old, kVersionByte, 0);
+  EXPECT_NE(fault().find(old + " is damaged"), std::string::npos) << fault();
+  change(old, kVersionByte, kFormatVersion);
+  EXPECT_EQ(fault(), "");
+  EXPECT_EQ(fault(), output + " is there already; choose another name");
+  std::filesystem::remove(output);
+  // A byte in the content of a tile.
+  const std::size_t content = bytesOf(old).find("\x78\x01");  // a zlib stream
+  ASSERT_NE(content, std::string::npos);
+  change(old, content + 6, static_cast<char>(~bytesOf(old)[content + 6]));
+  EXPECT_EQ(fault().find(old + " is damaged (tile"), 0u) << fault();
+  EXPECT_EQ(folder.fileCount(), 1u);
+}
+
+void toVersion5(Database& database) {
+  database.run("CREATE TABLE history (version INTEGER)");
+  database.run("INSERT INTO history VALUES (5)");
+}
+void toVersion6(Database& database) {
+  database.run("INSERT INTO history SELECT max(version) + 1 FROM history");
+}
+
+TEST(Migration, GoesStepByStep) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "file";
+  std::ofstream(path).close();
+  const std::vector<MigrationStep> steps = {{5, toVersion6}, {4, toVersion5}};
+  Database database(path, Database::Mode::kNew);
+  migrate(database, 4, 4, steps);
+  migrate(database, 4, 6, steps);
+  Statement history = database.prepare("SELECT sum(version) FROM history");
+  ASSERT_TRUE(history.step());
+  EXPECT_EQ(history.integer(0), 5 + 6);
+  Statement version = database.prepare("PRAGMA user_version");
+  ASSERT_TRUE(version.step());
+  EXPECT_EQ(version.integer(0), 6);
+  EXPECT_THROW(migrate(database, 6, 7, steps), std::logic_error);
+}
+
+}  // namespace
+}  // namespace bki_mapping
