@@ -14,7 +14,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/stopwatch.h"
 #include "ros/publisher_set.h"
-#include "ros/snapshot_request.h"
+#include "ros/queued_call.h"
 #include "simulation/lidar.h"
 #include "tools/options.h"
 
@@ -159,8 +159,10 @@ std::vector<double> waits(const std::vector<Scan>& scans, double rate, bool list
   };
   std::vector<double> waits;
   std::atomic<bool> mapped{false}, done{false};
-  PublisherSet publishing(ros::NodeHandle("~"), config,
-                          [&] { return SnapshotRequest::ask(queue, snapshot); });
+  PublisherSet publishing(ros::NodeHandle("~"), config, [&] {
+    return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(
+        queue, [&] { return std::make_shared<const MapSnapshot>(snapshot()); });
+  });
   publishers = &publishing;
   publishing.start();
   Listener listener;

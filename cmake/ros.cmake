@@ -4,6 +4,7 @@ bki_mapping_room(ros SOURCES
     cloud_conversion.cpp
     color_reader.cpp
     input_config.cpp
+    kept_map.cpp
     label_reader.cpp
     live_settings.cpp
     load_advice.cpp

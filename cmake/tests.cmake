@@ -118,7 +118,7 @@ if(CATKIN_ENABLE_TESTING)
   set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
-    test/ros/body_box_rostest.py test/ros/filters_rostest.py test/ros/killed_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py
+    test/ros/body_box_rostest.py test/ros/filters_rostest.py test/ros/killed_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
     test/ros/mapping_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
@@ -137,6 +137,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)
   add_rostest(test/ros/live.test)
+  add_rostest(test/ros/map_file.test)
   add_rostest(test/ros/mapping_node.test)
   add_rostest(test/ros/mapping_nodelet.test)
   add_rostest(test/ros/publishing.test)

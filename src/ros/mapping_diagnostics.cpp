@@ -26,6 +26,7 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
              const Health& points) {
   const std::string drops = newDrops(before, now);
   if (now.paused) return {DiagnosticStatus::WARN, "paused; call ~resume to go on"};
+  if (now.read_only) return {DiagnosticStatus::OK, "the map is read only"};
   if (now.received == 0) return {DiagnosticStatus::WARN, "no cloud has come yet; check the topic"};
   if (!drops.empty() && now.integrated == before.integrated) {
     return {DiagnosticStatus::ERROR, "nothing is being mapped; dropped: " + drops};
@@ -36,6 +37,7 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
     health.message += (health.message.empty() ? "" : "; ") + text;
   };
   if (!drops.empty()) warn("dropped: " + drops);
+  if (!now.map_file_fault.empty()) warn(now.map_file_fault);
   if (const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
       !advice.empty()) {
     warn(advice);
@@ -88,6 +90,7 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("time jumps", now_.time_jumps);
   out.add("blocks", now_.blocks);
   out.add("map [bytes]", now_.map_bytes);
+  out.add("map file", now_.map_file_fault);
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -7,7 +7,7 @@
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/mapping/parameters.h"
 #include "ros/pose_conversion.h"
-#include "ros/snapshot_request.h"
+#include "ros/queued_call.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -26,18 +26,19 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   mapper_ = std::make_unique<SemanticMapper>(
       mapper_config, std::make_shared<const ClassTable>(loadClassTable(config_.classes)));
   for (const std::string& warning : settingWarnings(mapper_config)) ROS_WARN("%s", warning.c_str());
+  kept_ = std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace());
 
   poses_ = std::make_unique<PoseSource>(node_);
   publishing_ = std::make_unique<PublisherSet>(node_, config_, [this] {
-    return SnapshotRequest::ask(queue_, [this] {
+    return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(queue_, [this] {
       publishing_->closeChanges();
-      return snapshot();
+      return std::make_shared<const MapSnapshot>(snapshot());
     });
   });
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
   offerServices();
-  subscribe();
+  if (!kept_->readOnly()) subscribe();
   live_settings_ = std::make_unique<LiveSettings>(
       private_node_, config_, mapper_->config(),
       [this](const ServerConfig& server, const MapperConfig& mapper) { applySettings(server, mapper); },
@@ -46,6 +47,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   thread_ = std::thread(&MappingServer::work, this);
   publishing_->start();
   saving_.start();
+  if (mapper_->map().size() > 0) publishing_->startOver();
 }
 
 MappingServer::~MappingServer() {
@@ -54,13 +56,18 @@ MappingServer::~MappingServer() {
   publishing_->stop();
   running_ = false;
   thread_.join();
-  const std::string summary = ledger_.summary(waiting_.size());
-  if (ros::isShuttingDown()) {  // rosconsole is already closed
-    std::printf("%s: %s\n", private_node_.getNamespace().c_str(), summary.c_str());
-    std::fflush(stdout);
-  } else {
-    ROS_INFO("%s", summary.c_str());
-  }
+  const auto say = [&](const std::string& sentence) {
+    if (ros::isShuttingDown()) {  // rosconsole is already closed
+      std::printf("%s: %s\n", private_node_.getNamespace().c_str(), sentence.c_str());
+      std::fflush(stdout);
+    } else {
+      ROS_INFO("%s", sentence.c_str());
+    }
+  };
+  say(ledger_.summary(waiting_.size()));
+  if (!kept_->hasFile()) return;
+  const std::string lost = kept_->close();
+  say(lost.empty() ? "The map is saved in " + config_.map_file : lost);
 }
 
 void MappingServer::subscribe() {
@@ -100,6 +107,8 @@ void MappingServer::work() {
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
     checkClock();
     processQueue();
+    publishing_->changed(kept_->update(config_, Clock::now()));
+    reportFault();
     diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
   }
 }
@@ -159,7 +168,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
   } catch (const ScanRefused& refused) {
     const bool memory = refused.reason() == ScanRefused::Reason::kMemory;
     drop(waiting, memory ? DropReason::kMemory : DropReason::kTooLarge,
-         refused.what() + std::string(memory ? "; or set window, or call ~reset" : ""));
+         refused.what() + std::string(memory ? "; or set window or map_file, or call ~reset" : ""));
   } catch (const std::bad_alloc&) {
     drop(waiting, DropReason::kMemory,
          "the computer's memory does not hold it; set memory_limit, or send smaller clouds");
@@ -170,7 +179,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
 }
 
 void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
-  const ScanStats stats = mapper_->integrate(placed.scan);
+  const ScanStats stats = addToMap(placed.scan);
   const std_msgs::Header& header = waiting.cloud->header;
   const auto now = Clock::now();
   ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
@@ -188,7 +197,8 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   sensor_ = placed.scan.origin;
   appendPose(header.stamp, placed.T_map_sensor);
   publishing_->changed(mapper_->touchedBlocks());
-  moveWindow();
+  publishing_->changed(kept_->addScan(placed.scan.stamp, sensor_, config_));
+  shortenTrajectory();
   status_publisher_.publish(status());
 }
 
@@ -211,20 +221,35 @@ void MappingServer::appendPose(const ros::Time& stamp, const Eigen::Isometry3d& 
   trajectory_.push_back({stamp, toPose(T_map_sensor)});
 }
 
-void MappingServer::moveWindow() {
+ScanStats MappingServer::addToMap(const Scan& scan) {
+  try {
+    return mapper_->integrate(scan);
+  } catch (const ScanRefused& refused) {
+    if (refused.reason() != ScanRefused::Reason::kMemory || !kept_->makeRoom()) throw;
+  }
+  return mapper_->integrate(scan);
+}
+
+void MappingServer::shortenTrajectory() {
   if (config_.window <= 0.0) return;
-  const GridGeometry& geometry = mapper_->map().geometry();
-  const double reach = 0.5 * (config_.window + geometry.blockSize());
-  const auto outside = [&](const Eigen::Vector3d& point) {
-    return (point - sensor_).cwiseAbs().maxCoeff() > reach;
-  };
-  publishing_->changed(
-      mapper_->eraseBlocks([&](const BlockIndex& block) { return outside(geometry.blockCentre(block)); }));
-  const auto left = [&](const SensorPose& sensor) {
-    const auto& p = sensor.pose.position;
-    return outside({p.x, p.y, p.z});
+  const double reach = 0.5 * (config_.window + mapper_->map().geometry().blockSize());
+  const auto left = [&](const SensorPose& pose) {
+    const auto& p = pose.pose.position;
+    return (Eigen::Vector3d(p.x, p.y, p.z) - sensor_).cwiseAbs().maxCoeff() > reach;
   };
   trajectory_.erase(std::remove_if(trajectory_.begin(), trajectory_.end(), left), trajectory_.end());
+}
+
+void MappingServer::reportFault() {
+  const std::string fault = kept_->fault();
+  if (fault == last_fault_) return;
+  if (fault.empty()) {
+    ROS_INFO("%s can be written again", config_.map_file.c_str());
+  } else {
+    ROS_ERROR("%s", fault.c_str());
+  }
+  last_fault_ = fault;
+  status_publisher_.publish(status());
 }
 
 void MappingServer::checkClock() {
@@ -280,6 +305,9 @@ MappingStatus MappingServer::status() {
   if (live_settings_) status.last_refusal = live_settings_->lastRefusal();
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
   status.map_bytes = mapper_->mapBytes();
+  status.read_only = kept_->readOnly();
+  status.map_file_fault = kept_->fault();
+  status.map_saved = ros::Time(kept_->saved().sec, kept_->saved().nsec);
   return status;
 }
 
@@ -292,7 +320,8 @@ MapSnapshot MappingServer::snapshot() {
 }
 
 std::shared_ptr<const MapSnapshot> MappingServer::askForSnapshot() {
-  return SnapshotRequest::ask(queue_, [this] { return snapshot(); });
+  return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(
+      queue_, [this] { return std::make_shared<const MapSnapshot>(snapshot()); });
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -1,6 +1,7 @@
 /// @file The server behind node and nodelet: takes clouds and tf, and publishes the map.
 #pragma once
 
+#include <bki_mapping/LoadMap.h>
 #include <bki_mapping/SaveMap.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "ros/kept_map.h"
 #include "ros/live_settings.h"
 #include "ros/mapping_diagnostics.h"
 #include "ros/point_account.h"
@@ -29,8 +31,8 @@ namespace bki_mapping::ros_interface {
 
 /// Owns a mapper and three threads, each with a callback queue of its own, so that mapping never blocks the
 /// threads of a nodelet manager. The mapping thread takes clouds and adds them to the map; it alone touches
-/// the mapper. The map topics and ~save_map have a thread each, and work on snapshots that the mapping thread
-/// makes between two scans.
+/// the mapper. The map topics, and ~save_map and ~load_map, have a thread each, and work on snapshots that
+/// the mapping thread makes between two scans.
 class MappingServer {
  public:
   /// @param node resolves topics. @param private_node holds parameters and services.
@@ -54,6 +56,7 @@ class MappingServer {
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
+  bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
 
   /// Processes the first waiting cloud whose transform is available, or whose tf_timeout is over.
   void processQueue();
@@ -65,8 +68,12 @@ class MappingServer {
   /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
   void appendPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor);
-  /// Erases blocks and poses outside of the window around the sensor.
-  void moveWindow();
+  /// Logs what is wrong with the map file, when that changes.
+  void reportFault();
+  /// Adds a scan, also where memory must first be gained for it.
+  ScanStats addToMap(const Scan& scan);
+  /// Removes poses outside of the window around the sensor.
+  void shortenTrajectory();
   /// Counts a cloud as dropped and logs the reason, each sentence at most once in 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
   /// Assesses the points of each input since the last call, and logs warnings.
@@ -76,11 +83,15 @@ class MappingServer {
   MapSnapshot snapshot();
   /// The same for all other threads: waits until the mapping thread has no scan in work.
   std::shared_ptr<const MapSnapshot> askForSnapshot();
+  /// Writes the whole map to a map file. @throws MapFileError.
+  void saveMapFile(const std::string& path);
 
   ros::CallbackQueue queue_, saving_queue_;
   ros::NodeHandle node_, private_node_;
   ServerConfig config_;
   std::unique_ptr<SemanticMapper> mapper_;
+  std::unique_ptr<KeptMap> kept_;
+  std::string last_fault_;            ///< of the map file, as logged
   std::vector<ScanReader> readers_;   ///< one per input
   std::vector<PointAccount> points_;  ///< of each input, since the last report
   ScanLedger ledger_;

@@ -1,12 +1,47 @@
 // The services of the mapping server.
+#include <chrono>
+#include <new>
+
 #include "bki_mapping/io/map_export.h"
+#include "bki_mapping/io/mapper_file.h"
 #include "ros/mapping_server.h"
+#include "ros/queued_call.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
 
 /// Maximum length of an answer, which contains a path given by the client [bytes].
 constexpr std::size_t kLongestAnswer = 1000;
+
+/// How often one who waits for the map file looks whether it can be written.
+constexpr std::chrono::milliseconds kFaultPoll(200);
+
+/// @throws std::invalid_argument if a file of a client cannot have this path.
+void checkPath(const std::string& path) {
+  if (path.empty() || path.front() != '/') {
+    throw std::invalid_argument("path '" + path + "' must be absolute");
+  }
+  if (path.find('\0') != std::string::npos) {  // the file system would cut the path there
+    throw std::invalid_argument("path '" + path + "' must not hold a zero byte");
+  }
+}
+
+/// Answers what `make` returns, or the sentence that it throws.
+template <typename Response, typename Make>
+void answer(const char* service, Response& response, Make&& make) {
+  try {
+    response.message = make();
+    response.success = true;
+  } catch (const std::bad_alloc&) {
+    response.success = false;
+    response.message = "the computer's memory does not suffice; free some, or use a smaller map";
+  } catch (const std::exception& fault) {
+    response.success = false;
+    response.message = fault.what();
+  }
+  response.message = shortText(response.message, kLongestAnswer);
+  ROS_INFO("%s: %s", service, response.message.c_str());
+}
 
 }  // namespace
 
@@ -18,10 +53,15 @@ void MappingServer::offerServices() {
   ros::NodeHandle saving(private_node_);
   saving.setCallbackQueue(&saving_queue_);
   services_.push_back(saving.advertiseService("save_map", &MappingServer::onSaveMap, this));
+  services_.push_back(saving.advertiseService("load_map", &MappingServer::onLoadMap, this));
 }
 
 void MappingServer::reset() {
-  mapper_->reset();
+  if (kept_->readOnly()) {
+    ROS_WARN("The map is not reset: it is read only (parameter read_only)");
+    return;
+  }
+  kept_->reset();
   trajectory_.clear();
   publishing_->startOver();
   ROS_INFO("The map was reset");
@@ -29,7 +69,7 @@ void MappingServer::reset() {
 
 bool MappingServer::onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
   reset();
-  return true;
+  return !kept_->readOnly();
 }
 
 bool MappingServer::onPublishMap(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
@@ -55,26 +95,65 @@ bool MappingServer::onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Res
   return true;
 }
 
+void MappingServer::saveMapFile(const std::string& path) {
+  struct Parts {
+    KeptMap::Saving saving;
+    std::shared_ptr<const MapSnapshot> snapshot;
+  };
+  const auto parts = QueuedCall<std::shared_ptr<Parts>>::ask(queue_, [&] {
+    auto made = std::make_shared<Parts>();
+    made->saving = kept_->saveTo(path);
+    if (!made->saving.done.valid()) made->snapshot = std::make_shared<const MapSnapshot>(snapshot());
+    return made;
+  });
+  if (parts->snapshot) return saveMap(path, parts->saving.info, parts->saving.drives, parts->snapshot->map);
+  while (parts->saving.done.wait_for(kFaultPoll) != std::future_status::ready) {
+    const std::string fault = QueuedCall<std::string>::ask(queue_, [this] { return kept_->fault(); });
+    if (!fault.empty()) throw MapFileError(fault);
+  }
+  parts->saving.done.get();
+}
+
 bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& response) {
-  try {
-    if (request.path.empty() || request.path.front() != '/') {
-      throw std::invalid_argument("path '" + request.path + "' must be absolute");
-    }
-    if (request.path.find('\0') != std::string::npos) {  // the file system would cut the path there
-      throw std::invalid_argument("path '" + request.path + "' must not hold a zero byte");
+  answer("save_map", response, [&] {
+    checkPath(request.path);
+    if (isMapFileName(request.path)) {
+      saveMapFile(request.path);
+      return "wrote " + request.path;
     }
     const std::string include = request.include.empty() ? "occupied" : request.include;
     const VoxelStates states = parseStates(include);
     const std::shared_ptr<const MapSnapshot> snapshot = askForSnapshot();
     exportMap(request.path, snapshot->map, snapshot->classes, states);
-    response.success = true;
-    response.message = "wrote " + request.path + " (" + include + ")";
-  } catch (const std::exception& fault) {
-    response.success = false;
-    response.message = fault.what();
-  }
-  response.message = shortText(response.message, kLongestAnswer);
-  ROS_INFO("save_map: %s", response.message.c_str());
+    return "wrote " + request.path + " (" + include + (kept_->hasFile() ? ", of what is in memory)" : ")");
+  });
+  return true;
+}
+
+bool MappingServer::onLoadMap(LoadMap::Request& request, LoadMap::Response& response) {
+  answer("load_map", response, [&] {
+    checkPath(request.path);
+    struct Needed {
+      MapInfo info;
+      double memory_limit;  // [MB]
+    };
+    const Needed needed = QueuedCall<Needed>::ask(queue_, [this] {
+      return Needed{kept_->info(), mapper_->config().memory_limit};
+    });
+    MapFile file(request.path, MapFile::Access::kRead);
+    checkFits(file, needed.info);
+    auto stored =
+        std::make_shared<StoredMap>(readMap(file, static_cast<std::size_t>(1e6 * needed.memory_limit)));
+    const std::string what = std::to_string(stored->map.size()) + " blocks of " +
+                             std::to_string(stored->drives.size()) + " drives from " + request.path;
+    QueuedCall<bool>::ask(queue_, [&] {
+      kept_->addMap(std::move(*stored), !request.add);
+      if (!request.add) trajectory_.clear();
+      publishing_->startOver();
+      return true;
+    });
+    return (request.add ? "added " : "loaded ") + what;
+  });
   return true;
 }
 

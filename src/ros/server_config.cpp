@@ -87,8 +87,19 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "continues it, reset starts an empty one."),
       realParameter(
           "window", &C::window, length, "m", Changes::kWhileMapping,
-          "Edge length of a cube around the sensor. Blocks and poses of the trajectory outside it are "
-          "removed. Set it to bound memory on long drives; 0 keeps everything."),
+          "Edge length of a cube around the sensor. Blocks outside it are removed, or move to map_file until "
+          "the sensor comes back; poses of the trajectory outside it are removed. Set it to bound memory on "
+          "long drives; 0 keeps everything in memory."),
+      textParameter(
+          "map_file", &C::map_file, "an absolute path that ends in .bkm", Changes::kAtStart,
+          "Map file that the mapper continues: loaded at the start, and saved every save_period and "
+          "at the end. It is created if missing. Without it, the map ends with the mapper."),
+      truthParameter("read_only", &C::read_only, Changes::kAtStart,
+                     "Publish the map in map_file, and take no clouds. Set true for a map that is finished."),
+      realParameter("save_period", &C::save_period, NumberRange::atLeast(0.0).slider(0.0, 3600.0), "s",
+                    Changes::kWhileMapping,
+                    "Time between two saves of map_file. Lower it to lose less when the power fails; 0 saves "
+                    "only at the end."),
       realParameter("diagnostic_period", &C::diagnostic_period, NumberRange::above(0.0), "s",
                     Changes::kAtStart, "Time between two reports on /diagnostics."),
       realParameter(

@@ -26,7 +26,10 @@ struct ServerConfig {
   int queue_size = 10;                     ///< most clouds that wait
   QueuePolicy queue_policy = QueuePolicy::kDropOldest;
   OnTimeJump on_time_jump = OnTimeJump::kKeep;
-  double window = 0.0;             ///< edge of the cube around the sensor that is kept [m]; 0: all
+  double window = 0.0;             ///< edge of the cube around the sensor that is kept in memory [m]; 0: all
+  std::string map_file;            ///< where the map is kept; "": nowhere
+  bool read_only = false;          ///< whether map_file is published and not changed
+  double save_period = 60.0;       ///< [s]; 0: map_file is saved only at the end
   double diagnostic_period = 1.0;  ///< [s]
   double publish_rate = 2.0;       ///< highest rate of each map topic [Hz]
   double view_min_z = -1e6;        ///< lowest height that markers and voxel_cloud show [m]
