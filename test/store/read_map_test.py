@@ -1,20 +1,25 @@
-#!/ usr / bin / env python3
-""
-    "The reader that needs SQLite and NumPy alone reads test/store/data/version_1.bkm as "
-    "test/store/version_1_test.cpp does."
-    "" import os import shutil import struct import subprocess import sys import tempfile import unittest
-        import zlib
+#!/usr/bin/env python3
+"""The reader that needs SQLite and NumPy alone reads test/store/data/version_1.bkm as test/store/version_1_test.cpp does."""
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
 
-            SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR'] sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
-                         import read_map #noqa : E402
+SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
+sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
+import read_map  # noqa: E402
 
-                                                     FILE =
-                os.path.join(SOURCE, 'test', 'store', 'data', 'version_1.bkm') UNITS = 65536 #in 1 of evidence
+FILE = os.path.join(SOURCE, 'test', 'store', 'data', 'version_1.bkm')
+UNITS = 65536  # in 1 of evidence
 
-                    def
-                    planes_of(part)
-    : return {(*block, label): (evidence * UNITS).astype('<i4') for block, label, evidence in read_map.read_planes(FILE, part)
-}
+
+def planes_of(part):
+    return {(*block, label): (evidence * UNITS).astype('<i4') for block, label, evidence in read_map.read_planes(FILE, part)}
+
 
 def checksum_of(planes):
     checksum = 0
