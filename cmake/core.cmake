@@ -35,7 +35,7 @@ bki_mapping_core_room(core SOURCES atomic_file.cpp class_table.cpp named_paramet
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES
-    column_map.cpp map_query.cpp semantic_map.cpp
+    clear_box.cpp column_map.cpp map_query.cpp semantic_map.cpp
     view_kernels.cpp view_kernels_avx2.cpp view_kernels_avx512.cpp view_kernels_generic.cpp
   LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
@@ -68,7 +68,7 @@ string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${
 find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
 bki_mapping_core_room(store SOURCES
-    database.cpp drive_cover.cpp grid_transform.cpp map_file.cpp map_info.cpp map_keeper.cpp map_merge.cpp
+    database.cpp drive_cover.cpp grid_transform.cpp map_clear.cpp map_file.cpp map_info.cpp map_keeper.cpp map_merge.cpp
     migration.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_store.cpp
   LINK bki_mapping_mapping)
 target_compile_definitions(bki_mapping_store PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")

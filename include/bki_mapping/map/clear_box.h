@@ -1,0 +1,17 @@
+/// @file Clears a box of a map.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "bki_mapping/map/semantic_map.h"
+
+namespace bki_mapping {
+
+/// Erases all evidence and occlusion marks of the voxels whose centres lie in a box, its faces included: they
+/// are then as if no scan had reached them. Planes and blocks that become empty are erased.
+/// @param box map frame [m]; may be infinite. @return the blocks that changed or were erased, sorted.
+/// @throws std::bad_alloc; part of the box may then be cleared.
+std::vector<GridIndex> clearBox(SemanticMap& map, const Eigen::AlignedBox3d& box);
+
+}  // namespace bki_mapping

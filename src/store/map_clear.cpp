@@ -1,0 +1,68 @@
+#include "bki_mapping/store/map_clear.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/store/map_file.h"
+
+namespace bki_mapping {
+namespace {
+
+/// The tiles that hold the voxels of a box.
+std::pair<GridIndex, GridIndex> tilesAbout(const Eigen::AlignedBox3d& box, double resolution) {
+  const double edge = Region::kEdge * kBlockEdge * resolution;
+  // Wider by one tile, for rounding; and within the range of indices.
+  constexpr double kMost = GridGeometry::kMaxCoordinate / (Region::kEdge * kBlockEdge) + 2.0;
+  const auto tile = [&](double metres, int wider) {
+    return static_cast<int>(std::clamp(std::floor(metres / edge) + wider, -kMost, kMost));
+  };
+  const Eigen::Vector3d &low = box.min(), &high = box.max();
+  return {{tile(low.x(), -1), tile(low.y(), -1), tile(low.z(), -1)},
+          {tile(high.x(), 1), tile(high.y(), 1), tile(high.z(), 1)}};
+}
+
+/// Clears a box of all parts. @param copies whether to write the tiles that stay as they are, too.
+ClearedFile clearParts(MapFile& file, const Eigen::AlignedBox3d& box, MapFile::Change& change, bool copies) {
+  ClearedFile cleared;
+  const auto [low, high] = tilesAbout(box, file.info().resolution);
+  for (const int part : file.parts()) {
+    for (const TileEntry& tile : copies ? file.tiles(part) : file.tilesIn(low, high, part)) {
+      SemanticMap map = file.info().emptyMap();
+      file.addTileTo(map, {tile.index, part});
+      const std::size_t blocks = clearBox(map, box).size();
+      if (blocks > 0 || copies) change.writeTile(map, {tile.index, part});
+      if (part > 0) continue;
+      cleared.blocks += blocks;
+      cleared.tiles += blocks > 0;
+    }
+  }
+  return cleared;
+}
+
+}  // namespace
+
+ClearedFile clearBoxOfFile(const std::string& path, const Eigen::AlignedBox3d& box,
+                           const std::string& output) {
+  if (box.min().hasNaN() || box.max().hasNaN())
+    throw std::invalid_argument("a corner of the box is not a number");
+  std::error_code missing;
+  if (output.empty() || std::filesystem::equivalent(path, output, missing)) {
+    MapFile file(path, MapFile::Access::kUpdate);
+    MapFile::Change change = file.change();
+    const ClearedFile cleared = clearParts(file, box, change, false);
+    change.commit();
+    return cleared;
+  }
+  MapFile file(path, MapFile::Access::kRead);
+  NewMapFile copy(output, file.info());
+  for (const DriveRecord& drive : file.drives()) copy.content().putDrive(drive);
+  const ClearedFile cleared = clearParts(file, box, copy.content(), true);
+  copy.commit();
+  return cleared;
+}
+
+}  // namespace bki_mapping

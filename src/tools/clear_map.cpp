@@ -1,0 +1,70 @@
+// Clears a box of a map file.
+#include <cmath>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+
+#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/store/map_clear.h"
+#include "tools/options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  options.add_options()("box", text("\"X0 Y0 Z0 X1 Y1 Z1\""),
+                        "two opposite corners of the box, in the map frame [m]; inf and -inf are allowed")(
+      "output", text("FILE.bkm"), "file for the result; default: the file itself is changed");
+  return options;
+}
+
+/// @param text as in --box.
+Eigen::AlignedBox3d parseBox(const std::string& text) {
+  std::istringstream words(text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    std::size_t end = 0;
+    try {
+      numbers.push_back(std::stod(word, &end));
+    } catch (const std::logic_error&) {
+      end = 0;
+    }
+    if (end != word.size() || std::isnan(numbers.back()))
+      throw std::invalid_argument("--box: " + word + " is not a number");
+  }
+  if (numbers.size() != 6) {
+    throw std::invalid_argument("--box has " + std::to_string(numbers.size()) +
+                                " numbers, but needs six: \"X0 Y0 Z0 X1 Y1 Z1\"");
+  }
+  const Eigen::Vector3d a(numbers[0], numbers[1], numbers[2]), b(numbers[3], numbers[4], numbers[5]);
+  return {a.cwiseMin(b), a.cwiseMax(b)};
+}
+
+int clearFile(const po::variables_map& given) {
+  const auto files =
+      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
+  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
+  if (!given.count("box")) throw std::invalid_argument("--box \"X0 Y0 Z0 X1 Y1 Z1\" is missing (see --help)");
+  const std::string output = given.count("output") ? given["output"].as<std::string>() : files[0];
+  if (!isMapFileName(output))
+    throw std::invalid_argument("the cleared map, " + output + ", must end in .bkm");
+  const ClearedFile cleared = clearBoxOfFile(files[0], parseBox(given["box"].as<std::string>()), output);
+  std::cout << output << ": cleared in " << cleared.blocks << " blocks of " << cleared.tiles << " tiles\n";
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("clear_map", [&] {
+    const auto given = tools::parse(argc, argv,
+                                    "clear_map FILE.bkm --box \"X0 Y0 Z0 X1 Y1 Z1\"\n"
+                                    "Clears a box of a map: what was mapped there is forgotten.",
+                                    options(), "files");
+    return given ? clearFile(*given) : 0;
+  });
+}
