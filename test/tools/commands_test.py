@@ -54,6 +54,7 @@ PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'ctest', 'dy
 PARTS = {
     'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise FRACTION',
     'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --report', 'map_sequence --report FILE.json',
+    'merge_maps --keep-drives', 'migrate_map OLD.bkm NEW.bkm',
     'rosnode kill', 'rosrun bki_mapping map_sequence', 'scripts/test_on SUITE', 'simulate_drive --seed 2',
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roscore|roslaunch(?!.* --ros-args)|rosrun pcl_ros|rviz|rostopic echo)\b')
