@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "beams/occlusion.h"
+#include "bki_mapping/map/clear_box.h"
 #include "bki_mapping/mapping/parameters.h"
 #include "core/stopwatch.h"
 #include "free_space/beam_samples.h"
@@ -195,6 +196,12 @@ SemanticMap SemanticMapper::takeRegion(const GridIndex& region) {
   SemanticMap taken = map_.takeRegion(region);
   for (const auto& [index, block] : taken.entries()) block_bytes_ -= block->bytes();
   return taken;
+}
+
+std::vector<GridIndex> SemanticMapper::clearBox(const Eigen::AlignedBox3d& box) {
+  std::vector<GridIndex> changed = bki_mapping::clearBox(map_, box);
+  countBlockBytes();
+  return changed;
 }
 
 SemanticMapper::Pipeline& SemanticMapper::pipeline() {

@@ -151,6 +151,12 @@ void KeptMap::addMap(StoredMap map, bool replace) {
   drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
 }
 
+std::vector<GridIndex> KeptMap::clearBox(const Eigen::AlignedBox3d& box) {
+  requireWritable();
+  unsaved_ = true;
+  return keeper_ ? keeper_->clearBox(box) : mapper_.clearBox(box);
+}
+
 KeptMap::Saving KeptMap::saveTo(const std::string& path) {
   Saving saving{info(), drives_, {}};
   if (drive_.scans > 0) saving.drives.push_back(drive_);

@@ -40,6 +40,10 @@ class KeptMap {
   /// the map is read only.
   void addMap(StoredMap map, bool replace);
 
+  /// Clears a box. @param box map frame [m]. @return the blocks that changed. @throws std::invalid_argument
+  /// if the map is read only.
+  std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
+
   /// What must be known to write the map to a file in another thread.
   struct Saving {
     MapInfo info;

@@ -1,6 +1,7 @@
 /// @file The server behind node and nodelet: takes clouds and tf, and publishes the map.
 #pragma once
 
+#include <bki_mapping/BoundingBoxQuery.h>
 #include <bki_mapping/LoadMap.h>
 #include <bki_mapping/SaveMap.h>
 #include <ros/callback_queue.h>
@@ -55,6 +56,7 @@ class MappingServer {
   bool onPublishMap(std_srvs::Empty::Request&, std_srvs::Empty::Response&);
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
+  bool onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQuery::Response&);
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
 

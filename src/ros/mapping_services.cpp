@@ -50,6 +50,7 @@ void MappingServer::offerServices() {
   services_.push_back(private_node_.advertiseService("publish_map", &MappingServer::onPublishMap, this));
   services_.push_back(private_node_.advertiseService("pause", &MappingServer::onPause, this));
   services_.push_back(private_node_.advertiseService("resume", &MappingServer::onResume, this));
+  services_.push_back(private_node_.advertiseService("clear_bbx", &MappingServer::onClearBox, this));
   ros::NodeHandle saving(private_node_);
   saving.setCallbackQueue(&saving_queue_);
   services_.push_back(saving.advertiseService("save_map", &MappingServer::onSaveMap, this));
@@ -93,6 +94,25 @@ bool MappingServer::onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Res
   status_publisher_.publish(status());
   ROS_INFO("%s", response.message.c_str());
   return true;
+}
+
+bool MappingServer::onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQuery::Response&) {
+  const Eigen::Vector3d a(request.min.x, request.min.y, request.min.z),
+      b(request.max.x, request.max.y, request.max.z);
+  try {
+    if (a.hasNaN() || b.hasNaN())
+      throw std::invalid_argument("a corner of the box is not a number; correct it");
+    if ((a.array() > b.array()).any()) {
+      throw std::invalid_argument("a coordinate of min is above that of max; exchange them");
+    }
+    const std::vector<GridIndex> changed = kept_->clearBox({a, b});
+    publishing_->changed(changed);
+    ROS_INFO("clear_bbx: cleared in %lu blocks", changed.size());
+    return true;
+  } catch (const std::exception& fault) {
+    ROS_ERROR("clear_bbx: %s", fault.what());
+    return false;
+  }
 }
 
 void MappingServer::saveMapFile(const std::string& path) {

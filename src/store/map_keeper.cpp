@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "bki_mapping/map/clear_box.h"
 #include "store/tile_store.h"
 
 namespace bki_mapping {
@@ -349,6 +350,27 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
     s.store->putDrive(drive);
   }
   s.must_sweep = true;
+}
+
+std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
+  State& s = *state_;
+  s.takeArrivals(true);
+  std::vector<GridIndex> changed = s.mapper.clearBox(box);
+  for (const GridIndex& block : changed) s.noteChange(SemanticMap::regionOf({block}));
+  std::vector<GridIndex> in_file;
+  for (const GridIndex& tile : s.stored) {
+    const Eigen::Vector3d low = s.edge * Eigen::Vector3d(tile.x, tile.y, tile.z);
+    const auto known = s.here.find(tile);
+    const bool stays =
+        known != s.here.end() && (known->second.here == Here::kWhole || known->second.here == Here::kDamaged);
+    if (!stays && box.intersects({low, low + Eigen::Vector3d::Constant(s.edge)})) in_file.push_back(tile);
+  }
+  s.store->changeTiles(in_file, [box](SemanticMap& map) { bki_mapping::clearBox(map, box); });
+  for (const GridIndex& tile : in_file) {  // what was asked for before is out of date
+    const auto known = s.here.find(tile);
+    if (known != s.here.end() && known->second.here == Here::kLoading) s.load(tile);
+  }
+  return changed;
 }
 
 std::string MapKeeper::fault() const {

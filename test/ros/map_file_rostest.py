@@ -12,7 +12,8 @@ import unittest
 import rospy
 import rostest
 from bki_mapping.msg import MappingStatus, OccupancyMap
-from bki_mapping.srv import LoadMap, SaveMap
+from bki_mapping.srv import BoundingBoxQuery, BoundingBoxQueryRequest, LoadMap, SaveMap
+from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, Trigger
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
@@ -183,7 +184,37 @@ class MapFile(unittest.TestCase):
             refused.status.close()
         user.end()
 
-    def test_7_a_reset_clears_the_file(self):
+    def test_7_boxes_are_cleared_in_memory_and_in_the_file(self):
+        path = self.path('cleared.bkm')
+        shutil.copy(self.whole, path)
+        mapper = Mapper(self, 'clearing', map_file=path, window=WINDOW)
+        mapper.map([180])
+        box = BoundingBoxQueryRequest(min=Point(-5.0, -4.0, -9.0), max=Point(1000.0, 4.0, 9.0))
+        mapper.call('clear_bbx', BoundingBoxQuery, box)
+        for wrong in (Point(float('nan'), 0, 0), Point(1001.0, 0, 0)):
+            with self.assertRaises(rospy.ServiceException):
+                mapper.call('clear_bbx', BoundingBoxQuery, BoundingBoxQueryRequest(min=wrong, max=box.max))
+        mapper.end()
+        edge = 0.4
+
+        def inside(block, axis, index):
+            return getattr(box.min, 'xyz'[axis]) <= edge * (8 * block[axis] + index + 0.5) <= \
+                getattr(box.max, 'xyz'[axis])
+        left, cleared = 0, 0
+        for block, _, plane in read_planes(path):
+            for z in range(8):
+                for y in range(8):
+                    for x in range(8):
+                        if all(inside(block, axis, i) for axis, i in enumerate((x, y, z))):
+                            self.assertEqual(plane[z, y, x], 0.0)
+                            cleared += 1
+                        else:
+                            left += plane[z, y, x] != 0.0
+        self.assertGreater(cleared, 1000)
+        self.assertGreater(left, 1000)
+        self.assertEqual(BoundingBoxQuery._md5sum, '93aa3d73b866f04880927745f4aab303', 'that of octomap_msgs')
+
+    def test_8_a_reset_clears_the_file(self):
         path = self.path('reset.bkm')
         shutil.copy(self.whole, path)
         mapper = Mapper(self, 'resetting', map_file=path, window=WINDOW)

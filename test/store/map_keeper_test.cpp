@@ -285,6 +285,27 @@ TEST(MapKeeper, AddsMapsAndForgetsThem) {
   EXPECT_EQ(loadMap(path).drives[0].id, "d");
 }
 
+TEST(MapKeeper, ClearsBoxesHereAndThere) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  const std::vector<Scan> scans = drive();
+  SemanticMapper plain(configOf(), reference::smallTable());
+  Kept kept(path, "a");
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(-40.0, 220.0), size(1.0, 60.0);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    plain.integrate(scans[i]);
+    kept.integrate(scans[i]);
+    if (i % 7 != 0) continue;  // at any moment of loading and giving away
+    const Eigen::Vector3d low(place(random), place(random), -3.0);
+    const Eigen::AlignedBox3d box(low, low + Eigen::Vector3d(size(random), size(random), 4.0));
+    plain.clearBox(box);
+    kept.keeper.clearBox(box);
+  }
+  EXPECT_EQ(kept.keeper.close(), "");
+  EXPECT_TRUE(same(contentIn(path), contentOf(plain.map())));
+}
+
 /// While it lives, files of this process cannot grow.
 class FullDisk {
  public:

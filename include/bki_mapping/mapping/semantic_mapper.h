@@ -44,6 +44,9 @@ class SemanticMapper {
   /// Moves a region of the map to a map of its own (SemanticMap::takeRegion).
   SemanticMap takeRegion(const GridIndex& region);
 
+  /// Clears a box of the map, as the function of this name does. @return the blocks that changed.
+  std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
+
   /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
   /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start
   /// (Changes::kAtStart); the settings are then unchanged.

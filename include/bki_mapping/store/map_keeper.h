@@ -63,6 +63,10 @@ class MapKeeper {
   /// this map already, or as SemanticMap::add; nothing is then added. std::bad_alloc.
   void addMap(SemanticMap other, const std::vector<DriveRecord>& drives);
 
+  /// Clears a box, in memory and in the file. @param box map frame [m]; may be infinite.
+  /// @return the blocks in memory that changed.
+  std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
+
   /// What is wrong with the file at present: one sentence; "" if nothing is.
   std::string fault() const;
   /// Memory of tiles that left and are not yet in the file [bytes].
