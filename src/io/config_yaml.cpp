@@ -51,6 +51,16 @@ std::map<std::string, std::string> loadParameterFile(const std::string& file) {
   return values;
 }
 
+std::map<std::string, std::string> parseParameters(const std::string& yaml) {
+  std::map<std::string, std::string> values;
+  try {
+    flatten(parseYaml(yaml), "", values);
+  } catch (const YAML::Exception& error) {
+    throw std::invalid_argument(error.what());
+  }
+  return values;
+}
+
 std::string parameterYaml(const MapperConfig& config) {
   std::string text, group;
   for (const Parameter& p : mapperParameters()) {

@@ -1,8 +1,11 @@
 #include "bki_mapping/io/mapper_file.h"
 
 #include <filesystem>
+#include <map>
+#include <stdexcept>
 
 #include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/mapping/parameters.h"
 
 namespace bki_mapping {
 
@@ -24,6 +27,25 @@ StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, cons
   MapFile file(path, MapFile::Access::kRead);
   checkFits(file, mapInfoOf(mapper, frame));
   return readMap(file, static_cast<std::size_t>(1e6 * mapper.config().memory_limit));
+}
+
+SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info) {
+  MapperConfig config;
+  try {
+    const std::map<std::string, std::string> values = parseParameters(info.parameters);
+    std::map<std::string, std::string> gains;
+    for (const Parameter& parameter : mapperParameters()) {
+      const auto found = values.find(parameter.name);
+      if (found != values.end() && parameter.name.rfind("free_gain/", 0) == 0) gains.insert(*found);
+    }
+    setParameters(config, gains);
+    config.resolution = info.resolution;
+    config.prior = info.prior;
+    config.threads = 1;
+    return SemanticMapper(config, info.classes).snapshot();
+  } catch (const std::invalid_argument& error) {
+    throw MapFileError("the parameters in " + path + " cannot be used: " + error.what());
+  }
 }
 
 }  // namespace bki_mapping

@@ -135,7 +135,10 @@ std::string textOf(const std::string& path) {
 }  // namespace
 
 YAML::Node loadYamlFile(const std::string& path) {
-  const std::string text = textOf(path);
+  return parseYaml(textOf(path));
+}
+
+YAML::Node parseYaml(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   Bounds bounds;

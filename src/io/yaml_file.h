@@ -12,5 +12,7 @@ namespace bki_mapping {
 /// that contains it. Every key must be plain text and unique in its map.
 /// @throws YAML::Exception in one sentence, to which the caller adds the name of the file.
 YAML::Node loadYamlFile(const std::string& path);
+/// The same of a text, without its own limit on the size.
+YAML::Node parseYaml(const std::string& text);
 
 }  // namespace bki_mapping

@@ -49,7 +49,7 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
             self.assertGreater(len(options), 1, program)
             for option in options:
@@ -431,6 +431,38 @@ class Tools(unittest.TestCase):
         self.fails('--box has 5 numbers', 'clear_map', a, '--box', '0 0 0 1 1')
         self.fails('1x is not a number', 'clear_map', a, '--box', '0 0 0 1 1 1x')
         self.fails('not a number', 'clear_map', a, '--box', '1 1 1 0 0 nan')
+
+    def test_inspecting(self):
+        a, report, json_file = self.path('inspected.bkm'), self.path('inspected_report.json'), self.path('inspected.json')
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', a, '--report', report, '--set',
+                      'free_gain/static=0.2')
+        top, profile = self.path('top.png'), self.path('profile.png')
+        printed = self.succeeds('inspect_map', a, '--json', json_file, '--top', top, '--profile', profile).stdout
+        with open(report) as mapped, open(json_file) as file:
+            mapped, found = json.load(mapped), json.load(file)
+        for field in ('voxels', 'voxels_by_class', 'blocks'):
+            self.assertEqual(found[field], mapped[field], field)
+        self.assertEqual(found['tiles'], len(self.tiles_of(a)))
+        self.assertEqual(found['file_bytes'], os.path.getsize(a))
+        self.assertEqual(found['resolution'], 0.3)
+        self.assertEqual([(drive['id'], drive['scans'], drive['first_stamp_ns']) for drive in found['drives']],
+                         [('drive/000000-000003', 4, 1000000000)])
+        self.assertIn(f'{found["voxels"]["occupied"]} occupied, {found["voxels"]["free"]} free', printed)
+        self.assertIn('drive/000000-000003: 4 scans, from 1970-01-01 00:00:01 UTC', printed)
+        for picture in (top, profile):
+            with open(picture, 'rb') as file:
+                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+        self.assertIn('\n  static: 0.2\n', self.succeeds('inspect_map', a, '--parameters').stdout)
+        before = self.tiles_of(a)
+        self.fails('must end in .png', 'inspect_map', a, '--top', a)
+        self.assertEqual(self.tiles_of(a), before)
+        self.fails('must be one map file', 'inspect_map')
+        self.fails('cannot be written', 'inspect_map', a, '--profile', '/no/such/a.png')
+        empty = self.path('empty.bkm')
+        self.succeeds('clear_map', a, '--box', '-inf -inf -inf inf inf inf', '--output', empty)
+        self.assertIn('0 occupied', self.succeeds('inspect_map', empty, '--json', json_file, '--top', top).stdout)
+        with open(json_file) as file:
+            self.assertIsNone(json.load(file)['bounds'])
 
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')

@@ -20,4 +20,9 @@ MapInfo mapInfoOf(const SemanticMapper& mapper, const std::string& frame);
 /// resolution, unit, prior or class table than the mapper: in one sentence with both values.
 StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, const std::string& frame);
 
+/// An empty map as MapInfo::emptyMap, with the gains that the parameters and the class table of a file set,
+/// so that voxels have the states that the mapper gave them. Parameters that this version does not know are
+/// ignored. @param path of the file, for errors. @throws MapFileError if the parameters are no YAML.
+SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
+
 }  // namespace bki_mapping

@@ -1,0 +1,63 @@
+#include "io/map_statistics.h"
+
+#include <algorithm>
+
+namespace bki_mapping {
+namespace {
+
+void extend(MapStatistics& statistics, const VoxelIndex& voxel) {
+  GridIndex &low = statistics.low, &high = statistics.high;
+  if (low.x > high.x) low = high = voxel;
+  low = {std::min(low.x, voxel.x), std::min(low.y, voxel.y), std::min(low.z, voxel.z)};
+  high = {std::max(high.x, voxel.x), std::max(high.y, voxel.y), std::max(high.z, voxel.z)};
+}
+
+void count(MapStatistics& statistics, const BlockIndex& index, const BlockView& view) {
+  for (int offset = 0; offset < kBlockVoxels; ++offset) {
+    const auto v = static_cast<std::size_t>(offset);
+    switch (view.state[v]) {
+      case VoxelState::kUnknown:
+        continue;
+      case VoxelState::kFree:
+        ++statistics.free;
+        break;
+      case VoxelState::kOccluded:
+        ++statistics.occluded;
+        break;
+      case VoxelState::kOccupied:
+        ++statistics.occupied;
+        ++statistics.occupied_by_class[view.label[v]];
+        break;
+    }
+    extend(statistics, GridGeometry::voxelOf(index, offset));
+  }
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
+  if (low.x > high.x) return {};
+  return {resolution * Eigen::Vector3d(low.x, low.y, low.z),
+          resolution * Eigen::Vector3d(high.x + 1.0, high.y + 1.0, high.z + 1.0)};
+}
+
+MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit) {
+  MapStatistics statistics;
+  BlockView view;
+  for (const TileEntry& tile : file.tiles()) {
+    SemanticMap map = empty_map.snapshot();
+    file.addTileTo(map, {tile.index});
+    ++statistics.tiles;
+    for (const auto& [index, block] : sortedBlocks(map)) {
+      ++statistics.blocks;
+      statistics.planes += block->classes().size();
+      statistics.memory_bytes += block->bytes();
+      readBlock(map, *block, BlockFields::kStates, view);
+      count(statistics, index, view);
+      if (visit) visit(index, view);
+    }
+  }
+  return statistics;
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,34 @@
+/// @file What is in a map file, counted tile by tile.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <map>
+
+#include "bki_mapping/core/types.h"
+#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/store/map_file.h"
+
+namespace bki_mapping {
+
+struct MapStatistics {
+  std::uint64_t tiles = 0, blocks = 0, planes = 0;     ///< of the sum of all drives
+  std::uint64_t free = 0, occupied = 0, occluded = 0;  ///< voxels
+  std::map<ClassId, std::uint64_t> occupied_by_class;
+  std::uint64_t memory_bytes = 0;  ///< of the whole map in memory, without its index
+  /// From the first to the last voxel that is free, occupied or occluded. With low > high there is none.
+  GridIndex low{1, 1, 1}, high{0, 0, 0};
+
+  std::uint64_t known() const { return free + occupied; }
+  /// The space of the voxels [m]; empty without voxels.
+  Eigen::AlignedBox3d bounds(double resolution) const;
+};
+
+/// Reads the map in a file, the sum of all drives, tile by tile. @param empty_map has the gains that decide
+/// the states (emptyMapWithGains). @param visit is called for each block with the state of its voxels.
+/// @throws MapFileError.
+using BlockVisit = std::function<void(const BlockIndex& index, const BlockView& view)>;
+MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit = nullptr);
+
+}  // namespace bki_mapping

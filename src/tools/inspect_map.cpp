@@ -1,0 +1,185 @@
+// Says what is in a map file, and draws it.
+#include <ctime>
+#include <iomanip>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/io/mapper_file.h"
+#include "core/atomic_file.h"
+#include "io/map_picture.h"
+#include "io/map_statistics.h"
+#include "tools/options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+using Json = nlohmann::ordered_json;
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  options.add_options()("json", text("FILE.json"), "write the figures as JSON, too")(
+      "top", text("FILE.png"), "draw the map as seen from above")(
+      "profile", text("FILE.png"), "draw the map as seen from its longer side")(
+      "parameters", po::bool_switch(), "print the parameters it was made with as YAML, and exit");
+  return options;
+}
+
+Json boxJson(const Eigen::AlignedBox3d& box) {
+  if (box.isEmpty()) return nullptr;
+  const Eigen::Vector3d &low = box.min(), &high = box.max();
+  return {{"min", {low.x(), low.y(), low.z()}}, {"max", {high.x(), high.y(), high.z()}}};
+}
+
+Json driveJson(const DriveRecord& drive) {
+  return {{"id", drive.id},
+          {"name", drive.name},
+          {"part", drive.part},
+          {"scans", drive.scans},
+          {"first_stamp_ns", drive.first_stamp},
+          {"last_stamp_ns", drive.last_stamp},
+          {"bounds", boxJson(drive.bounds)}};
+}
+
+double bytesPerVoxel(const MapFile& file, const MapStatistics& found) {
+  return static_cast<double>(file.size().bytes) / static_cast<double>(found.known());
+}
+
+Json statisticsJson(MapFile& file, const MapStatistics& found) {
+  const MapInfo& info = file.info();
+  Json by_class = Json::object(), drives = Json::array();
+  for (const SemanticClass& c : info.classes->classes()) {
+    const auto count = found.occupied_by_class.find(c.id);
+    by_class[c.name] = count == found.occupied_by_class.end() ? 0 : count->second;
+  }
+  for (const DriveRecord& drive : file.drives()) drives.push_back(driveJson(drive));
+  const Json per_voxel = found.known() > 0 ? Json(bytesPerVoxel(file, found)) : Json();
+  return {{"file", file.path()},
+          {"program", info.program},
+          {"frame", info.frame},
+          {"resolution", info.resolution},
+          {"prior", info.prior},
+          {"class_table", info.classes->name()},
+          {"bounds", boxJson(found.bounds(info.resolution))},
+          {"voxels", {{"free", found.free}, {"occupied", found.occupied}, {"occluded", found.occluded}}},
+          {"voxels_by_class", by_class},
+          {"blocks", found.blocks},
+          {"tiles", found.tiles},
+          {"file_bytes", file.size().bytes},
+          {"map_bytes", found.memory_bytes},
+          {"file_bytes_per_known_voxel", per_voxel},
+          {"drives", drives}};
+}
+
+std::string timeText(std::uint64_t stamp) {
+  const auto seconds = static_cast<std::time_t>(stamp / 1'000'000'000);
+  std::ostringstream text;
+  text << std::put_time(std::gmtime(&seconds), "%Y-%m-%d %H:%M:%S UTC");
+  return text.str();
+}
+
+void printDrive(std::ostream& out, const DriveRecord& drive) {
+  out << "  " << drive.id << ": " << drive.scans << " scans";
+  if (drive.scans > 0) {
+    out << ", from " << timeText(drive.first_stamp) << ", "
+        << 1e-9 * static_cast<double>(drive.last_stamp - drive.first_stamp) << " s";
+  }
+  if (drive.part > 0) out << ", kept apart in part " << drive.part;
+  out << "\n";
+}
+
+void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
+  const MapInfo& info = file.info();
+  out << file.path() << ", by " << info.program << "\n"
+      << "frame " << info.frame << ", resolution " << numberText(info.resolution) << " m, class table "
+      << info.classes->name() << "\n"
+      << std::fixed << std::setprecision(1);
+  const Eigen::AlignedBox3d box = found.bounds(info.resolution);
+  if (!box.isEmpty()) {
+    for (const Eigen::Index axis : {0, 1, 2}) {
+      out << (axis == 0 ? "" : ", ") << "xyz"[axis] << " from " << box.min()[axis] << " to "
+          << box.max()[axis];
+    }
+    out << " m\n";
+  }
+  out << "voxels: " << found.occupied << " occupied, " << found.free << " free, " << found.occluded
+      << " occluded; " << found.blocks << " blocks in " << found.tiles << " tiles\n"
+      << "size: " << static_cast<double>(file.size().bytes) / 1e6 << " MB in the file, "
+      << static_cast<double>(found.memory_bytes) / 1e6 << " MB in memory";
+  if (found.known() > 0) {
+    out << ", " << std::setprecision(2) << bytesPerVoxel(file, found)
+        << " bytes of the file for each known voxel" << std::setprecision(1);
+  }
+  out << "\ndrives:\n";
+  for (const DriveRecord& drive : file.drives()) printDrive(out, drive);
+  out << "occupied voxels by class:\n";
+  for (const auto& [id, count] : found.occupied_by_class) {
+    const SemanticClass* known = info.classes->find(id);
+    out << "  " << std::setw(20) << std::left << (known ? known->name : "?") << count << "\n";
+  }
+}
+
+/// The files of --top and --profile, checked before the work.
+std::string pictureFile(const po::variables_map& given, const char* option) {
+  if (!given.count(option)) return "";
+  const std::string path = given[option].as<std::string>();
+  if (path.size() < 4 || path.compare(path.size() - 4, 4, ".png") != 0) {
+    throw std::invalid_argument(std::string("--") + option + " " + path + " must end in .png");
+  }
+  checkWritable(path);
+  return path;
+}
+
+void draw(MapFile& file, SemanticMap& empty_map, const MapStatistics& found, const std::string& top,
+          const std::string& profile) {
+  std::vector<std::pair<std::string, MapPicture>> pictures;
+  if (!top.empty()) pictures.emplace_back(top, MapPicture(MapPicture::View::kTop, found.low, found.high));
+  if (!profile.empty())
+    pictures.emplace_back(profile, MapPicture(MapPicture::View::kProfile, found.low, found.high));
+  if (pictures.empty()) return;
+  readStatistics(file, empty_map, [&](const BlockIndex& index, const BlockView& view) {
+    for (auto& [path, picture] : pictures) picture.add(index, view);
+  });
+  for (const auto& [path, picture] : pictures) {
+    writePng(path, picture.draw(*file.info().classes));
+    std::cout << path << ": " << numberText(file.info().resolution * picture.voxelsPerPixel())
+              << " m a pixel\n";
+  }
+}
+
+int inspect(const po::variables_map& given) {
+  const auto files =
+      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
+  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
+  MapFile file(files[0], MapFile::Access::kRead);
+  if (given["parameters"].as<bool>()) {
+    std::cout << file.info().parameters;
+    return 0;
+  }
+  const std::string top = pictureFile(given, "top"), profile = pictureFile(given, "profile");
+  if (given.count("json")) checkWritable(given["json"].as<std::string>());
+  SemanticMap empty_map = emptyMapWithGains(files[0], file.info());
+  const MapStatistics found = readStatistics(file, empty_map);
+  print(std::cout, file, found);
+  if (given.count("json")) {
+    writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found).dump(2) + "\n");
+  }
+  draw(file, empty_map, found, top, profile);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("inspect_map", [&] {
+    const auto given = tools::parse(argc, argv,
+                                    "inspect_map FILE.bkm\n"
+                                    "Says what is in a map file, checks every byte of its map, and draws it.",
+                                    options(), "files");
+    return given ? inspect(*given) : 0;
+  });
+}

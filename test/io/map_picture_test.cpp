@@ -1,0 +1,236 @@
+// What inspect_map says and draws, against a look at each voxel.
+#include "io/map_picture.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <map>
+#include <tuple>
+
+#include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/mapper_file.h"
+#include "io/map_statistics.h"
+#include "store/map_maker.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+MapInfo infoWithGains() {
+  MapInfo info = infoOf();
+  info.parameters =
+      "resolution: 7\nunknown: 1\nfree_gain:\n  static: 0.01\n  dynamic: 50\n  persistence: 3\n";
+  return info;
+}
+
+struct Inspected {
+  MapStatistics statistics;
+  Picture top, profile;
+};
+
+Inspected inspect(const std::string& path) {
+  MapFile file(path, MapFile::Access::kRead);
+  SemanticMap empty_map = emptyMapWithGains(path, file.info());
+  Inspected result;
+  result.statistics = readStatistics(file, empty_map);
+  MapPicture top(MapPicture::View::kTop, result.statistics.low, result.statistics.high),
+      profile(MapPicture::View::kProfile, result.statistics.low, result.statistics.high);
+  readStatistics(file, empty_map, [&](const BlockIndex& index, const BlockView& view) {
+    top.add(index, view);
+    profile.add(index, view);
+  });
+  result.top = top.draw(*file.info().classes);
+  result.profile = profile.draw(*file.info().classes);
+  return result;
+}
+
+/// The whole map with the gains of infoWithGains().
+SemanticMap mapWithGains(unsigned seed, int blocks, int extent) {
+  SemanticMap map = infoOf().emptyMap();
+  map.setGainPersistence(3.0);
+  map.setFreeGain(0, 1.0);   // unlabelled
+  map.setFreeGain(40, 2.5);  // by its own gain
+  map.setFreeGain(80, 0.01);
+  map.add(randomMap(seed, blocks, extent));
+  return map;
+}
+
+TEST(MapStatistics, CountsVoxelsAsTheMapperSeesThem) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  saveMap(path, infoWithGains(), {driveOf("a")}, randomMap(3));
+  const MapStatistics found = inspect(path).statistics;
+  const SemanticMap map = mapWithGains(3, 60, 12);
+  MapStatistics expected;
+  GridIndex low{1 << 30, 1 << 30, 1 << 30}, high{-(1 << 30), -(1 << 30), -(1 << 30)};
+  std::size_t bytes = 0;
+  for (const auto& [index, block] : map.entries()) {
+    bytes += block->bytes();
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelView view = viewVoxel(map, *block, v);
+      expected.free += view.state == VoxelState::kFree;
+      expected.occluded += view.state == VoxelState::kOccluded;
+      expected.occupied += view.state == VoxelState::kOccupied;
+      if (view.state == VoxelState::kOccupied) ++expected.occupied_by_class[view.label];
+      if (view.state == VoxelState::kUnknown) continue;
+      const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
+      low = {std::min(low.x, voxel.x), std::min(low.y, voxel.y), std::min(low.z, voxel.z)};
+      high = {std::max(high.x, voxel.x), std::max(high.y, voxel.y), std::max(high.z, voxel.z)};
+    }
+  }
+  EXPECT_EQ(found.free, expected.free);
+  EXPECT_EQ(found.occupied, expected.occupied);
+  EXPECT_EQ(found.occluded, expected.occluded);
+  EXPECT_GT(found.occluded, 0u);
+  EXPECT_EQ(found.occupied_by_class, expected.occupied_by_class);
+  EXPECT_EQ(found.blocks, map.size());
+  EXPECT_EQ(found.tiles, tilesOf(map).size());
+  EXPECT_EQ(found.low, low);
+  EXPECT_EQ(found.high, high);
+  EXPECT_NEAR(static_cast<double>(found.memory_bytes), static_cast<double>(bytes),
+              0.1 * static_cast<double>(bytes));
+  const Eigen::AlignedBox3d box = found.bounds(0.3);
+  EXPECT_TRUE(box.min().isApprox(0.3 * Eigen::Vector3d(low.x, low.y, low.z)));
+  EXPECT_TRUE(box.max().isApprox(0.3 * Eigen::Vector3d(high.x + 1, high.y + 1, high.z + 1)));
+}
+
+/// The colour of what is nearest, looking along an axis: `right`, `up` and `towards` the viewer say which
+/// coordinate is which.
+using Axes = std::tuple<int, int, int>;  // of x 0, y 1, z 2; -1 - axis: reversed
+
+int coordinate(const GridIndex& i, int axis) {
+  const int values[] = {i.x, i.y, i.z};
+  return axis < 0 ? -values[-1 - axis] : values[axis];
+}
+
+Picture drawn(const SemanticMap& map, const MapStatistics& found, const Axes& axes, int pixels) {
+  const auto [right, up, towards] = axes;
+  const int left = coordinate(found.low, right), below = coordinate(found.low, up);
+  const int far = std::min(coordinate(found.low, towards), coordinate(found.high, towards));
+  const int near = std::max(coordinate(found.low, towards), coordinate(found.high, towards));
+  Picture picture;
+  picture.width = (coordinate(found.high, right) - left + 1) * pixels;
+  picture.height = (coordinate(found.high, up) - below + 1) * pixels;
+  picture.pixels.assign(static_cast<std::size_t>(picture.width * picture.height), Color{255, 255, 255});
+  std::map<std::pair<int, int>, std::pair<int, Color>> nearest;  // nearness and colour by right and up
+  forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
+    if (view.state == VoxelState::kOccluded) return;
+    const int nearness = view.state == VoxelState::kFree ? far - 1 : coordinate(voxel, towards);
+    Color color = kFreeColor;
+    if (view.state == VoxelState::kOccupied) {
+      const double brightness = 0.45 + 0.55 * (nearness - far) / std::max(1, near - far);
+      color = infoOf().classes->find(view.label)->color;
+      for (std::uint8_t& part : color) part = static_cast<std::uint8_t>(brightness * part);
+    }
+    const std::pair<int, int> cell(coordinate(voxel, right) - left, coordinate(voxel, up) - below);
+    const auto known = nearest.find(cell);
+    if (known == nearest.end() || known->second.first < nearness) nearest[cell] = {nearness, color};
+  });
+  for (const auto& [cell, seen] : nearest) {
+    for (int y = 0; y < pixels; ++y) {
+      const int row = picture.height - 1 - (cell.second * pixels + y);
+      const auto first = picture.pixels.begin() + row * picture.width + cell.first * pixels;
+      std::fill(first, first + pixels, seen.second);
+    }
+  }
+  return picture;
+}
+
+void expectSame(const Picture& found, const Picture& expected) {
+  ASSERT_EQ(found.width, expected.width);
+  ASSERT_EQ(found.height, expected.height);
+  int different = 0;
+  for (std::size_t i = 0; i < found.pixels.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {  // brightness may be rounded to another number
+      different += std::abs(int{found.pixels[i][c]} - int{expected.pixels[i][c]}) > 1;
+    }
+  }
+  EXPECT_EQ(different, 0);
+}
+
+TEST(MapPicture, ShowsWhatIsNearest) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  saveMap(path, infoWithGains(), {}, randomMap(3, 60, 3));
+  const Inspected inspected = inspect(path);
+  const SemanticMap map = mapWithGains(3, 60, 3);
+  const GridIndex &low = inspected.statistics.low, &high = inspected.statistics.high;
+  const bool along_y = high.y - low.y > high.x - low.x;
+  const int top_edge = std::max(high.x - low.x, high.y - low.y) + 1;
+  expectSame(inspected.top, drawn(map, inspected.statistics, {0, 1, 2}, 2048 / top_edge));
+  const int profile_edge = std::max(top_edge, high.z - low.z + 1);
+  expectSame(inspected.profile,
+             drawn(map, inspected.statistics, along_y ? Axes{1, 2, 0} : Axes{0, 2, -2}, 2048 / profile_edge));
+}
+
+TEST(MapPicture, TurnsProfilesToTheLongerSide) {
+  for (const bool along_y : {false, true}) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "map.bkm";
+    SemanticMap map = infoOf().emptyMap();
+    // A wall of class 40 in front, as the viewer sees it, of one of class 80, which is longer to the right.
+    std::vector<EvidenceUnits> plane(kBlockVoxels, 100);
+    const auto block = [&](int right, int back) -> Block& {
+      return map.getOrAllocate(along_y ? BlockIndex{{-back, right, 0}} : BlockIndex{{right, back, 0}});
+    };
+    for (int right = 0; right < 3; ++right) block(right, 0).add(40, plane.data());
+    for (int right = 0; right < 5; ++right) block(right, 2).add(80, plane.data());
+    saveMap(path, infoOf(), {}, map);
+    const Picture profile = inspect(path).profile;
+    EXPECT_EQ(profile.width, 2048 / 40 * 40);
+    EXPECT_EQ(profile.height, 2048 / 40 * 8);
+    const auto width = static_cast<std::size_t>(profile.width);
+    EXPECT_EQ(profile.pixels[width / 4], (Color{1, 128, 255})) << along_y;
+    EXPECT_GT(profile.pixels[width - 1][2], 100) << along_y;
+    EXPECT_LT(profile.pixels[width - 1][2], 200) << along_y;
+  }
+}
+
+TEST(MapPicture, ReducesLargeMaps) {
+  MapPicture picture(MapPicture::View::kTop, {-50000, -10, 0}, {49999, 9, 7});
+  EXPECT_EQ(picture.voxelsPerPixel(), 49.0);
+  BlockView view;
+  view.state.fill(VoxelState::kOccupied);
+  view.label.fill(40);
+  picture.add({{-6250, 0, 0}}, view);
+  picture.add({{6249, 0, 0}}, view);
+  const Picture drawn = picture.draw(*infoOf().classes);
+  EXPECT_EQ(drawn.width, 2041);
+  EXPECT_EQ(drawn.height, 1);
+  EXPECT_NE(drawn.pixels.front(), (Color{255, 255, 255}));
+  EXPECT_EQ(drawn.pixels[1000], (Color{255, 255, 255}));
+  EXPECT_NE(drawn.pixels.back(), (Color{255, 255, 255}));
+  const MapStatistics nothing;
+  EXPECT_EQ(MapPicture(MapPicture::View::kTop, nothing.low, nothing.high).draw(*infoOf().classes).width, 1);
+}
+
+TEST(MapPicture, WritesPng) {
+  const TemporaryFolder folder;
+  const Picture picture{3, 2, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 20, 30}, {40, 50, 60}, {255, 0, 128}}};
+  writePng(folder / "a.png", picture);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_TRUE(png_image_begin_read_from_file(&image, (folder / "a.png").c_str()));
+  image.format = PNG_FORMAT_RGB;
+  EXPECT_EQ(image.width, 3u);
+  EXPECT_EQ(image.height, 2u);
+  std::vector<Color> pixels(6);
+  ASSERT_TRUE(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr));
+  EXPECT_EQ(pixels, picture.pixels);
+  EXPECT_THROW(writePng(folder / "no/a.png", picture), std::runtime_error);
+}
+
+TEST(MapFileGains, RefusesParametersThatAreNone) {
+  MapInfo info = infoOf();
+  info.parameters = "free_gain: {static: -1}";
+  EXPECT_NE(
+      sentenceOf([&] { emptyMapWithGains("FILE", info); }).find("the parameters in FILE cannot be used"),
+      std::string::npos);
+  info.parameters = "[";
+  EXPECT_NE(sentenceOf([&] { emptyMapWithGains("FILE", info); }), "");
+  info.parameters = parameterYaml(MapperConfig());
+  EXPECT_EQ(sentenceOf([&] { emptyMapWithGains("FILE", info); }), "");
+}
+
+}  // namespace
+}  // namespace bki_mapping
