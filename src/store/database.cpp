@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -40,8 +41,9 @@ constexpr char kBusy[] = " is open in another place; close it there, or work on 
     case SQLITE_CANTOPEN:
       throw MapFileError(path + " cannot be opened: " + reason + "; check name and rights");
     case SQLITE_FULL:
+      throw MapFileError(writeFailure(path, "the disk is full").what());
     case SQLITE_READONLY:
-      throw MapFileError(writeFailure(path, sqlite3_errstr(code)).what());
+      throw MapFileError(writeFailure(path, "it may only be read").what());
     case SQLITE_IOERR:
       if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_SHORT_READ) {
         throw MapFileError(path + " cannot be read: " + reason + "; check the disk");
@@ -131,6 +133,11 @@ void Database::harden() {
 
 void Database::lock() {
   if (mode_ == Mode::kUpdate) {
+    // SQLite would say so only when something is written.
+    const char* const file = sqlite3_db_filename(database_.get(), "main");
+    if (access(file, W_OK) != 0 || access(std::filesystem::path(file).parent_path().c_str(), W_OK) != 0) {
+      throw MapFileError(writeFailure(name_, std::strerror(errno)).what());
+    }
     run("PRAGMA locking_mode = EXCLUSIVE");
     run("PRAGMA synchronous = EXTRA");
     run("BEGIN EXCLUSIVE");

@@ -75,6 +75,7 @@ class Database {
   void lock();
 
   const std::string& name() const { return name_; }
+  Mode mode() const { return mode_; }
   /// @throws MapFileError if the file is shorter.
   Header header() const;
   std::int64_t fileSize() const;

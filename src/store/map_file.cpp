@@ -151,10 +151,40 @@ struct MapFile::State {
     return select.step() ? select.integer(0) : -1;
   }
 
+  /// Makes an open transaction durable. @param next the totals of the file then.
+  void commit(const Totals& next) {
+    try {
+      database.run("COMMIT");
+      totals = next;
+    } catch (...) {
+      database.rollBack();
+      if (database.mode() == Database::Mode::kNew) throw;
+      attempted = next;
+      bool made = false;
+      try {
+        made = settle();
+      } catch (const MapFileError&) {
+      }
+      if (!made) throw;
+    }
+  }
+  /// Finds out what has become of a commit() that failed. If it was the last sync of all that failed, by
+  /// which SQLite gives up its journal, SQLite gives it up again, and the change is made.
+  /// @return whether it is. @throws MapFileError if that cannot be known at present.
+  bool settle() {
+    if (!attempted) return false;
+    const Totals found = readTotals(database);
+    const bool made = found == *attempted && !(found == totals);
+    totals = found;
+    attempted.reset();
+    return made;
+  }
+
   Database database;
   bool writable;
   MapInfo info;
   Totals totals;
+  std::optional<Totals> attempted;  ///< by a commit() that failed, if its outcome is not yet known
   std::unique_ptr<TileCodec> codec;
 };
 
@@ -205,7 +235,7 @@ MapFile::Size MapFile::size() const {
 
 std::vector<DriveRecord> MapFile::drives() {
   std::int64_t ignored = 0;
-  return readDrives(state_->database, state_->totals.drives, ignored);
+  return readDrives(state_->database, std::nullopt, ignored);  // a change may have put some
 }
 
 std::vector<int> MapFile::parts() {
@@ -275,6 +305,9 @@ MapFile::Change::~Change() {
 
 MapFile::Change MapFile::change() {
   if (!state_->writable) throw std::logic_error(state_->database.name() + " is open for reading only");
+  if (state_->settle()) {
+    throw MapFileLateCommit(path() + " holds the last change, although writing it failed; do not repeat it");
+  }
   return Change(*this);
 }
 
@@ -330,9 +363,8 @@ void MapFile::Change::putDrive(const DriveRecord& drive) {
 void MapFile::Change::commit() {
   MapFile::State& file = state_->file;
   writeTotals(file.database, state_->totals);
-  file.database.run("COMMIT");
-  file.totals = state_->totals;
   state_->done = true;
+  file.commit(state_->totals);
 }
 
 namespace {

@@ -95,16 +95,17 @@ bool isGood(double value) {
 /// Calls visit(RowReader&) for each row of a table. SQLite does not sort them: in a hostile file the same row
 /// may come again and again, and sorting takes all rows into memory.
 template <typename Visit>
-void readRows(Database& database, const std::string& table, std::int64_t expected, Visit&& visit) {
+void readRows(Database& database, const std::string& table, std::optional<std::int64_t> expected,
+              Visit&& visit) {
   Statement select = database.prepare(("SELECT * FROM " + table).c_str());
   std::int64_t rows = 0, text_left = database.mostContent();
-  for (; rows <= expected && select.step(); ++rows) {
+  for (; (!expected || rows <= *expected) && select.step(); ++rows) {
     RowReader row(select, database.name());
     visit(row);
     text_left -= row.textSize();
     if (text_left < 0) throw damaged(database.name(), "rows of the table '" + table + "' share their texts");
   }
-  if (rows != expected) {
+  if (expected && rows != *expected) {
     throw damaged(database.name(), "the table '" + table + "' has another number of rows than it should");
   }
 }
@@ -203,7 +204,8 @@ std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive) {
   return checksum;
 }
 
-std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, std::int64_t& checksums) {
+std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64_t> expected,
+                                    std::int64_t& checksums) {
   std::vector<DriveRecord> drives;
   readRows(database, "drive", expected, [&](RowReader& row) {
     DriveRecord& drive = drives.emplace_back();

@@ -126,11 +126,12 @@ std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
 void writeTotals(Database& database, const Totals& totals);
 Totals readTotals(Database& database);
 
-/// All rows of a table, sorted by position or id. @param expected number of rows. @param[in,out] checksums is
-/// added to.
+/// All rows of a table, sorted by position or id. @param expected number of rows, if it is known.
+/// @param[in,out] checksums is added to.
 /// @throws MapFileError if there are other rows.
 std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected, std::int64_t& checksums);
-std::vector<DriveRecord> readDrives(Database& database, std::int64_t expected, std::int64_t& checksums);
+std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64_t> expected,
+                                    std::int64_t& checksums);
 
 /// @throws std::invalid_argument in one sentence if a value is not allowed.
 void checkInfo(const MapInfo& info);

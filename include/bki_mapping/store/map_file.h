@@ -92,6 +92,7 @@ class MapFile {
     void putDrive(const DriveRecord& drive);
     void eraseDrive(const std::string& id);
     /// Returns when the change is on the disk. The object must not be used after it.
+    /// If it throws, the change is not made; see MapFile::change() for the one exception.
     void commit();
 
    private:
@@ -100,7 +101,8 @@ class MapFile {
     explicit Change(MapFile& file);
     std::unique_ptr<State> state_;
   };
-  /// @throws std::logic_error if the file is open for reading.
+  /// @throws std::logic_error if the file is open for reading; MapFileLateCommit, once, if the disk failed at
+  /// the very end of the last commit(), which then threw another error.
   Change change();
 
  private:

@@ -24,6 +24,12 @@ class MapFileDamaged : public MapFileError {
  public:
   using MapFileError::MapFileError;
 };
+/// A change of which MapFile::Change::commit() could but say that it failed is in the file after all, as a
+/// whole, and must not be made again.
+class MapFileLateCommit : public MapFileError {
+ public:
+  using MapFileError::MapFileError;
+};
 /// Another process, or another place in this one, has the file open.
 class MapFileInUse : public MapFileError {
  public:
