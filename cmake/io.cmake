@@ -3,15 +3,17 @@ find_package(PCL REQUIRED COMPONENTS common filters io)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
+find_package(octomap REQUIRED)
 
 
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
-    class_table_yaml.cpp config_yaml.cpp map_export.cpp map_picture.cpp map_statistics.cpp mapper_file.cpp
-    sequence_reader.cpp sequence_writer.cpp share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
+    class_table_yaml.cpp config_yaml.cpp grid_export.cpp map_export.cpp map_picture.cpp map_statistics.cpp mapper_file.cpp
+    octomap_export.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
   LINK bki_mapping_mapping bki_mapping_store pcl_common)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ${CMAKE_DL_LIBS})
+target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
+target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation SOURCES dynamics_evaluation.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
@@ -31,6 +33,8 @@ add_executable(simulate_drive src/tools/simulate_drive.cpp)
 bki_mapping_tool(simulate_drive)
 add_executable(clear_map src/tools/clear_map.cpp)
 bki_mapping_tool(clear_map)
+add_executable(export_map src/tools/export_map.cpp)
+bki_mapping_tool(export_map)
 add_executable(inspect_map src/tools/inspect_map.cpp)
 bki_mapping_tool(inspect_map nlohmann_json::nlohmann_json)
 add_executable(merge_maps src/tools/merge_maps.cpp)

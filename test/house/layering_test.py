@@ -31,7 +31,7 @@ LIBRARIES = {
     'beams/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
     'mapping/semantic_mapper.cpp': ('malloc.h',),
     'store': ('sqlite3.h', 'zlib.h'),
-    'io': ('pcl/', 'png.h', 'yaml-cpp/'),
+    'io': ('octomap/', 'pcl/', 'png.h', 'yaml-cpp/'),
     'evaluation': ('nlohmann/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),

@@ -49,7 +49,7 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
             self.assertGreater(len(options), 1, program)
             for option in options:
@@ -463,6 +463,36 @@ class Tools(unittest.TestCase):
         self.assertIn('0 occupied', self.succeeds('inspect_map', empty, '--json', json_file, '--top', top).stdout)
         with open(json_file) as file:
             self.assertIsNone(json.load(file)['bounds'])
+
+    def test_exporting(self):
+        gain = ('--set', 'free_gain/static=0.2')
+        a, direct, exported = self.path('exported.bkm'), self.path('direct.ply'), self.path('exported.ply')
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', a, *gain)
+        for states in ('occupied', 'occupied,free'):
+            self.succeeds('map_sequence', '--sequence', self.drive, '--output', direct, '--include', states, *gain)
+            self.succeeds('export_map', a, '--output', exported, '--include', states)
+            with open(direct, 'rb') as one, open(exported, 'rb') as other:
+                self.assertEqual(one.read(), other.read(), states)
+        for name, begin in (('map.ot', b'# Octomap OcTree file\n'), ('map.bt', b'# Octomap OcTree binary file\n'),
+                            ('map.pcd', b'# .PCD v0.7'), ('map.yaml', b'image: "map.pgm"\n'), ('map.pgm', b'P5\n')):
+            if name != 'map.pgm':
+                result = self.succeeds('export_map', a, '--output', self.path(name))
+                self.assertEqual((result.stderr, result.stdout), ('', f'{self.path(name)}: written, in frame map\n'))
+            with open(self.path(name), 'rb') as file:
+                self.assertEqual(file.read(len(begin)), begin)
+        with open(self.path('map.pgm'), 'rb') as file:
+            all_heights = file.read()
+        self.succeeds('export_map', a, '--output', self.path('map.yaml'), '--height', 'ground', '--min-z', '0.5')
+        with open(self.path('map.pgm'), 'rb') as file:
+            above_ground = file.read()
+        self.assertEqual(len(all_heights), len(above_ground))
+        self.assertGreater(all_heights.count(b'\0'), above_ground.count(b'\0'))
+        self.fails('must be one map file', 'export_map', '--output', exported)
+        self.fails('--output FILE is missing', 'export_map', a)
+        self.fails('must end in .ply, .pcd, .ot, .bt or .yaml', 'export_map', a, '--output', self.path('map.bkm'))
+        self.fails("must be map or ground", 'export_map', a, '--output', self.path('map.yaml'), '--height', 'sea')
+        self.fails('--min-z must not be above', 'export_map', a, '--output', self.path('map.yaml'), '--min-z', '1', '--max-z', '0')
+        self.fails("state 'busy' is unknown", 'export_map', a, '--output', exported, '--include', 'busy')
 
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')

@@ -1,0 +1,90 @@
+// Exports a map file for other programs.
+#include <filesystem>
+#include <iostream>
+#include <stdexcept>
+
+#include "bki_mapping/io/map_export.h"
+#include "bki_mapping/io/mapper_file.h"
+#include "core/atomic_file.h"
+#include "io/grid_export.h"
+#include "io/octomap_export.h"
+#include "tools/options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+po::options_description options() {
+  po::options_description options("Options");
+  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
+  const ColumnRules rules;
+  options.add_options()(
+      "output", text("FILE"),
+      "file to write; its ending chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
+      "the colours of classes; .bt, OctoMap of occupied and free; .yaml, with an image .pgm beside it, "
+      "for map_server")("include", text("STATES")->default_value("occupied"),
+                        "voxels in a .ply or .pcd file: occupied,free,occluded")(
+      "min-z", po::value<double>()->value_name("M")->default_value(rules.min_z),
+      "lowest height of obstacles in a .yaml map")(
+      "max-z", po::value<double>()->value_name("M")->default_value(rules.max_z),
+      "greatest height of obstacles in a .yaml map")(
+      "height", text("map|ground")->default_value("map"),
+      "zero of these heights: the origin of the map frame, or the ground below");
+  return options;
+}
+
+ColumnRules columnRules(const po::variables_map& given) {
+  ColumnRules rules;
+  rules.min_z = given["min-z"].as<double>();
+  rules.max_z = given["max-z"].as<double>();
+  if (!(rules.min_z <= rules.max_z)) throw std::invalid_argument("--min-z must not be above --max-z");
+  const std::string reference = given["height"].as<std::string>();
+  if (reference != "map" && reference != "ground") {
+    throw std::invalid_argument("--height is '" + reference + "', but must be map or ground");
+  }
+  rules.reference = reference == "map" ? HeightReference::kMap : HeightReference::kGround;
+  return rules;
+}
+
+int exportFile(const po::variables_map& given) {
+  const auto files =
+      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
+  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
+  if (!given.count("output")) throw std::invalid_argument("--output FILE is missing (see --help)");
+  const std::string output = given["output"].as<std::string>();
+  const std::string ending = std::filesystem::path(output).extension().string();
+  if (ending != ".ply" && ending != ".pcd" && ending != ".ot" && ending != ".bt" && ending != ".yaml") {
+    throw std::invalid_argument("--output " + output + " must end in .ply, .pcd, .ot, .bt or .yaml");
+  }
+  const VoxelStates states = parseStates(given["include"].as<std::string>());
+  const ColumnRules rules = columnRules(given);
+  checkWritable(output);
+  if (ending == ".yaml") checkWritable(gridImagePath(output));
+
+  MapFile file(files[0], MapFile::Access::kRead);
+  const ClassTable& classes = *file.info().classes;
+  SemanticMap map = emptyMapWithGains(files[0], file.info());
+  for (const TileEntry& tile : file.tiles()) file.addTileTo(map, {tile.index});
+  if (ending == ".yaml") {
+    exportGrid(output, map, classes, rules);
+  } else if (ending == ".ot" || ending == ".bt") {
+    exportOctoMap(output, map, classes);
+  } else {
+    exportMap(output, map, classes, states);
+  }
+  std::cout << output << ": written, in frame " << file.info().frame << "\n";
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run("export_map", [&] {
+    const auto given = tools::parse(argc, argv,
+                                    "export_map FILE.bkm --output FILE\n"
+                                    "Writes a map for other programs.",
+                                    options(), "files");
+    return given ? exportFile(*given) : 0;
+  });
+}
