@@ -12,6 +12,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "evaluation/run_report.h"
+#include "io/cleaned_points.h"
 #include "tools/options.h"
 
 namespace {
@@ -32,6 +33,7 @@ po::options_description options() {
       "what the map file calls these scans (default: name of the sequence's folder, first and last scan)")(
       "include", text("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
+      "points", text("FILE.pcd"), "file for the points of the scans that lie in occupied voxels at the end")(
       "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
                                                         "print the effective parameters as YAML, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -85,7 +87,8 @@ int mapSequence(const po::variables_map& given) {
   if (given.count("output") && !isMapFileName(given["output"].as<std::string>())) {
     checkMapFileName(given["output"].as<std::string>());
   }
-  for (const char* file : {"output", "report"}) {
+  if (given.count("points")) checkPointFileName(given["points"].as<std::string>());
+  for (const char* file : {"output", "points", "report"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
@@ -102,11 +105,13 @@ int mapSequence(const po::variables_map& given) {
   }
 
   std::vector<ScanReport> scans;
+  std::vector<std::size_t> mapped;
   std::size_t refused = 0;
   for (std::size_t i = first; i < last; ++i) {
     try {
       const Scan scan = sequence.read(i).scan();
       scans.push_back({sequence.name(i), mapper.integrate(scan)});
+      mapped.push_back(i);
       drive.addScan(scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
     } catch (const ScanRefused& refusal) {
       // Report the first refusal and count the others, which mostly have the same reason.
@@ -124,6 +129,13 @@ int mapSequence(const po::variables_map& given) {
     } else {
       exportMap(output, mapper.map(), mapper.classes(), states);
     }
+  }
+  if (given.count("points")) {
+    const std::string path = given["points"].as<std::string>();
+    const CleanedCount count = writeCleanedPoints(
+        path, sequence, mapped, mapper.map(),
+        [&](std::size_t done) { tools::showProgress(done, mapped.size(), "scans cleaned"); });
+    std::cout << path << ": " << count.kept << " of " << count.points << " points\n";
   }
   if (given.count("report")) writeTextFile(given["report"].as<std::string>(), reportJson(mapper, scans));
   std::cout << summaryText(mapper, scans);

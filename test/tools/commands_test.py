@@ -48,14 +48,16 @@ SHORTER = {
 }
 SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # environment of Google Benchmark
 # First words of commands in a line of text; a single word is only the name of a program.
-PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'ctest', 'dynparam', 'evaluate_map', 'export_map',
-            'inspect_map', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'ros', 'rviz', 'scripts/', 'sequence_to_bag', 'simulate_drive', 'source')
+PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'ctest', 'dynparam', 'evaluate_map',
+            'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'ros', 'rviz',
+            'scripts/', 'sequence_to_bag', 'simulate_drive', 'source')
 # Not commands: fragments in a line of text, whose other arguments are up to the reader.
 PARTS = {
     'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise FRACTION',
-    'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --report', 'map_sequence --report FILE.json',
-    'merge_maps --keep-drives', 'migrate_map OLD.bkm NEW.bkm',
-    'rosnode kill', 'rosrun bki_mapping map_sequence', 'scripts/test_on SUITE', 'simulate_drive --seed 2',
+    'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --points FILE.pcd',
+    'map_sequence --report', 'map_sequence --report FILE.json', 'merge_maps --keep-drives',
+    'migrate_map OLD.bkm NEW.bkm', 'rosnode kill', 'rosrun bki_mapping map_sequence', 'scripts/test_on SUITE',
+    'simulate_drive --seed 2',
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roscore|roslaunch(?!.* --ros-args)|rosrun pcl_ros|rviz|rostopic echo)\b')
 WRONG = re.compile(r'\bERROR\b|FATAL|Traceback|\b[Uu]nknown\b|has died|command not found|No such file', re.MULTILINE)

@@ -494,6 +494,24 @@ class Tools(unittest.TestCase):
         self.fails('--min-z must not be above', 'export_map', a, '--output', self.path('map.yaml'), '--min-z', '1', '--max-z', '0')
         self.fails("state 'busy' is unknown", 'export_map', a, '--output', exported, '--include', 'busy')
 
+    def test_cleaned_points(self):
+        kept = {}
+        for mode in ('none', 'line'):
+            result = self.succeeds('map_sequence', '--sequence', self.drive, '--points', self.path('points.pcd'), '--set',
+                                   f'free_space/mode={mode}')
+            kept[mode], points = map(int, re.search(r'points.pcd: (\d+) of (\d+) points\n', result.stdout).groups())
+            self.assertEqual(points, sum(os.path.getsize(os.path.join(self.drive, 'velodyne', name)) // 16
+                                         for name in os.listdir(os.path.join(self.drive, 'velodyne'))))
+            with open(self.path('points.pcd'), 'rb') as file:
+                content = file.read()
+            begin = content.index(b'DATA binary\n') + len(b'DATA binary\n')
+            self.assertEqual(len(content) - begin, 21 * kept[mode])
+        self.assertEqual(kept['none'], points)
+        self.assertLess(kept['line'], points)
+        self.assertGreater(kept['line'], points // 2)
+        self.fails('must end in .pcd', 'map_sequence', '--sequence', self.drive, '--points', self.path('points.ply'))
+        self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--points', '/no/such/points.pcd')
+
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
         self.assertIn('version 1, from version 1', self.succeeds('migrate_map', a, copy).stdout)

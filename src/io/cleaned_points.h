@@ -1,0 +1,39 @@
+/// @file The points of scans that a map confirms.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/io/sequence.h"
+#include "bki_mapping/map/semantic_map.h"
+
+namespace bki_mapping {
+
+/// One point in the file, as it lies there.
+struct [[gnu::packed]] CleanedPoint {
+  float x, y, z;           ///< map frame [m]
+  float intensity;         ///< remission
+  std::uint32_t label;     ///< raw label of the scan
+  std::uint8_t map_class;  ///< class id of the voxel
+};
+
+struct CleanedCount {
+  std::uint64_t points = 0;  ///< in the scans
+  std::uint64_t kept = 0;    ///< of these in the file
+};
+
+/// Writes the points of scans that lie in occupied voxels of a map, as a binary PCD file by AtomicFile. So
+/// what moved away is not in it. Reads the scans again and holds one at a time.
+/// @param scans indices in the sequence. @param progress is told how many scans are done.
+/// @throws std::runtime_error if a scan cannot be read, or the file not written.
+CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,
+                                const std::vector<std::size_t>& scans, const SemanticMap& map,
+                                const std::function<void(std::size_t)>& progress = nullptr);
+
+/// @throws std::invalid_argument if the path does not end in .pcd.
+void checkPointFileName(const std::string& path);
+
+}  // namespace bki_mapping
