@@ -43,6 +43,8 @@ add_executable(migrate_map src/tools/migrate_map.cpp)
 bki_mapping_tool(migrate_map)
 add_executable(benchmark_sequence benchmark/benchmark_sequence.cpp benchmark/curves.cpp)
 bki_mapping_tool(benchmark_sequence pcl_filters)
+add_executable(benchmark_store benchmark/benchmark_store.cpp)
+bki_mapping_tool(benchmark_store)
 find_package(benchmark QUIET)  # Google Benchmark: for developers
 if(benchmark_FOUND)
   add_executable(benchmark_parts benchmark/benchmark_parts.cpp)

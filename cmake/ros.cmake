@@ -56,7 +56,7 @@ install(TARGETS ${bki_mapping_rooms} bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS benchmark_publishing benchmark_sequence clear_map evaluate_map export_map inspect_map map_sequence
+install(TARGETS benchmark_publishing benchmark_sequence benchmark_store clear_map evaluate_map export_map inspect_map map_sequence
   mapping_node merge_maps migrate_map play_sequence print_parameters sequence_to_bag simulate_drive
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 if(TARGET benchmark_parts)

@@ -1,9 +1,11 @@
 #include "ros/publisher_set.h"
 
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
-
-#include "parallel/yield_to_others.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -15,6 +17,13 @@ constexpr double kIdleWait = 0.1;
 struct Wake : ros::CallbackInterface {
   CallResult call() override { return Success; }
 };
+
+/// Lets other threads of the process go first: publishing may wait, a scan may not. (On Linux the niceness of
+/// the process means that of the calling thread.)
+void yieldToOthers() {
+  constexpr int kNiceness = 19;  // the most
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);
+}
 
 }  // namespace
 

@@ -5,8 +5,6 @@
 #include <new>
 #include <utility>
 
-#include "parallel/yield_to_others.h"
-
 namespace bki_mapping {
 namespace {
 
@@ -182,7 +180,6 @@ void TileStore::arrive(Arrival arrival) {
 }
 
 void TileStore::run() {
-  yieldToOthers();
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
     wake_.wait(lock, [this] { return closing_ || !jobs_.empty(); });
