@@ -26,7 +26,8 @@ def read_planes(file, part=0):
             position += lengths[number]
             return numpy.frombuffer(data if len(data) == size else zlib.decompress(data), numpy.uint8)
         listed = section(0, 4 * blocks + planes)
-        numbers, counts, marked = listed[:2 * blocks].view('<u2'), listed[2 * blocks:3 * blocks], listed[3 * blocks:4 * blocks]
+        numbers = listed[:2 * blocks].view('<u2').astype(int)  # signed: the index of a tile may be negative
+        counts, marked = listed[2 * blocks:3 * blocks], listed[3 * blocks:4 * blocks]
         masks = numpy.unpackbits(section(1, 64 * (int(marked.sum()) + planes)), bitorder='little').reshape(-1, 512)
         masks = masks[int(marked.sum()):].astype(bool)
         size = int(masks.sum())
