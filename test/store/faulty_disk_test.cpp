@@ -1,7 +1,6 @@
 // A disk that is full, that must not be written to or that fails is named in one sentence; the file stays as
 // it was, and all goes on when the fault is gone.
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -224,36 +223,6 @@ TEST_F(FaultyDisk, MayLimitTheSizeOfFiles) {
                  }),
                  path_, "changed");
   EXPECT_TRUE(contentOf(path_) == before);
-  EXPECT_EQ(folder_.fileCount(), 1u);
-}
-
-TEST_F(FaultyDisk, MayBeFull) {
-  if (mount("none", folder_.path().c_str(), "tmpfs", 0, "size=400k") != 0) {
-    GTEST_SKIP() << "needs the right to mount a small file system";
-  }
-  const std::unique_ptr<TemporaryFolder, void (*)(TemporaryFolder*)> mounted(
-      &folder_, [](TemporaryFolder* folder) { umount2(folder->path().c_str(), MNT_DETACH); });
-  const auto fill = [&] {
-    MapFile file(path_, MapFile::Access::kUpdate);
-    for (unsigned seed = 1;; ++seed) {
-      MapFile::Change change = file.change();
-      const SemanticMap map = randomMap(seed, 20, 40);
-      for (const GridIndex& tile : tilesOf(map)) change.writeTile(map, {tile, static_cast<int>(seed)});
-      DriveRecord drive = driveOf("a");
-      drive.scans = seed;
-      change.putDrive(drive);
-      change.commit();
-    }
-  };
-  saveMap(path_, infoOf(), {}, before_);
-  const std::string sentence = sentenceOf(fill);
-  expectSentence(sentence, path_, "changed");
-  EXPECT_NE(sentence.find("MB free there"), std::string::npos) << sentence;
-  const FileContent content = contentOf(path_);
-  ASSERT_FALSE(content.drives.empty());
-  EXPECT_EQ(content.parts.size(), content.drives[0].scans + 1);
-  expectSentence(sentenceOf([&] { saveMap(path_, infoOf(), {}, randomMap(1, 500)); }), path_, "replaced");
-  EXPECT_TRUE(contentOf(path_) == content);
   EXPECT_EQ(folder_.fileCount(), 1u);
 }
 
