@@ -11,7 +11,9 @@ function(bki_mapping_room room)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
   target_link_libraries(${target} PUBLIC ${arg_LINK})
-  target_link_options(${target} PRIVATE LINKER:--no-undefined)
+  if(NOT BKI_MAPPING_LIBFUZZER)  # whose functions are in the program only
+    target_link_options(${target} PRIVATE LINKER:--no-undefined)
+  endif()
   set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")  # rooms share precompiled headers
   bki_mapping_warnings(${target})
   set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_ROOMS ${target})

@@ -1,6 +1,7 @@
 #include "store/database.h"
 
 #include <sqlite3.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -22,14 +23,24 @@ constexpr double kStepsPerByte = 0.5;
 /// SQLite keeps up to 2 MB of a change in memory.
 constexpr std::int64_t kMostUnwritten = 4'000'000;
 
+constexpr int kLargestValue = 300'000'000;  ///< more than the largest tile [bytes]
 constexpr std::size_t kLongestQuote = 300;
 constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
+
+/// Whether memory is not short, although SQLite says so: it does of lengths beyond all limits, too.
+bool canAllocate(std::size_t bytes) {
+  void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return false;
+  munmap(memory, bytes);
+  return true;
+}
 
 [[noreturn]] void fail(const std::string& path, sqlite3* database, int code) {
   const int system_error = database ? sqlite3_system_errno(database) : 0;
   const std::string reason = system_error ? std::strerror(system_error) : sqlite3_errstr(code);
   switch (code & 0xff) {
     case SQLITE_NOMEM:
+      if (canAllocate(kLargestValue)) throw damaged(path, "a length is wrong");
       throw std::bad_alloc();
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
@@ -72,14 +83,18 @@ void distrust(sqlite3* database) {
   for (const auto& [setting, value] : kSettings) {
     sqlite3_db_config(database, setting, value, static_cast<int*>(nullptr));
   }
-  constexpr std::pair<int, int> kLimits[] = {
-      {SQLITE_LIMIT_LENGTH, 300'000'000},  // more than the largest tile
-      {SQLITE_LIMIT_SQL_LENGTH, 4096},    {SQLITE_LIMIT_COLUMN, 32},
-      {SQLITE_LIMIT_EXPR_DEPTH, 20},      {SQLITE_LIMIT_COMPOUND_SELECT, 3},
-      {SQLITE_LIMIT_VDBE_OP, 25'000},     {SQLITE_LIMIT_FUNCTION_ARG, 8},
-      {SQLITE_LIMIT_ATTACHED, 0},         {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 50},
-      {SQLITE_LIMIT_VARIABLE_NUMBER, 32}, {SQLITE_LIMIT_TRIGGER_DEPTH, 1},
-      {SQLITE_LIMIT_WORKER_THREADS, 0}};
+  constexpr std::pair<int, int> kLimits[] = {{SQLITE_LIMIT_LENGTH, kLargestValue},
+                                             {SQLITE_LIMIT_SQL_LENGTH, 4096},
+                                             {SQLITE_LIMIT_COLUMN, 32},
+                                             {SQLITE_LIMIT_EXPR_DEPTH, 20},
+                                             {SQLITE_LIMIT_COMPOUND_SELECT, 3},
+                                             {SQLITE_LIMIT_VDBE_OP, 25'000},
+                                             {SQLITE_LIMIT_FUNCTION_ARG, 8},
+                                             {SQLITE_LIMIT_ATTACHED, 0},
+                                             {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 50},
+                                             {SQLITE_LIMIT_VARIABLE_NUMBER, 32},
+                                             {SQLITE_LIMIT_TRIGGER_DEPTH, 1},
+                                             {SQLITE_LIMIT_WORKER_THREADS, 0}};
   for (const auto& [limit, value] : kLimits) sqlite3_limit(database, limit, value);
 }
 

@@ -15,9 +15,10 @@ namespace {
 
 std::atomic<std::ptrdiff_t> allocated_bytes{0}, most_bytes{0};
 
-void* countedAllocation(std::size_t size) {
+// Not inline: GCC would take malloc for another allocator than the one that it replaces.
+[[gnu::noinline]] void* countedAllocation(std::size_t size) noexcept {
   void* const memory = std::malloc(size);
-  if (!memory) throw std::bad_alloc();
+  if (!memory) return nullptr;
   allocated_bytes += static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
   most_bytes = std::max<std::ptrdiff_t>(most_bytes, allocated_bytes);
   return memory;
@@ -26,6 +27,11 @@ void* countedAllocation(std::size_t size) {
 }  // namespace
 
 void* operator new(std::size_t size) {
+  void* const memory = countedAllocation(size);
+  if (!memory) throw std::bad_alloc();
+  return memory;
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   return countedAllocation(size);
 }
 void operator delete(void* memory) noexcept {

@@ -1,19 +1,16 @@
 // Map files that somebody made in order to do harm are refused in one sentence, in time, and in memory that
 // goes with their size: their checksums are right, and their content is wrong.
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <chrono>
 #include <filesystem>
-#include <functional>
-#include <limits>
 
 #include "bki_mapping/store/map_file.h"
 #include "store/counted_memory.h"
 #include "store/example_map.h"
 #include "store/file_content.h"
+#include "store/forgery.h"
 #include "store/map_maker.h"
-#include "store/records.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -22,97 +19,13 @@ namespace {
 constexpr std::size_t kPage = 4096;
 const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
 
-/// A file in the hands of somebody who knows SQLite.
-class Forgery {
- public:
-  explicit Forgery(const std::string& path) : path_(path) {
-    sqlite3_open(path.c_str(), &database_);
-    run("PRAGMA journal_mode = OFF");
-    run("PRAGMA synchronous = OFF");
-  }
-  ~Forgery() { sqlite3_close(database_); }
-  Forgery(const Forgery&) = delete;
-  Forgery& operator=(const Forgery&) = delete;
-
-  void run(const std::string& sql) {
-    char* fault = nullptr;
-    EXPECT_EQ(sqlite3_exec(database_, sql.c_str(), nullptr, nullptr, &fault), SQLITE_OK)
-        << sql << ": " << fault;
-    sqlite3_free(fault);
-  }
-  std::int64_t number(const std::string& sql) {
-    std::int64_t value = 0;
-    forEachRow(sql, [&](sqlite3_stmt* row) { value = sqlite3_column_int64(row, 0); });
-    return value;
-  }
-  /// Makes all checksums of rows and all totals right.
-  void sign() {
-    std::int64_t sum = 0;
-    for (const std::string table : {"map", "class", "drive"}) {
-      std::vector<std::pair<std::int64_t, std::uint32_t>> checksums;
-      forEachRow("SELECT *, rowid FROM " + table, [&](sqlite3_stmt* row) {
-        const int columns = sqlite3_column_count(row);
-        checksums.emplace_back(sqlite3_column_int64(row, columns - 1), checksumOf(row, columns - 2));
-        sum += checksums.back().second;
-      });
-      for (const auto& [row, checksum] : checksums) {
-        run("UPDATE " + table + " SET checksum = " + std::to_string(checksum) +
-            " WHERE rowid = " + std::to_string(row));
-      }
-    }
-    forEachRow("SELECT part, z, y, x, blocks, planes, checksum FROM tile",
-               [&](sqlite3_stmt* row) { sum += checksumOf(row, 7); });
-    run("UPDATE total SET classes = (SELECT count(*) FROM class), drives = (SELECT count(*) FROM drive), "
-        "tiles = (SELECT count(*) FROM tile), blocks = (SELECT sum(blocks) FROM tile), "
-        "planes = (SELECT sum(planes) FROM tile), checksums = " +
-        std::to_string(sum));
-    signTotals();
-  }
-  void signTotals() {
-    std::uint32_t checksum = 0;
-    forEachRow("SELECT * FROM total", [&](sqlite3_stmt* row) { checksum = checksumOf(row, 6); });
-    run("UPDATE total SET checksum = " + std::to_string(checksum));
-  }
-
- private:
-  void forEachRow(const std::string& sql, const std::function<void(sqlite3_stmt*)>& visit) {
-    sqlite3_stmt* statement = nullptr;
-    EXPECT_EQ(sqlite3_prepare_v2(database_, sql.c_str(), -1, &statement, nullptr), SQLITE_OK) << sql;
-    while (sqlite3_step(statement) == SQLITE_ROW) visit(statement);
-    sqlite3_finalize(statement);
-  }
-  static std::uint32_t checksumOf(sqlite3_stmt* row, int columns) {
-    RowChecksum checksum;
-    for (int c = 0; c < columns; ++c) {
-      switch (sqlite3_column_type(row, c)) {
-        case SQLITE_INTEGER:
-          checksum.add(std::int64_t{sqlite3_column_int64(row, c)});
-          break;
-        case SQLITE_FLOAT:
-          checksum.add(sqlite3_column_double(row, c));
-          break;
-        case SQLITE_TEXT:
-          checksum.add(std::string(reinterpret_cast<const char*>(sqlite3_column_text(row, c)),
-                                   static_cast<std::size_t>(sqlite3_column_bytes(row, c))));
-          break;
-        default:
-          break;
-      }
-    }
-    return checksum.value();
-  }
-
-  std::string path_;
-  sqlite3* database_ = nullptr;
-};
-
 class HostileFile : public testing::Test {
  protected:
   HostileFile() { writeFile(path_, readFile(kFile)); }
 
   void forge(const std::string& sql) {
     Forgery forgery(path_);
-    forgery.run(sql);
+    EXPECT_TRUE(forgery.run(sql)) << sql;
     forgery.sign();
   }
   /// The sentence that refuses the file. @param words that it has.
@@ -214,7 +127,7 @@ TEST_F(HostileFile, HasOtherTables) {
         "PRAGMA writable_schema = ON; UPDATE sqlite_master SET rootpage = 1 WHERE name = 'map'",
         "PRAGMA writable_schema = ON; UPDATE sqlite_master SET sql = NULL WHERE name = 'map'"}) {
     writeFile(path_, readFile(kFile));
-    Forgery(path_).run(sql);
+    EXPECT_TRUE(Forgery(path_).run(sql)) << sql;
     expectRefused("", sql);
   }
 }
@@ -279,7 +192,7 @@ TEST_F(HostileFile, HasRowsInTheSamePlace) {
     Forgery forgery(path_);
     page = kPage * static_cast<std::size_t>(
                        forgery.number("SELECT rootpage - 1 FROM sqlite_master WHERE name = 'drive'"));
-    forgery.run("UPDATE total SET drives = 600");
+    EXPECT_TRUE(forgery.run("UPDATE total SET drives = 600"));
     forgery.signTotals();
   }
   std::string bytes = readFile(path_);
@@ -308,7 +221,7 @@ TEST_F(HostileFile, ClaimsWhatItHasNoRoomFor) {
     writeFile(path_, readFile(kFile));
     {
       Forgery forgery(path_);
-      forgery.run(sql);
+      EXPECT_TRUE(forgery.run(sql)) << sql;
       forgery.signTotals();
     }
     expectRefused("", sql);
