@@ -5,7 +5,6 @@
 #include <png.h>
 
 #include <map>
-#include <tuple>
 
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/mapper_file.h"
@@ -94,17 +93,19 @@ TEST(MapStatistics, CountsVoxelsAsTheMapperSeesThem) {
   EXPECT_TRUE(box.max().isApprox(0.3 * Eigen::Vector3d(high.x + 1, high.y + 1, high.z + 1)));
 }
 
-/// The colour of what is nearest, looking along an axis: `right`, `up` and `towards` the viewer say which
-/// coordinate is which.
-using Axes = std::tuple<int, int, int>;  // of x 0, y 1, z 2; -1 - axis: reversed
+/// Which coordinates a viewer sees to the right, up and towards himself: x 0, y 1, z 2; -1 - axis: reversed.
+struct Axes {
+  int right, up, towards;
+};
 
 int coordinate(const GridIndex& i, int axis) {
   const int values[] = {i.x, i.y, i.z};
   return axis < 0 ? -values[-1 - axis] : values[axis];
 }
 
+/// The colours of what is nearest.
 Picture drawn(const SemanticMap& map, const MapStatistics& found, const Axes& axes, int pixels) {
-  const auto [right, up, towards] = axes;
+  const int right = axes.right, up = axes.up, towards = axes.towards;
   const int left = coordinate(found.low, right), below = coordinate(found.low, up);
   const int far = std::min(coordinate(found.low, towards), coordinate(found.high, towards));
   const int near = std::max(coordinate(found.low, towards), coordinate(found.high, towards));
