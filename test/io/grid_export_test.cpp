@@ -59,7 +59,8 @@ class ServedMap {
 TEST(GridExport, IsTheProjectedMap) {
   const TemporaryFolder folder;
   const SemanticMap map = randomMap(5, 80, 5);
-  const ClassTable& classes = *infoOf().classes;
+  const auto table = infoOf().classes;
+  const ClassTable& classes = *table;
   for (const ColumnRules& rules : {ColumnRules(), ColumnRules{-9.0, -5.0, HeightReference::kMap},
                                    ColumnRules{0.2, 3.0, HeightReference::kGround}}) {
     exportGrid(folder / "a map: \"1\".yaml", map, classes, rules);

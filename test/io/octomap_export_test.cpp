@@ -79,7 +79,7 @@ TEST(OctoMap, HoldsTheClassOfEachVoxel) {
     agreeing += std::abs(node.getLogOdds() - limited) < 1e-3;
     if (view.state == VoxelState::kFree) return !node.isColorSet();
     ++occupied;
-    const auto& color = infoOf().classes->find(view.label)->color;
+    const auto color = infoOf().classes->find(view.label)->color;
     return node.getColor() == octomap::ColorOcTreeNode::Color(color[0], color[1], color[2]);
   });
   EXPECT_GT(occupied, 1000u);

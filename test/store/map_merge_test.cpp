@@ -39,6 +39,13 @@ void* countedAllocation(std::size_t size) {
 void* operator new(std::size_t size) {
   return countedAllocation(size);
 }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return countedAllocation(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
 void operator delete(void* memory) noexcept {
   countedRelease(memory);
 }
