@@ -129,5 +129,29 @@ TEST_P(Killed, WhileItReplacesAFile) {
   killAgainAndAgain([this](const Report& report) { replace(report); }, 40);
 }
 
+TEST(LockedFile, IsRefusedToOtherProcesses) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  saveMap(path, infoOf(), {}, mapOf(1));
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const MapFile file(path, MapFile::Access::kUpdate);
+    [[maybe_unused]] const ssize_t size = write(ends[1], "x", 1);
+    for (;;) pause();
+  }
+  char opened = 0;
+  ASSERT_EQ(read(ends[0], &opened, 1), 1);
+  EXPECT_THROW(MapFile(path, MapFile::Access::kRead), MapFileInUse);
+  EXPECT_THROW(MapFile(path, MapFile::Access::kUpdate), MapFileInUse);
+  EXPECT_THROW(saveMap(path, infoOf(), {}, mapOf(2)), MapFileInUse);
+  ::kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  EXPECT_EQ(reference::contentOf(loadMap(path).map), reference::contentOf(mapOf(1)));
+  close(ends[0]);
+  close(ends[1]);
+}
+
 }  // namespace
 }  // namespace bki_mapping
