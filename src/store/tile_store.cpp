@@ -216,6 +216,10 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
       any |= !job->done;
     }
     if (any) change.commit();
+  } catch (const MapFileLateCommit&) {  // the last trial has succeeded after all
+    jobs.resize(last_trial_);
+    bytes = 0;
+    for (const Job* job : jobs) bytes += job->bytes;
   } catch (const std::bad_alloc&) {
     fault = "the computer's memory does not suffice to write to " + file_->path();
   } catch (const std::exception& error) {
@@ -234,6 +238,7 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
     waiting_bytes_ -= bytes;
     ended_ += jobs.size();
   } else {
+    last_trial_ = jobs.size();
     ++failures_;
   }
   tried_.notify_all();

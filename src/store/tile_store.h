@@ -100,7 +100,8 @@ class TileStore {
   std::string fault_;
   std::size_t waiting_bytes_ = 0;
   Call called_ = 0, ended_ = 0;
-  std::size_t failures_ = 0;  ///< number of trials that failed
+  std::size_t last_trial_ = 0;  ///< number of jobs in the last trial that failed
+  std::size_t failures_ = 0;    ///< number of trials that failed
   bool closing_ = false;
   std::thread thread_;  ///< last, so that it starts when all else is there
 };

@@ -237,6 +237,20 @@ TEST(MapKeeper, SavedIsWhatTheFileHoldsWhateverComesThen) {
   }
 }
 
+TEST(MapKeeper, BringsBackWhatWasSavedBeforeItLeft) {
+  const TemporaryFolder folder;
+  std::vector<Scan> scans = drive();
+  scans.resize(20);
+  Kept kept(folder / "map.bkm", "a");
+  for (const Scan& scan : scans) kept.integrate(scan, 1000.0);
+  kept.keeper.save().get();
+  kept.keeper.moveTo({{5000.0, 0.0, 0.0}, kWindow});
+  EXPECT_EQ(kept.mapper.map().size(), 0u);
+  kept.keeper.moveTo({Eigen::Vector3d::Zero(), 1000.0});
+  kept.keeper.waitForTiles();
+  EXPECT_TRUE(same(contentOf(kept.mapper.map()), contentOfAll(scans)));
+}
+
 TEST(MapKeeper, KeepsWithinMemory) {
   const TemporaryFolder folder;
   const std::vector<Scan> scans = drive();
