@@ -36,6 +36,8 @@ LEFT_OUT = {
                      'scripts/test_on --arm64 trixie'), 'installs and builds in a chroot, for many minutes'),
     'scripts/fuzz --seconds 14400 --seed 7': 'builds with sanitizers; scripts/test runs hostile_test',
     'scripts/fuzz --seed 7 --settings two_lidars': 'the same',
+    'scripts/fuzz --target map_file --seconds 14400': 'builds with Clang and runs for hours; ctest runs the fixed inputs',
+    'scripts/fuzz --target tile_codec --seconds 14400': 'the same',
     'roslaunch bki_mapping mapping.launch body_box:="-0.6 -0.4 -0.5 0.6 0.4 0.3" body_frame:=base_link':
         'needs the frames of a robot, which body_box_rostest has',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
