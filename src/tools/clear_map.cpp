@@ -45,14 +45,12 @@ Eigen::AlignedBox3d parseBox(const std::string& text) {
 }
 
 int clearFile(const po::variables_map& given) {
-  const auto files =
-      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
-  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
+  const std::string path = tools::onlyMapFile(given);
   if (!given.count("box")) throw std::invalid_argument("--box \"X0 Y0 Z0 X1 Y1 Z1\" is missing (see --help)");
-  const std::string output = given.count("output") ? given["output"].as<std::string>() : files[0];
+  const std::string output = given.count("output") ? given["output"].as<std::string>() : path;
   if (!isMapFileName(output))
     throw std::invalid_argument("the cleared map, " + output + ", must end in .bkm");
-  const ClearedFile cleared = clearBoxOfFile(files[0], parseBox(given["box"].as<std::string>()), output);
+  const ClearedFile cleared = clearBoxOfFile(path, parseBox(given["box"].as<std::string>()), output);
   std::cout << output << ": cleared in " << cleared.blocks << " blocks of " << cleared.tiles << " tiles\n";
   return 0;
 }

@@ -48,9 +48,7 @@ ColumnRules columnRules(const po::variables_map& given) {
 }
 
 int exportFile(const po::variables_map& given) {
-  const auto files =
-      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
-  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
+  const std::string path = tools::onlyMapFile(given);
   if (!given.count("output")) throw std::invalid_argument("--output FILE is missing (see --help)");
   const std::string output = given["output"].as<std::string>();
   const std::string ending = std::filesystem::path(output).extension().string();
@@ -62,9 +60,9 @@ int exportFile(const po::variables_map& given) {
   checkWritable(output);
   if (ending == ".yaml") checkWritable(gridImagePath(output));
 
-  MapFile file(files[0], MapFile::Access::kRead);
+  MapFile file(path, MapFile::Access::kRead);
   const ClassTable& classes = *file.info().classes;
-  SemanticMap map = emptyMapWithGains(files[0], file.info());
+  SemanticMap map = emptyMapWithGains(path, file.info());
   for (const TileEntry& tile : file.tiles()) file.addTileTo(map, {tile.index});
   if (ending == ".yaml") {
     exportGrid(output, map, classes, rules);

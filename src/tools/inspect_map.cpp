@@ -152,17 +152,15 @@ void draw(MapFile& file, SemanticMap& empty_map, const MapStatistics& found, con
 }
 
 int inspect(const po::variables_map& given) {
-  const auto files =
-      given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
-  if (files.size() != 1) throw std::invalid_argument("there must be one map file (see --help)");
-  MapFile file(files[0], MapFile::Access::kRead);
+  const std::string path = tools::onlyMapFile(given);
+  MapFile file(path, MapFile::Access::kRead);
   if (given["parameters"].as<bool>()) {
     std::cout << file.info().parameters;
     return 0;
   }
   const std::string top = pictureFile(given, "top"), profile = pictureFile(given, "profile");
   if (given.count("json")) checkWritable(given["json"].as<std::string>());
-  SemanticMap empty_map = emptyMapWithGains(files[0], file.info());
+  SemanticMap empty_map = emptyMapWithGains(path, file.info());
   const MapStatistics found = readStatistics(file, empty_map);
   print(std::cout, file, found);
   if (given.count("json")) {

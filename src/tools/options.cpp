@@ -69,6 +69,14 @@ std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::strin
   return given;
 }
 
+std::string onlyMapFile(const po::variables_map& given) {
+  if (given.count("files") > 0) {
+    const auto files = given["files"].as<std::vector<std::string>>();
+    if (files.size() == 1) return files[0];
+  }
+  throw std::invalid_argument("there must be one map file (see --help)");
+}
+
 po::options_description mapperOptions() {
   po::options_description options("Mapper");
   options.add_options()("classes",

@@ -37,6 +37,10 @@ po::typed_value<double>* realOption(const std::string& option, double least,
 /// The value of a countOption.
 std::size_t count(const po::variables_map& given, const std::string& name);
 
+/// The only one of the words that parse() has found as "files". @throws std::invalid_argument if there is
+/// another number of them.
+std::string onlyMapFile(const po::variables_map& given);
+
 /// Options of all programs with a mapper: --classes, --config, --set, --threads.
 po::options_description mapperOptions();
 /// The configuration that these options give. Prints a warning to standard error for questionable settings.

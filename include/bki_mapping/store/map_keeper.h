@@ -34,7 +34,8 @@ class MapKeeper {
   /// Opens a map file, or creates it. @param mapper with an empty map; must outlive this object, and be
   /// changed only as the functions here say. @param info what the mapper maps. @param drive that begins.
   /// @throws MapFileError if the file cannot be opened or its map has another grid or frame (checkFits);
-  /// std::invalid_argument if it holds a drive with this id already.
+  /// std::invalid_argument if it holds a drive with this id already; std::logic_error if the map is not
+  /// empty.
   MapKeeper(SemanticMapper& mapper, const std::string& path, const MapInfo& info, const DriveRecord& drive);
   /// As close().
   ~MapKeeper();
