@@ -1,6 +1,7 @@
 /// @file Counter-based random numbers: each is a function of its keys, whichever thread draws it and when.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace bki_mapping {
@@ -33,6 +34,13 @@ class CounterRandom {
 inline double counterRandom(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam,
                             std::uint64_t sample) {
   return CounterRandom::draw(CounterRandom(seed, scan).beamKey(beam), sample);
+}
+
+/// @return a standard normal number that is a function of the three keys (Box and Muller 1958).
+inline double counterNormal(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam) {
+  constexpr double kTwoPi = 6.28318530717958647692;
+  const double u = 1.0 - counterRandom(seed, scan, beam, 0), v = counterRandom(seed, scan, beam, 1);
+  return std::sqrt(-2.0 * std::log(u)) * std::cos(kTwoPi * v);
 }
 
 }  // namespace bki_mapping

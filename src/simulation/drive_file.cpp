@@ -37,7 +37,7 @@ void forEachSetting(Config& config, Visit&& visit) {
 void writeDriveFile(const std::string& folder, const DriveConfig& config) {
   YAML::Emitter out;
   out.SetDoublePrecision(17);
-  out << YAML::BeginMap;
+  out << YAML::BeginMap << YAML::Key << "scene" << YAML::Value << nameOf(config.scene);
   forEachSetting(
       config, [&](const char* name, const auto& value) { out << YAML::Key << name << YAML::Value << value; });
   out << YAML::EndMap;
@@ -50,11 +50,12 @@ std::optional<DriveConfig> readDriveFile(const std::string& folder) {
   try {
     const YAML::Node file = loadYamlFile(path);
     DriveConfig config;
+    config.scene = sceneKindNamed(file["scene"].as<std::string>());
     forEachSetting(config, [&](const char* name, auto& value) {
       value = file[name].template as<std::decay_t<decltype(value)>>();
     });
     return config;
-  } catch (const YAML::Exception& fault) {
+  } catch (const std::exception& fault) {
     throw std::runtime_error(path + " cannot be read (" + fault.what() +
                              "); write the drive again with simulate_drive");
   }

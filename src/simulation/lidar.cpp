@@ -18,12 +18,6 @@ struct Return {
   std::uint32_t label = 0;
 };
 
-/// Standard normal random number from a counter (Box and Muller 1958).
-double normal(std::uint64_t seed, std::uint64_t scan, std::uint64_t beam) {
-  const double u = 1.0 - counterRandom(seed, scan, beam, 0), v = counterRandom(seed, scan, beam, 1);
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * kPi * v);
-}
-
 Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const Eigen::Vector3d& origin,
             const Eigen::Vector3d& direction, double time, double max_range) {
   Return nearest{max_range, 0};
@@ -77,8 +71,7 @@ const DriveConfig& checked(const DriveConfig& config) {
     throw std::invalid_argument(std::string(l.name) + " is " + numberText(l.value) + ", but must be from " +
                                 numberText(l.least) + " to " + numberText(l.most));
   }
-  if (!(config.speed * config.scans / lidar.rate <=
-        1e6)) {  // before makeStreet allocates a street of this length
+  if (!(config.speed * config.duration() <= 1e6)) {  // before makeScene allocates a street of this length
     throw std::invalid_argument(
         "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
   }
@@ -86,6 +79,23 @@ const DriveConfig& checked(const DriveConfig& config) {
 }
 
 }  // namespace
+
+LidarConfig lidarNamed(const std::string& name) {
+  LidarConfig lidar;
+  const auto rows = [&](int beams, double lowest, double highest) {
+    lidar.beams = beams;
+    lidar.lowest = lowest * kPi / 180.0;
+    lidar.highest = highest * kPi / 180.0;
+  };
+  if (name == "hdl32") {
+    rows(32, -30.67, 10.67);
+  } else if (name == "vlp16") {
+    rows(16, -15.0, 15.0);
+  } else if (name != "hdl64") {
+    throw std::invalid_argument("there is no lidar " + name + "; known lidars: hdl64, hdl32, vlp16");
+  }
+  return lidar;
+}
 
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
                    double time, std::uint64_t scan) {
@@ -112,7 +122,8 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
   SequenceFrame frame;
   for (std::size_t r = 0; r < returns.size(); ++r) {
     if (returns[r].range == 0.0) continue;
-    const double range = std::max(0.01, returns[r].range + lidar.range_noise * normal(lidar.seed, scan, r));
+    const double range =
+        std::max(0.01, returns[r].range + lidar.range_noise * counterNormal(lidar.seed, scan, r));
     const bool wrong = !scene.shapes.empty() && counterRandom(lidar.seed, scan, r, 2) < lidar.label_noise;
     frame.points.push_back((directionOf(r / beams, r % beams) * range).cast<float>());
     frame.remissions.push_back(0.5f);
@@ -124,8 +135,8 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
 
 Drive::Drive(const DriveConfig& config)
     : config_(checked(config)),
-      scene_(makeStreet(config.speed * static_cast<double>(config.scans) / config.lidar.rate + 110.0,
-                        config.seed)) {}
+      scene_(makeScene(config.scene, config.speed * config.duration() + 110.0, config.duration(),
+                       config.speed, config.seed)) {}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
   // In the right lane, weaving slightly, 1.73 m above the ground as in KITTI.

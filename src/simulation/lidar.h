@@ -18,6 +18,11 @@ struct LidarConfig {
   std::uint64_t seed = 1;     ///< of the noise
 };
 
+/// The rows of a sensor: "hdl64" (here the default, as spread out in KITTI), "hdl32" (+10.67 to -30.67
+/// degrees) or "vlp16" (15 to -15 degrees), after Velodyne's data sheets. @throws std::invalid_argument if
+/// there is no sensor of this name.
+LidarConfig lidarNamed(const std::string& name);
+
 /// Simulates one revolution without motion distortion: all beams are taken at the same time and pose.
 /// @param time [s]. @param scan index of the scan, which seeds its noise.
 /// @return points in the sensor frame with raw SemanticKITTI labels; the caller sets pose and stamp.
@@ -30,9 +35,12 @@ struct DriveConfig {
   double speed = 8.0;      ///< [m/s]
   std::uint64_t seed = 1;  ///< of the street
   LidarConfig lidar;
+  SceneKind scene = SceneKind::kStreet;
+
+  double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };
 
-/// A drive along the street of makeStreet.
+/// A drive along the street of makeScene.
 class Drive {
  public:
   /// @throws std::invalid_argument if a setting is out of its limits.

@@ -43,6 +43,17 @@ void clipToQuadric(double a, double b, double c, double& enter, double& leave) {
 
 }  // namespace
 
+Eigen::Vector3d Shape::centreAt(double time) const {
+  Eigen::Vector3d at = centre;
+  double begin = 0.0;
+  for (const Leg& leg : legs) {
+    if (time <= leg.until) return at + (time - begin) * leg.velocity;
+    at += (leg.until - begin) * leg.velocity;
+    begin = leg.until;
+  }
+  return at + (time - begin) * velocity;
+}
+
 bool Shape::contains(const Eigen::Vector3d& point, double time) const {
   const Eigen::Array3d r = intoAxes(point - centreAt(time), yaw).cwiseQuotient(half).array();
   switch (type) {

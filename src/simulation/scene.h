@@ -4,13 +4,21 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace bki_mapping::simulation {
 
 enum class ShapeType { kBox, kCylinder, kEllipsoid };
 
-/// A shape that moves with constant velocity. Boxes may be rotated about the vertical axis.
+/// A part of a way, with constant velocity.
+struct Leg {
+  double until = 0.0;                                  ///< when it ends [s]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
+};
+
+/// A shape that moves with constant velocity, after other legs if it has some. Boxes may be rotated about the
+/// vertical axis.
 struct Shape {
   ShapeType type = ShapeType::kBox;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< at time 0, world frame [m]
@@ -18,11 +26,11 @@ struct Shape {
   /// semi-axes.
   Eigen::Vector3d half = Eigen::Vector3d::Ones();
   double yaw = 0.0;                                    ///< of boxes [rad]
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< after the last leg [m/s]
   std::uint32_t label = 0;                             ///< raw SemanticKITTI label
+  std::vector<Leg> legs = {};                          ///< by rising time; the first begins at time 0
 
-  Eigen::Vector3d centreAt(double time) const { return centre + time * velocity; }
-  bool moves() const { return !velocity.isZero(); }
+  Eigen::Vector3d centreAt(double time) const;
   bool contains(const Eigen::Vector3d& point, double time) const;
   /// Distance along a ray to the surface [m]; nullopt if the ray misses, or starts inside of the shape.
   /// @param direction unit vector.
@@ -46,8 +54,21 @@ struct Scene {
   std::optional<std::uint32_t> labelAt(const Eigen::Vector3d& point, double time) const;
 };
 
-/// A street along x with buildings, fences, trees, poles, signs, parked and moving cars and pedestrians.
-/// @param length of the street, which begins at x = -30 m [m]. @param seed equal seeds give equal streets.
-Scene makeStreet(double length, std::uint64_t seed);
+/// What a street is full of.
+enum class SceneKind {
+  kStreet,   ///< cars that pass or are parked, and a few pedestrians
+  kTraffic,  ///< stop-and-go traffic in both directions, and parked cars of which some drive off
+  kCrowd,    ///< many pedestrians, who walk and stand, and cyclists
+};
+/// @throws std::invalid_argument if there is no kind of this name.
+SceneKind sceneKindNamed(const std::string& name);
+/// "street", "traffic" or "crowd".
+std::string nameOf(SceneKind kind);
+
+/// A street along x with buildings, fences, trees, poles, signs, and what its kind brings.
+/// @param length of the street, which begins at x = -30 m [m]. @param duration time during which somebody
+/// looks [s]. @param speed of the sensor, which drives at y = -1.5 m and is at x = 0 at time 0 [m/s]. @param
+/// seed equal arguments give equal streets.
+Scene makeScene(SceneKind kind, double length, double duration, double speed, std::uint64_t seed);
 
 }  // namespace bki_mapping::simulation

@@ -19,25 +19,44 @@ po::options_description options() {
   const simulation::LidarConfig lidar;
   po::options_description options("Options");
   options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
-      "scans", value<int>("N", 100), "number of scans")(
-      "beams", value("N", lidar.beams), "rows of the lidar")("columns", value("N", lidar.columns),
-                                                             "azimuth steps per revolution")(
+      "scene", value<std::string>("KIND", "street"),
+      "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
+      "many "
+      "pedestrians and cyclists")("scans", value<int>("N", 100), "number of scans")(
+      "lidar", value<std::string>("NAME", "hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
+      "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
+      "columns", value("N", lidar.columns), "azimuth steps per revolution")(
       "rate", value("HZ", lidar.rate), "revolutions per second")("max-range", value("M", lidar.max_range),
                                                                  "range beyond which there is no return [m]")(
       "range-noise", value("M", lidar.range_noise), "standard deviation of the ranges [m]")(
       "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
-      "speed", value("M/S", 8.0), "speed of the drive [m/s]")(
+      "speed", po::value<double>()->value_name("M/S"),
+      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
       "seed of the street and of the noise");
   return options;
 }
 
+/// [m/s]
+double usualSpeed(simulation::SceneKind scene) {
+  switch (scene) {
+    case simulation::SceneKind::kTraffic:
+      return 3.0;
+    case simulation::SceneKind::kCrowd:
+      return 2.0;
+    default:
+      return 8.0;
+  }
+}
+
 simulation::DriveConfig driveConfig(const po::variables_map& given) {
   simulation::DriveConfig drive;
   drive.scans = given["scans"].as<int>();
-  drive.speed = given["speed"].as<double>();
+  drive.scene = simulation::sceneKindNamed(given["scene"].as<std::string>());
+  drive.speed = given.count("speed") ? given["speed"].as<double>() : usualSpeed(drive.scene);
   drive.seed = tools::count(given, "seed");
-  drive.lidar.beams = given["beams"].as<int>();
+  drive.lidar = simulation::lidarNamed(given["lidar"].as<std::string>());
+  if (given.count("beams")) drive.lidar.beams = given["beams"].as<int>();
   drive.lidar.columns = given["columns"].as<int>();
   drive.lidar.rate = given["rate"].as<double>();
   drive.lidar.max_range = given["max-range"].as<double>();

@@ -36,6 +36,63 @@ TEST(Shape, HitsOfABoxACylinderAndAnEllipsoid) {
   EXPECT_FALSE(ball.contains({10, 0, 0}, 3.0));
 }
 
+TEST(Shape, GoesLegByLeg) {
+  Shape car{ShapeType::kBox, {10, 0, 0}, {2, 1, 1}};
+  car.legs = {{2.0, Eigen::Vector3d::Zero()}, {4.0, {0, 3, 0}}};
+  car.velocity = {1, 0, 0};
+  EXPECT_EQ(car.centreAt(1.5), Eigen::Vector3d(10, 0, 0));
+  EXPECT_EQ(car.centreAt(3.0), Eigen::Vector3d(10, 3, 0));
+  EXPECT_EQ(car.centreAt(4.0), Eigen::Vector3d(10, 6, 0));
+  EXPECT_EQ(car.centreAt(9.0), Eigen::Vector3d(15, 6, 0));
+}
+
+/// The distances that the shapes with a label are from where they were at time 0, at each of the given times.
+std::vector<std::vector<double>> waysOf(const Scene& scene, std::uint32_t label,
+                                        const std::vector<double>& times) {
+  std::vector<std::vector<double>> ways;
+  for (const Shape& shape : scene.shapes) {
+    if (shape.label != label) continue;
+    ways.emplace_back();
+    for (const double time : times) ways.back().push_back((shape.centreAt(time) - shape.centreAt(0)).norm());
+  }
+  return ways;
+}
+
+TEST(Scene, TrafficWaitsAndGoesAndParkedCarsDriveOff) {
+  const Scene scene = makeScene(SceneKind::kTraffic, 200.0, 30.0, 3.0, 1);
+  int waiting = 0, driven_off = 0;
+  for (const auto& way : waysOf(scene, 252, {2.9, 7.0, 14.0, 30.0})) {
+    waiting += way[2] > 0.0 && way[0] < way[1];
+    driven_off += way[0] == 0.0 && way[3] > 10.0;
+    EXPECT_GT(way[3], 0.0) << "what is labelled as moving moves";
+  }
+  EXPECT_GT(waiting, 20);
+  EXPECT_GT(driven_off, 3);
+  for (const auto& way : waysOf(scene, 10, {30.0})) EXPECT_EQ(way[0], 0.0);
+  // The sensor drives at y = -1.5 and runs into nobody.
+  for (double time = 0.0; time < 30.0; time += 0.1) {
+    EXPECT_FALSE(scene.labelAt({3.0 * time, -1.5, 1.0}, time)) << time;
+  }
+}
+
+TEST(Scene, ACrowdStandsAndWalks) {
+  const Scene scene = makeScene(SceneKind::kCrowd, 150.0, 30.0, 2.0, 1);
+  EXPECT_GT(waysOf(scene, 254, {1.0}).size(), 100u);
+  EXPECT_GT(waysOf(scene, 30, {1.0}).size(), 5u);
+  EXPECT_GT(waysOf(scene, 253, {1.0}).size(), 5u);
+  for (const auto& way : waysOf(scene, 254, {30.0})) EXPECT_GT(way[0], 0.0);
+}
+
+TEST(Lidar, IsKnownByName) {
+  EXPECT_EQ(lidarNamed("hdl64").beams, 64);
+  EXPECT_EQ(lidarNamed("hdl32").beams, 32);
+  const LidarConfig lidar = lidarNamed("vlp16");
+  EXPECT_EQ(lidar.beams, 16);
+  EXPECT_NEAR(lidar.highest - lidar.lowest, M_PI / 6, 1e-12);
+  EXPECT_THROW(lidarNamed("vlp17"), std::invalid_argument);
+  EXPECT_THROW(sceneKindNamed("desert"), std::invalid_argument);
+}
+
 TEST(Lidar, BeamsEndWhereTheWorldBegins) {
   const Drive drive({5, 8.0, 3, smallLidar()});
   const SequenceFrame frame = drive.frame(4);
