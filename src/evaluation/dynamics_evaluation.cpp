@@ -30,20 +30,21 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
   ++added_;
 }
 
-std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map) const {
+std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,
+                                                                        const Taken& taken) const {
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
   for (const Voxel& voxel : voxels_) {
     const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
     if (voxel.ground_points + voxel.standing_points + voxel.other_points > 0) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
-    } else if (voxel.early_moving_points > 0 && !voxel.hit_late) {
+    } else if (voxel.early_moving_points > 0 && !mayBeOccupied(voxel, taken)) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kLeft : VoxelFate::kForgotten);
     }
   }
   return fates;
 }
 
-DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
+DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const Taken& taken) const {
   DynamicsQuality quality;
   for (const Voxel& voxel : voxels_) {
     const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
@@ -58,7 +59,7 @@ DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map) const {
     } else {
       quality.floor_holes += voxel.ground_points > 0;
     }
-    if (voxel.hit_late) continue;
+    if (voxel.early_moving_points == 0 || mayBeOccupied(voxel, taken)) continue;
     quality.moving_points += voxel.early_moving_points;
     if (!occupied) quality.moving_removed += voxel.early_moving_points;
   }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -26,7 +27,7 @@ struct DynamicsQuality {
   std::size_t floor_voxels = 0;    ///< voxels with static points of ground
   std::size_t floor_holes = 0;     ///< of these, those that are not occupied
   std::size_t moving_points = 0;   ///< points of moving objects in the first half of the scans, in voxels
-                                   ///< that no point of the last scans hits
+                                   ///< that no point of the last scans hits and that are not taken
   std::size_t moving_removed = 0;  ///< of these, those in voxels that are not occupied
 
   double staticAccuracy() const { return fraction(static_kept, static_points); }  ///< SA
@@ -62,6 +63,10 @@ class DynamicsEvaluation {
   /// SemanticKITTI's raw labels of moving objects, 252 to 259.
   static std::set<std::uint32_t> movingOfSemanticKitti();
 
+  /// Whether something that can move is in a voxel at the end, where that is known. Such a voxel need not be
+  /// cleared.
+  using Taken = std::function<bool(const VoxelIndex&)>;
+
   /// @param scans number of scans that will be added. @param late voxels hit in this many last scans need not
   /// be cleared.
   DynamicsEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving, std::size_t scans,
@@ -72,9 +77,10 @@ class DynamicsEvaluation {
   /// table. Ids of the class table do not say what moves: points labelled by id all count as static.
   void add(const Scan& scan, const ClassTable& classes);
 
-  DynamicsQuality compare(const SemanticMap& map) const;
+  /// @param taken may be empty.
+  DynamicsQuality compare(const SemanticMap& map, const Taken& taken = {}) const;
   /// The outcome for each voxel that has points of static or of early moving objects.
-  std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map) const;
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map, const Taken& taken = {}) const;
 
  private:
   struct Voxel {
@@ -82,6 +88,10 @@ class DynamicsEvaluation {
     std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
     bool hit_late = false;
   };
+
+  static bool mayBeOccupied(const Voxel& voxel, const Taken& taken) {
+    return voxel.hit_late || (taken && taken(voxel.index));
+  }
 
   GridGeometry geometry_;
   std::set<std::uint32_t> moving_;

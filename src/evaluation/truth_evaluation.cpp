@@ -72,6 +72,10 @@ bool TruthEvaluation::isMovable(std::uint32_t raw_label) const {
   return id && classes_.find(*id)->dynamic;
 }
 
+bool TruthEvaluation::isTaken(const VoxelIndex& index, double time) const {
+  return truth_.isNear(index, time, 0.0, [this](std::uint32_t label) { return isMovable(label); });
+}
+
 bool TruthEvaluation::isGhost(const VoxelIndex& index, double time) const {
   for (double ago = 0.0; ago < kGhostAge + 0.5 * kGhostStep; ago += kGhostStep) {
     const auto movable = [this](std::uint32_t label) { return isMovable(label); };

@@ -59,6 +59,8 @@ class TruthEvaluation {
   TruthEvaluation(VoxelTruth truth, const ClassTable& classes)
       : truth_(std::move(truth)), geometry_(truth_.geometry()), classes_(classes) {}
 
+  /// Whether something that can move is in a voxel. @param time since the start of the drive [s].
+  bool isTaken(const VoxelIndex& index, double time) const;
   /// Adds the next scan: all its hits, and the voxels that every 16th beam crosses.
   void add(const Scan& scan);
   /// Counts the ghosts in the map at a time. @param time since the start of the drive [s].

@@ -63,7 +63,7 @@ struct Evaluation {
 
   tools::MapQuality compare(const SemanticMap& map) const {
     tools::MapQuality quality;
-    quality.dynamics = dynamics.compare(map);
+    quality.dynamics = dynamics.compare(map, taken());
     quality.semantics = semantics.compare(map);
     if (truth) quality.truth = truth->compare(map, end);
     quality.labels = labels;
@@ -72,6 +72,12 @@ struct Evaluation {
     forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
       if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
     });
+  /// What can move and is in a voxel at the end, where the truth is known.
+  DynamicsEvaluation::Taken taken() const {
+    if (!truth) return {};
+    return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
+  }
+
     return quality;
   }
 
@@ -83,7 +89,7 @@ struct Evaluation {
       csv += numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
     };
     constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
-    for (const auto& [voxel, fate] : dynamics.fates(map)) add(voxel, kNames[static_cast<int>(fate)]);
+    for (const auto& [voxel, fate] : dynamics.fates(map, taken())) add(voxel, kNames[static_cast<int>(fate)]);
     for (const VoxelIndex& voxel : semantics.wrongVoxels(map)) add(voxel, "wrong class");
     if (!truth) return csv;
     for (const VoxelIndex& voxel : truth->ghosts(map, end)) add(voxel, "ghost");

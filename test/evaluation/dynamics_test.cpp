@@ -58,6 +58,14 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_DOUBLE_EQ(quality.dynamicAccuracy(), 2.0 / 3.0);
   EXPECT_DOUBLE_EQ(quality.accuracy(), std::sqrt(0.5));
   EXPECT_DOUBLE_EQ(quality.harmonicAccuracy(), 12.0 / 17.0);
+
+  // A voxel that something is in at the end need not be cleared.
+  const auto taken = [](const VoxelIndex& voxel) { return voxel.x == 7; };
+  const DynamicsQuality known = evaluation.compare(map, taken);
+  EXPECT_EQ(known.moving_points, 2u);
+  EXPECT_EQ(known.moving_removed, 2u);
+  EXPECT_EQ(known.static_kept, 3u);
+  for (const auto& [voxel, fate] : evaluation.fates(map, taken)) EXPECT_NE(fate, VoxelFate::kLeft) << voxel.x;
 }
 
 TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
