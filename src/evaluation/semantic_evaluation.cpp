@@ -5,8 +5,6 @@
 #include <limits>
 #include <set>
 
-#include "parallel/counter_random.h"
-
 namespace bki_mapping {
 namespace {
 
@@ -147,28 +145,6 @@ std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map) 
     if (view.state == VoxelState::kOccupied && points_[n].count(view.label) == 0) wrong.push_back(voxels_[n]);
   }
   return wrong;
-}
-
-std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& classes, double rate,
-                                          std::uint64_t seed) {
-  std::vector<std::uint32_t> labels = scan.labels;
-  std::vector<const SemanticClass*> others;
-  for (const SemanticClass& c : classes.classes()) {
-    if (!c.unlabelled && (scan.labels_are_ids || !c.raw.empty())) others.push_back(&c);
-  }
-  for (std::size_t i = 0; i < labels.size() && others.size() > 1; ++i) {
-    if (counterRandom(seed, scan.stamp, i, 0) >= rate) continue;
-    const auto own = classes.classOf(labels[i], labelValues(scan));
-    const double u = counterRandom(seed, scan.stamp, i, 1);
-    // Draw among the classes other than its own.
-    const auto is_own = [&](const SemanticClass* c) { return own == c->id; };
-    const auto mine = std::find_if(others.begin(), others.end(), is_own);
-    const std::size_t choices = others.size() - (mine == others.end() ? 0 : 1);
-    auto chosen = static_cast<std::size_t>(u * static_cast<double>(choices));
-    if (mine != others.end() && chosen >= static_cast<std::size_t>(mine - others.begin())) ++chosen;
-    labels[i] = scan.labels_are_ids ? others[chosen]->id : others[chosen]->raw.front();
-  }
-  return labels;
 }
 
 }  // namespace bki_mapping

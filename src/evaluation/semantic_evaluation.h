@@ -91,10 +91,4 @@ class SemanticEvaluation {
   std::vector<std::map<ClassId, std::size_t>> points_;  ///< in each voxel, by true class
 };
 
-/// The labels of a scan with errors: each is replaced, with probability `rate`, by that of another class of
-/// the table, drawn uniformly. Equal seeds and stamps give equal labels.
-/// @param rate 0 to 1.
-std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& classes, double rate,
-                                          std::uint64_t seed);
-
 }  // namespace bki_mapping

@@ -2,6 +2,7 @@
 // calibration.
 #include <filesystem>
 #include <iostream>
+#include <sstream>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/sequence.h"
@@ -9,6 +10,8 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "core/quantile.h"
+#include "evaluation/label_noise.h"
+#include "evaluation/pose_noise.h"
 #include "evaluation/quality_report.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
@@ -31,9 +34,17 @@ po::options_description options() {
       "late", tools::countOption("--late", 0)->value_name("N")->default_value(3),
       "voxels hit in the last N scans do not count for DA")(
       "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("FRACTION")->default_value(0.0),
-      "fraction of the labels replaced by wrong ones")(
+      "probability that a label is replaced by a wrong one")(
+      "label-errors", po::value<std::string>()->value_name("KIND")->default_value("even"),
+      "which labels --label-noise replaces: even, similar, objects, borders or far")(
+      "predictions", po::value<std::string>()->value_name("FOLDER"),
+      "name of a folder with predicted labels: these are mapped, and those of --labels judge")(
+      "pose-noise", po::value<std::string>()->value_name("M,DEG"),
+      "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
+      "pose-drift", po::value<std::string>()->value_name("M,DEG"),
+      "the same for errors of each step from pose to pose, which add up")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
-      "seed of --label-noise");
+      "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -61,6 +72,12 @@ struct Evaluation {
     }
   }
 
+  /// What can move and is in a voxel at the end, where the truth is known.
+  DynamicsEvaluation::Taken taken() const {
+    if (!truth) return {};
+    return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
+  }
+
   tools::MapQuality compare(const SemanticMap& map) const {
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map, taken());
@@ -72,12 +89,6 @@ struct Evaluation {
     forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
       if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
     });
-  /// What can move and is in a voxel at the end, where the truth is known.
-  DynamicsEvaluation::Taken taken() const {
-    if (!truth) return {};
-    return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
-  }
-
     return quality;
   }
 
@@ -97,6 +108,26 @@ struct Evaluation {
   }
 };
 
+std::optional<PoseNoise> poseNoise(const po::variables_map& given) {
+  if (given.count("pose-noise") && given.count("pose-drift")) {
+    throw std::invalid_argument("--pose-noise and --pose-drift are both given; keep one");
+  }
+  const bool drifts = given.count("pose-drift");
+  const std::string name = drifts ? "pose-drift" : "pose-noise";
+  if (!given.count(name)) return std::nullopt;
+  const std::string text = given[name].as<std::string>();
+  std::istringstream in(text);
+  double metres = -1.0, degrees = -1.0;
+  char comma = 0;
+  in >> metres >> comma >> degrees;
+  if (!in || !(in >> std::ws).eof() || comma != ',' || !(metres >= 0.0) || !(degrees >= 0.0)) {
+    throw std::invalid_argument("--" + name + " is " + text +
+                                ", but must be two numbers M,DEG of at least 0, such as 0.05,0.3");
+  }
+  return PoseNoise(drifts ? PoseNoise::Kind::kDrift : PoseNoise::Kind::kWhite, metres,
+                   degrees * 3.14159265358979323846 / 180.0, tools::count(given, "noise-seed"));
+}
+
 void drawErrors(const std::string& picture, const std::string& rows) {
   const std::filesystem::path path(picture);
   const std::string table = std::filesystem::path(path).replace_extension(".csv").string();
@@ -108,7 +139,13 @@ int evaluate(const po::variables_map& given) {
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
-  const double noise = given["label-noise"].as<double>();
+  const LabelNoise label_noise{given["label-noise"].as<double>(),
+                               labelErrorsNamed(given["label-errors"].as<std::string>()),
+                               tools::count(given, "noise-seed")};
+  std::optional<PoseNoise> pose_noise = poseNoise(given);
+  std::optional<Sequence> predictions;
+  if (given.count("predictions"))
+    predictions.emplace(sequence.folder(), given["predictions"].as<std::string>());
   if (given.count("errors") &&
       std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
     throw std::invalid_argument("--errors must end in .png");
@@ -121,18 +158,22 @@ int evaluate(const po::variables_map& given) {
                                            last - first, tools::count(given, "late")),
                         SemanticEvaluation(geometry), std::nullopt};
   std::optional<simulation::Drive> drive;
-  if (const auto config = simulation::readDriveFile(given["sequence"].as<std::string>())) {
+  const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
+  // A map that drifts is in no frame of the true scene.
+  if (config && !given.count("pose-drift")) {
     drive.emplace(*config);
     evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
   }
   std::vector<double> times;
   for (std::size_t i = first; i < last; ++i) {
-    Scan scan = sequence.read(i).scan();
-    scan.labels_are_ids = mapper.config().label_values == LabelValues::kId;
-    Scan input = scan;
-    if (noise > 0.0) {
-      input.labels = withLabelNoise(scan, mapper.classes(), noise, tools::count(given, "noise-seed"));
-    }
+    SequenceFrame frame = sequence.read(i);
+    Scan scan = frame.scan();
+    if (pose_noise) frame.T_map_sensor = pose_noise->next(frame.T_map_sensor);
+    Scan input = frame.scan();
+    if (given.count("pose-drift")) scan = input;
+    scan.labels_are_ids = input.labels_are_ids = mapper.config().label_values == LabelValues::kId;
+    if (predictions) input.labels = predictions->read(i).labels;
+    input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     times.push_back(mapper.integrate(input).totalMs());
     evaluation.add(scan, input.labels, mapper.classes());
     if (drive) {

@@ -133,23 +133,5 @@ TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {
   EXPECT_LE(error, (8.0 / 16 + 8.0 / 12 + 4.0 / 8 + 0) / 4 - best + 1e-12);
 }
 
-TEST(LabelNoise, ReplacesTheShareAskedForByOtherClasses) {
-  Scan scan;
-  scan.points.resize(20000, Eigen::Vector3f::Ones());
-  scan.labels.assign(20000, 20);
-  scan.stamp = 5;
-  const auto classes = reference::smallTable();
-  const auto noisy = withLabelNoise(scan, *classes, 0.3, 1);
-  std::map<std::uint32_t, int> counts;
-  for (const std::uint32_t label : noisy) ++counts[label];
-  EXPECT_NEAR(counts[20], 14000, 300);
-  EXPECT_NEAR(counts[10], 3000, 200);
-  EXPECT_NEAR(counts[30], 3000, 200);
-  EXPECT_EQ(counts.size(), 3u);  // never the unlabelled class
-  EXPECT_EQ(withLabelNoise(scan, *classes, 0.3, 1), noisy);
-  EXPECT_NE(withLabelNoise(scan, *classes, 0.3, 2), noisy);
-  EXPECT_EQ(withLabelNoise(scan, *classes, 0.0, 1), scan.labels);
-}
-
 }  // namespace
 }  // namespace bki_mapping

@@ -160,6 +160,42 @@ class Tools(unittest.TestCase):
             with open(os.path.join(folder, file), 'wb') as target:
                 target.write(array.array('I', [change(label) for label in labels]).tobytes())
 
+    def test_evaluation_with_errors(self):
+        clean = self.evaluation()
+        self.assertEqual(clean['miou_input'], 1.0)
+        for kind in ('even', 'similar', 'objects', 'borders', 'far'):
+            noisy = self.evaluation(more=('--label-noise', '0.5', '--label-errors', kind))
+            self.assertLess(noisy['miou_input'], 0.99, kind)
+            self.assertEqual(noisy['static_points'], clean['static_points'], kind)
+        # Predictions that take every building for a fence.
+        self.labels('predicted', lambda label: 51 if label == 50 else label)
+        predicted = {each['name']: each for each in self.evaluation(more=('--predictions', 'predicted'))['classes']}
+        self.assertEqual(predicted['building']['iou_input'], 0.0)
+        self.assertEqual(predicted['building']['iou_map'], 0.0)
+        self.assertEqual(predicted['road']['iou_input'], 1.0)
+        # Points are judged where they are: a map of poses that are a metre wrong keeps fewer. Where poses drift, the
+        # frame of the map drifts with them, and there is no truth to compare it with.
+        shaken = self.evaluation(more=('--pose-noise', '1,1'))
+        self.assertLess(shaken['sa'], clean['sa'] - 0.05)
+        self.assertIn('truth', shaken)
+        drifting = self.evaluation(more=('--pose-drift', '1,0'))
+        self.assertGreater(drifting['sa'], shaken['sa'])
+        self.assertNotIn('truth', drifting)
+        self.assertEqual(self.evaluation(more=('--pose-drift', '0,0'))['sa'], clean['sa'])
+
+    def test_simulated_scenes(self):
+        moving = {}
+        for scene in ('street', 'traffic', 'crowd'):
+            folder = self.path(scene)
+            result = call('simulate_drive', '--output', folder, '--scene', scene, '--scans', '2', '--lidar', 'vlp16',
+                          '--columns', '300')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            result = call('evaluate_map', '--sequence', folder, '--late', '1', '--json', self.path('figures.json'))
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(self.path('figures.json')) as file:
+                moving[scene] = json.load(file)['moving_points']
+        self.assertGreater(moving['crowd'], moving['street'])
+
     def test_evaluation_of_class_ids(self):
         table = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'classes', 'semantic_kitti.yaml')
         ids = {}
@@ -215,6 +251,12 @@ class Tools(unittest.TestCase):
         self.fails('--noise-seed is -1', 'evaluate_map', *sequence, '--noise-seed', '-1')
         for share in ('nan', '-0.1', '1.1', 'inf'):
             self.fails('--label-noise is ', 'evaluate_map', *sequence, '--label-noise', share)
+        for option in ('--pose-noise', '--pose-drift'):
+            for errors in ('0.1', '0.1,', '0.1,2,3', '-0.1,2', '0.1,nan', 'a,b', ''):
+                self.fails(option + ' is ' + errors, 'evaluate_map', *sequence, option, errors)
+        self.fails('keep one', 'evaluate_map', *sequence, '--pose-noise', '0,0', '--pose-drift', '0,0')
+        self.fails('no label errors near', 'evaluate_map', *sequence, '--label-errors', 'near')
+        self.fails('predicted', 'evaluate_map', *sequence, '--predictions', 'predicted')
         self.fails('--warm-up is -1', 'benchmark_sequence', *sequence, '--warm-up', '-1')
         self.fails('--repeats is -1', 'benchmark_sequence', *sequence, '--repeats', '-1')
         self.fails('--curve-scans is 1', 'benchmark_sequence', *sequence, '--curve-scans', '1')
@@ -225,6 +267,8 @@ class Tools(unittest.TestCase):
             for value in values.split():
                 self.fails(f'{option} is {value}, but must be', 'simulate_drive', '--output', output, '--' + option,
                            value)
+        self.fails('no scene desert', 'simulate_drive', '--output', output, '--scene', 'desert')
+        self.fails('no lidar vlp17', 'simulate_drive', '--output', output, '--lidar', 'vlp17')
         self.fails('--seed is -1', 'simulate_drive', '--output', output, '--seed', '-1')
         self.assertFalse(os.path.exists(output))
 
