@@ -22,7 +22,8 @@ endif()
 add_library(bki_mapping_reference STATIC test/reference/reference.cpp)
 target_include_directories(bki_mapping_reference PUBLIC test)
 target_link_libraries(bki_mapping_reference PUBLIC bki_mapping_mapping)
-target_compile_options(bki_mapping_reference PRIVATE -O2)
+# Without sanitizers, with which it would take minutes: it is what the mapper is compared with, not what runs on robots.
+target_compile_options(bki_mapping_reference PRIVATE -O2 -fno-sanitize=all)
 bki_mapping_warnings(bki_mapping_reference)
 
 # How long a unit test may take [s].
