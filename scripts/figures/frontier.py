@@ -16,8 +16,9 @@ STEPS = {
     '+ free_gain/static 0.1': {'free_gain/static': 0.1},
     '+ evidence before misses': {'free_space/evidence_before_misses': 'true'},
     '+ scan_limit 0.2, 0.1': {'scan_limit/hits': 0.2, 'scan_limit/free': 0.1, 'kernel/scale': 100},
-    '+ free_gain/dynamic 8': {'free_gain/dynamic': 8},
+    '+ free_gain/dynamic 16': {'free_gain/dynamic': 16},
     '+ free_gain/persistence 0.5': {'free_gain/persistence': 0.5},
+    '+ free_gain/living 10000': {'free_gain/living': 10000},
 }
 
 

@@ -49,13 +49,15 @@ void setFlag(const std::string& file, const std::string& flag, SemanticClass& c)
     c.unlabelled = true;
   } else if (flag == "dynamic") {
     c.dynamic = true;
+  } else if (flag == "living") {
+    c.dynamic = c.living = true;
   } else if (flag == "ground") {
     c.ground = true;
   } else if (flag == "ignored") {
     c.ignored = true;
   } else {
     fail(file, "flag '" + flag + "' is unknown" +
-                   nearestWord(flag, {"unlabelled", "dynamic", "ground", "ignored"}));
+                   nearestWord(flag, {"unlabelled", "dynamic", "living", "ground", "ignored"}));
   }
 }
 

@@ -16,6 +16,12 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
           "dynamic", &C::dynamic_classes, gain, "", Changes::kWhileMapping,
           "Factor on the evidence for free when deciding the state of a voxel whose likeliest class has the "
           "flag dynamic. Set it above 1 to clear the trails of moving objects sooner."),
+      realParameter("living", &C::living_classes,
+                    NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
+                    Changes::kWhileMapping,
+                    "The same for classes with the flag living: people, riders, animals. They may stand for "
+                    "a while, but "
+                    "nobody parks them, so that a far larger factor is right. 0: that of free_gain/dynamic."),
       realParameter(
           "static", &C::static_classes, gain, "", Changes::kWhileMapping,
           "Factor on the evidence for free when deciding the state of a voxel whose likeliest class does not "

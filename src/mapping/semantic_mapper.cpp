@@ -144,7 +144,9 @@ void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
-    const double of_kind = c.unlabelled ? 1.0 : (c.dynamic ? gain.dynamic_classes : gain.static_classes);
+    double of_kind = gain.static_classes;
+    if (c.dynamic) of_kind = c.living ? gain.ofLiving() : gain.dynamic_classes;
+    if (c.unlabelled) of_kind = 1.0;
     map_.setFreeGain(c.id, c.free_gain.value_or(of_kind));
   }
 }

@@ -118,11 +118,11 @@ MapInfo newestInfo(const Files& files) {
     for (const DriveRecord& drive : file->file.drives()) latest = std::max(latest, drive.last_stamp);
     const MapInfo& info = file->file.info();
     std::vector<std::tuple<ClassId, std::string, std::array<std::uint8_t, 3>, std::vector<std::uint32_t>,
-                           bool, bool, bool, bool, bool, std::optional<double>>>
+                           bool, bool, bool, bool, bool, bool, std::optional<double>>>
         classes;
     for (const SemanticClass& c : info.classes->classes()) {
-      classes.emplace_back(c.id, c.name, c.color, c.raw, c.any_raw, c.unlabelled, c.dynamic, c.ground,
-                           c.ignored, c.free_gain);
+      classes.emplace_back(c.id, c.name, c.color, c.raw, c.any_raw, c.unlabelled, c.dynamic, c.living,
+                           c.ground, c.ignored, c.free_gain);
     }
     return std::tuple(latest, info.parameters, info.classes->name(), classes);
   };

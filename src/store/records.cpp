@@ -49,8 +49,11 @@ void visitMap(Visit& visit, Info& info, Text& table_name) {
   visit(info.program);
 }
 
-template <typename Visit, typename Class, typename Position, typename Text>
-void visitClass(Visit& visit, Class& c, Position& position, Text& raw) {
+/// How well things of a class move, as the column `dynamic` says it.
+enum Mobility : std::uint8_t { kStays, kDynamic, kLiving };
+
+template <typename Visit, typename Class, typename Position, typename Text, typename Number>
+void visitClass(Visit& visit, Class& c, Position& position, Text& raw, Number& mobility) {
   visit(position);
   visit(c.id);
   visit(c.name);
@@ -58,7 +61,7 @@ void visitClass(Visit& visit, Class& c, Position& position, Text& raw) {
   visit(raw);
   visit(c.any_raw);
   visit(c.unlabelled);
-  visit(c.dynamic);
+  visit(mobility);
   visit(c.ground);
   visit(c.ignored);
   visit(c.free_gain);
@@ -166,7 +169,8 @@ std::uint32_t readMapRow(Database& database, MapInfo& info, std::string& table_n
 std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const SemanticClass& c) {
   RowWriter row(insert);
   const std::string raw = rawText(c.raw);
-  visitClass(row, c, position, raw);
+  const std::uint8_t mobility = c.living ? kLiving : c.dynamic ? kDynamic : kStays;
+  visitClass(row, c, position, raw, mobility);
   const std::uint32_t checksum = row.finish();
   insert.step();
   insert.reset();
@@ -178,8 +182,12 @@ std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected
   readRows(database, "class", expected, [&](RowReader& row) {
     auto& [position, c] = rows.emplace_back();
     std::string raw;
-    visitClass(row, c, position, raw);
+    std::uint8_t mobility = kStays;
+    visitClass(row, c, position, raw, mobility);
     checksums += row.finish();
+    if (mobility > kLiving) throw damaged(database.name(), "a number is out of range");
+    c.dynamic = mobility != kStays;
+    c.living = mobility == kLiving;
     c.raw = parseRaw(raw, database.name());
     if (c.free_gain && !isGood(*c.free_gain)) throw damaged(database.name(), "a gain is out of range");
   });

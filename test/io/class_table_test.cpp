@@ -35,12 +35,14 @@ TEST(ClassTable, FlagsAndGainsBelongToClasses) {
   const std::string file = folder / "file.yaml";
   std::ofstream(file) << "classes:\n"
                          "  - {id: 0, name: a, color: [1, 2, 3], flags: [ground], free_gain: 0.5}\n"
-                         "  - {id: 1, name: b, color: [1, 2, 3], flags: [ignored, dynamic]}\n";
+                         "  - {id: 1, name: b, color: [1, 2, 3], flags: [ignored, dynamic]}\n"
+                         "  - {id: 2, name: c, color: [1, 2, 3], flags: [living]}\n";
   const ClassTable table = loadClassTable(file);
   EXPECT_TRUE(table.find(0)->ground && !table.find(0)->ignored && !table.find(0)->dynamic);
   EXPECT_EQ(table.find(0)->free_gain, 0.5);
   EXPECT_TRUE(table.find(1)->ignored && table.find(1)->dynamic && !table.find(1)->ground);
-  EXPECT_FALSE(table.find(1)->free_gain);
+  EXPECT_FALSE(table.find(1)->free_gain || table.find(1)->living);
+  EXPECT_TRUE(table.find(2)->living && table.find(2)->dynamic) << "what lives can move";
   const std::string head = "classes:\n  - {id: 0, name: a, color: [1, 2, 3], ";
   EXPECT_NAMES(faultOf(head + "flags: [ground, ignored]}\n"), "both ground and ignored");
   EXPECT_NAMES(faultOf(head + "free_gain: 0}\n"), "free_gain of class 'a' must be a number > 0");

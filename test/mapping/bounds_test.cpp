@@ -332,7 +332,7 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
 
 TEST(Bounds, NoSettingMakesEvidenceInfinite) {
   const char* const names[] = {
-      "prior",           "kernel/scale",    "free_gain/dynamic",    "free_gain/static",
+      "prior",           "kernel/scale",    "free_gain/dynamic",    "free_gain/living", "free_gain/static",
       "scan_limit/hits", "scan_limit/free", "free_gain/persistence"};
   for (const char* name : names) {
     MapperConfig config;

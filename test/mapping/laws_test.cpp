@@ -425,6 +425,11 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_EQ(mapper.map().freeGain(1, 5.0f), 0.1f);
   EXPECT_EQ(mapper.map().freeGain(2, 5.0f), 30.0f);
   EXPECT_EQ(mapper.map().freeGain(kFreeClass, 5.0f), 1.0f);
+  classes[2].living = true;
+  const auto living = std::make_shared<ClassTable>("living", classes);
+  EXPECT_EQ(SemanticMapper(config, living).map().freeGain(2, 5.0f), 30.0f) << "by default that of dynamic";
+  config.free_gain.living_classes = 500.0;
+  EXPECT_EQ(SemanticMapper(config, living).map().freeGain(2, 5.0f), 500.0f);
   classes[2].free_gain = 7.0;
   const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
   EXPECT_EQ(own.map().freeGain(2, 5.0f), 7.0f);

@@ -32,8 +32,8 @@ inline std::string textOf(const MapInfo& info) {
        << info.parameters << '|' << info.program << '|' << info.classes->name();
   for (const SemanticClass& c : info.classes->classes()) {
     text << '\n'
-         << int{c.id} << '|' << c.name << '|' << c.any_raw << c.unlabelled << c.dynamic << c.ground
-         << c.ignored;
+         << int{c.id} << '|' << c.name << '|' << c.any_raw << c.unlabelled << c.dynamic << c.living
+         << c.ground << c.ignored;
     for (const int channel : c.color) text << '|' << channel;
     for (const std::uint32_t raw : c.raw) text << '|' << raw;
     if (c.free_gain) text << '|' << *c.free_gain;

@@ -71,7 +71,7 @@ TEST_F(HostileFile, HasWrongValues) {
       {"UPDATE class SET id = 256 WHERE id = 40", "out of range"},
       {"UPDATE class SET id = -1 WHERE id = 40", "out of range"},
       {"UPDATE class SET red = 256", "out of range"},
-      {"UPDATE class SET dynamic = 2", "out of range"},
+      {"UPDATE class SET dynamic = 3", "out of range"},
       {"UPDATE class SET raw = '1,2'", "raw labels"},
       {"UPDATE class SET raw = '4294967296'", "raw labels"},
       {"UPDATE class SET free_gain = -1.0", "gain"},

@@ -51,6 +51,7 @@ TEST(MapFile, HoldsWhatTheMapIsAbout) {
     EXPECT_EQ(c.any_raw, given.any_raw);
     EXPECT_EQ(c.unlabelled, given.unlabelled);
     EXPECT_EQ(c.dynamic, given.dynamic);
+    EXPECT_EQ(c.living, given.living);
     EXPECT_EQ(c.ground, given.ground);
     EXPECT_EQ(c.ignored, given.ignored);
     EXPECT_EQ(c.free_gain, given.free_gain);

@@ -20,7 +20,7 @@ inline MapInfo infoOf(double resolution = 0.3) {
     classes[i].raw = {static_cast<std::uint32_t>(10 * i), 1000u + static_cast<std::uint32_t>(i)};
   }
   classes[0].unlabelled = classes[0].any_raw = true;
-  classes[1].dynamic = true;
+  classes[1].dynamic = classes[1].living = true;
   classes[1].free_gain = 2.5;
   classes[2].ground = classes[2].ignored = true;
   MapInfo info;

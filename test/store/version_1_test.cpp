@@ -90,6 +90,7 @@ TEST(Version1, HoldsWhatTheMapIsAbout) {
   EXPECT_FALSE(street.unlabelled || street.any_raw || street.dynamic || street.ignored || street.free_gain);
   EXPECT_EQ(car.id, 253);
   EXPECT_TRUE(car.dynamic);
+  EXPECT_FALSE(car.living);
   EXPECT_EQ(car.free_gain, 2.5);
 
   const std::vector<DriveRecord> drives = file.drives();

@@ -7,7 +7,11 @@ namespace bki_mapping {
 /// evidence. With a gain of 1 the state follows the posterior; the unlabelled class always has 1.
 struct FreeGainConfig {
   double dynamic_classes = 1.0;  ///< classes flagged dynamic
+  double living_classes = 0.0;   ///< of these, those flagged living; 0: as dynamic_classes
   double static_classes = 1.0;   ///< all other classes
+
+  double ofLiving() const { return living_classes > 0.0 ? living_classes : dynamic_classes; }
+
   /// Evidence of hits over which a gain g > 1 decays, to 1 + (g - 1) exp(-hits / persistence); 0: never.
   double persistence = 0.0;
 };
