@@ -41,7 +41,7 @@ const char* kindOf(mode_t mode) {
 fs::path followLinks(const std::string& path, bool& exists, struct stat& old) {
   exists = stat(path.c_str(), &old) == 0;
   if (exists && !S_ISREG(old.st_mode)) {
-    throw std::runtime_error(path + " is " + kindOf(old.st_mode) + ", no regular file; give another name");
+    throw std::runtime_error(path + " is " + kindOf(old.st_mode) + ", not a regular file; give another name");
   }
   if (exists) return fs::canonical(path);
   if (errno == ELOOP) throw writeFailure(path, "it is in a loop of links");

@@ -16,18 +16,18 @@
 namespace bki_mapping {
 namespace {
 
-/// SQLite counts the steps of its virtual machine in portions of this size.
+/// SQLite reports the steps of its virtual machine in portions of this size.
 constexpr int kStepsAtOnce = 1000;
 /// A row takes more than 60 bytes, with that of its index, and less than 30 steps to be read.
 constexpr double kStepsPerByte = 0.5;
 /// SQLite keeps up to 2 MB of a change in memory.
 constexpr std::int64_t kMostUnwritten = 4'000'000;
 
-constexpr int kLargestValue = 300'000'000;  ///< more than the largest tile [bytes]
+constexpr int kLargestValue = 300'000'000;  ///< larger than the largest tile [bytes]
 constexpr std::size_t kLongestQuote = 300;
 constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
 
-/// Whether memory is not short, although SQLite says so: it does of lengths beyond all limits, too.
+/// Whether memory is available although SQLite reports a shortage, as it also does for impossible lengths.
 bool canAllocate(std::size_t bytes) {
   void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return false;
@@ -54,7 +54,7 @@ bool canAllocate(std::size_t bytes) {
     case SQLITE_FULL:
       throw MapFileError(writeFailure(path, "the disk is full").what());
     case SQLITE_READONLY:
-      throw MapFileError(writeFailure(path, "it may only be read").what());
+      throw MapFileError(writeFailure(path, "it is read-only").what());
     case SQLITE_IOERR:
       if (code == SQLITE_IOERR_READ || code == SQLITE_IOERR_SHORT_READ) {
         throw MapFileError(path + " cannot be read: " + reason + "; check the disk");
@@ -71,7 +71,7 @@ sqlite3_file* fileOf(sqlite3* database) {
   return file;
 }
 
-/// Sets what an application that opens files of strangers should: see sqlite.org/security.html.
+/// Configures SQLite for files from strangers, as sqlite.org/security.html recommends.
 void distrust(sqlite3* database) {
   constexpr std::pair<int, int> kSettings[] = {{SQLITE_DBCONFIG_DEFENSIVE, 1},
                                                {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
@@ -101,7 +101,7 @@ void distrust(sqlite3* database) {
 }  // namespace
 
 MapFileDamaged damaged(const std::string& path, const std::string& what) {
-  // It may quote the file: nobody wants to read much of it, nor to have a terminal obey it.
+  // The text may quote the file, so it is cut, and freed of characters that a terminal would obey.
   std::string quoted = what.substr(0, kLongestQuote);
   for (char& c : quoted) {
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
@@ -117,10 +117,10 @@ Database::Database(const std::string& path, Mode mode, const std::string& name)
     : name_(name), mode_(mode), work_(std::make_unique<Work>()) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
-    throw MapFileError(name_ + " is no regular file; give the name of a .bkm file");
+    throw MapFileError(name_ + " is not a regular file; give the name of a .bkm file");
   }
   sqlite3* opened = nullptr;
-  // Absolute paths have no special meaning, as "file:x" or ":memory:" have.
+  // An absolute path has no special meaning to SQLite; "file:x" and ":memory:" do.
   const std::string absolute = std::filesystem::absolute(path).string();
   const int code = sqlite3_open_v2(absolute.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX,
                                    mode == Mode::kNew ? "unix-none" : nullptr);
@@ -148,7 +148,7 @@ void Database::harden() {
 
 void Database::lock() {
   if (mode_ == Mode::kUpdate) {
-    // SQLite would say so only when something is written.
+    // SQLite would not report it before the first write.
     const char* const file = sqlite3_db_filename(database_.get(), "main");
     if (access(file, W_OK) != 0 || access(std::filesystem::path(file).parent_path().c_str(), W_OK) != 0) {
       throw MapFileError(writeFailure(name_, std::strerror(errno)).what());
@@ -266,21 +266,21 @@ void Statement::bindBytes(int parameter, const std::string& bytes) {
 
 std::int64_t Statement::integer(int column) const {
   if (sqlite3_column_type(statement_.get(), column) != SQLITE_INTEGER) {
-    throw damaged(path_, "a value is no integer");
+    throw damaged(path_, "a value is not an integer");
   }
   return sqlite3_column_int64(statement_.get(), column);
 }
 
 double Statement::real(int column) const {
   if (sqlite3_column_type(statement_.get(), column) != SQLITE_FLOAT) {
-    throw damaged(path_, "a value is no real number");
+    throw damaged(path_, "a value is not a real number");
   }
   return sqlite3_column_double(statement_.get(), column);
 }
 
 std::string Statement::text(int column) const {
   if (sqlite3_column_type(statement_.get(), column) != SQLITE_TEXT) {
-    throw damaged(path_, "a value is no text");
+    throw damaged(path_, "a value is not a text");
   }
   const auto* const text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   if (!text) throw std::bad_alloc();
@@ -293,7 +293,7 @@ bool Statement::isNull(int column) const {
 
 Statement::Bytes Statement::bytes(int column) const {
   if (sqlite3_column_type(statement_.get(), column) != SQLITE_BLOB) {
-    throw damaged(path_, "a value is no blob");
+    throw damaged(path_, "a value is not a blob");
   }
   const auto* const data = static_cast<const unsigned char*>(sqlite3_column_blob(statement_.get(), column));
   const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));

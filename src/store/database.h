@@ -18,7 +18,7 @@ class Statement {
  public:
   /// Runs to the next row. @return false after the last one. @throws MapFileError.
   bool step();
-  /// Prepares to run again, with all parameters unbound.
+  /// Prepares the statement to run again, with all parameters unbound.
   void reset() noexcept;
 
   void bind(int parameter, std::int64_t value);
@@ -28,7 +28,7 @@ class Statement {
   /// @param bytes must stay until the next reset().
   void bindBytes(int parameter, const std::string& bytes);
 
-  // Values of the present row. @throws MapFileError that the file is damaged if the type is another one.
+  // Values of the current row. @throws MapFileDamaged if the value has another type.
   std::int64_t integer(int column) const;
   double real(int column) const;
   std::string text(int column) const;
@@ -57,21 +57,21 @@ class Statement {
 class Database {
  public:
   enum class Mode {
-    kRead,    ///< many at the same time
-    kUpdate,  ///< alone; changes are durable
-    kNew,     ///< an existing file of which nobody knows: without locks, journal and syncing
+    kRead,    ///< any number of databases may read a file
+    kUpdate,  ///< this database has the file for itself; changes are durable
+    kNew,     ///< an existing file that no other process knows: without locks, journal and syncing
   };
   /// The first 100 bytes of the file.
   using Header = std::array<unsigned char, 100>;
 
-  /// Opens a file, but reads nothing of it. @param name what errors call the file. @throws MapFileError.
+  /// Opens a file without reading from it. @param name of the file in errors. @throws MapFileError.
   Database(const std::string& path, Mode mode, const std::string& name);
-  /// Likewise, named after its path.
+  /// The same, with the path as the name.
   Database(const std::string& path, Mode mode) : Database(path, mode, path) {}
 
-  /// Takes the lock of the mode, for as long as the file is open; with kRead in a transaction that never
-  /// ends. What a killed process left of a change is undone. @throws MapFileError; MapFileInUse if another
-  /// one has locked the file.
+  /// Takes the lock of the mode, and keeps it as long as the file is open (with kRead, by a transaction that
+  /// never ends). If a process was killed in the middle of a change, the change is undone.
+  /// @throws MapFileError; MapFileInUse if the file is locked elsewhere.
   void lock();
 
   const std::string& name() const { return name_; }
@@ -79,7 +79,8 @@ class Database {
   /// @throws MapFileError if the file is shorter.
   Header header() const;
   std::int64_t fileSize() const;
-  /// The rows of a sound database take no more bytes than this, those of a change not yet written included.
+  /// An upper bound for the bytes in all rows of a sound database, including rows of a change that has not
+  /// been written yet.
   std::int64_t mostContent() const;
   /// Runs a statement and ignores its rows.
   void run(const char* sql);
@@ -98,8 +99,8 @@ class Database {
     std::int64_t steps;
   };
   void harden();
-  /// Gives the next statement as many steps as it can need in a sound file of this size: pages that contain
-  /// each other would keep SQLite busy for ever.
+  /// Limits the next statement to the number of steps that it can need in a sound file of this size. In a
+  /// hostile file, pages that contain each other would keep SQLite busy for ever.
   void limitWork() const;
 
   std::string name_;
@@ -108,7 +109,7 @@ class Database {
   std::unique_ptr<sqlite3, Close> database_;
 };
 
-/// "PATH is damaged (WHAT); take a copy of it ..."
+/// "PATH is damaged (WHAT); use another copy of it"
 MapFileDamaged damaged(const std::string& path, const std::string& what);
 
 }  // namespace bki_mapping

@@ -6,7 +6,7 @@
 namespace bki_mapping {
 namespace {
 
-/// The search: for the first drive that is left, tries the sets that hold it.
+/// The search: takes the first drive that is not yet covered, and tries each set that contains it.
 class Search {
  public:
   Search(const std::vector<DriveSet>& sets, std::vector<std::size_t> order)

@@ -10,15 +10,15 @@ namespace {
 
 constexpr double kTileEdge = Region::kEdge * kBlockEdge;  // [voxels]
 constexpr double kPi = 3.14159265358979323846;
-/// How far a number of voxels or quarter turns may be from a whole one: more than the rounding of decimal
-/// fractions of metres, and less than anybody means.
+/// Tolerance within which a number of voxels or quarter turns counts as whole: larger than the rounding of
+/// decimal fractions of metres, and smaller than any shift that a user intends.
 constexpr double kWhole = 1e-6;
 
 bool isWhole(double number) {
   return std::abs(number - std::round(number)) < kWhole;
 }
 
-/// The box about the images of the corners of a box.
+/// The bounding box of the images of a box's corners.
 template <typename Map>
 Eigen::AlignedBox3d boxAbout(const Eigen::AlignedBox3d& box, Map&& map) {
   Eigen::AlignedBox3d about;
@@ -44,7 +44,7 @@ GridTransform::GridTransform(const MapPlacement& placement, double resolution)
     : resolution_(resolution), shift_(placement.translation / resolution) {
   const double quarters = placement.yaw / 90.0;
   if (!shift_.allFinite() || !std::isfinite(quarters)) {
-    throw std::invalid_argument("the place of a map is not finite");
+    throw std::invalid_argument("the placement of a map is not finite; give finite metres and degrees");
   }
   exact_ = isWhole(quarters);
   for (const double number : {shift_.x(), shift_.y(), shift_.z()}) exact_ = exact_ && isWhole(number);
@@ -71,7 +71,7 @@ Eigen::Vector3d GridTransform::backward(const Eigen::Vector3d& point) const {
 }
 
 VoxelIndex GridTransform::sourceOf(const VoxelIndex& target) const {
-  // Exact for whole numbers: doubles hold halves of indices, and the factors are 0 and 1.
+  // Exact for whole numbers: doubles represent halves of indices, and the factors are 0, 1 and -1.
   const Eigen::Vector3d centre = backward({target.x + 0.5, target.y + 0.5, target.z + 0.5});
   return {{floorToInt(centre.x()), floorToInt(centre.y()), floorToInt(centre.z())}};
 }
@@ -93,7 +93,8 @@ TileRange GridTransform::targetTiles(const GridIndex& source) const {
   const Eigen::AlignedBox3d centres(targets.min() + inside, targets.max() - inside);
   if (!(centres.min().array().abs() < GridGeometry::kMaxCoordinate).all() ||
       !(centres.max().array().abs() < GridGeometry::kMaxCoordinate).all()) {
-    throw std::invalid_argument("a map is moved too far from the origin of the frame");
+    throw std::invalid_argument(
+        "a placement moves a map too far from the origin of the frame; check its metres");
   }
   return {tileAt(centres.min()), tileAt(centres.max())};
 }

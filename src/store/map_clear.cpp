@@ -12,10 +12,10 @@
 namespace bki_mapping {
 namespace {
 
-/// The tiles that hold the voxels of a box.
+/// The tiles that may hold voxels of a box.
 std::pair<GridIndex, GridIndex> tilesAbout(const Eigen::AlignedBox3d& box, double resolution) {
   const double edge = Region::kEdge * kBlockEdge * resolution;
-  // Wider by one tile, for rounding; and within the range of indices.
+  // One tile more on each side because of rounding, but within the range of indices.
   constexpr double kMost = GridGeometry::kMaxCoordinate / (Region::kEdge * kBlockEdge) + 2.0;
   const auto tile = [&](double metres, int wider) {
     return static_cast<int>(std::clamp(std::floor(metres / edge) + wider, -kMost, kMost));
@@ -25,7 +25,7 @@ std::pair<GridIndex, GridIndex> tilesAbout(const Eigen::AlignedBox3d& box, doubl
           {tile(high.x(), 1), tile(high.y(), 1), tile(high.z(), 1)}};
 }
 
-/// Clears a box of all parts. @param copies whether to write the tiles that stay as they are, too.
+/// Clears a box in all parts. @param copies whether to write unchanged tiles, too.
 ClearedFile clearParts(MapFile& file, const Eigen::AlignedBox3d& box, MapFile::Change& change, bool copies) {
   ClearedFile cleared;
   const auto [low, high] = tilesAbout(box, file.info().resolution);

@@ -14,12 +14,12 @@
 namespace bki_mapping {
 namespace {
 
-/// No voxel with a valid index, nor one beside it, lies in a tile farther out.
+/// Tiles farther out contain no voxel with a valid index, nor any neighbour of one.
 constexpr int kMostTileIndex = (1 << 22) + 1;
 constexpr int kTileEdge = Region::kEdge * kBlockEdge;
 static_assert(GridGeometry::kMaxCoordinate == double{1 << 22} * kTileEdge);
 
-// Statements that read the list of tiles. They begin with the columns of readEntry().
+// Statements that read the list of tiles. Their first columns are those that readEntry() reads.
 constexpr char kSelectList[] =
     "SELECT x, y, z, blocks, planes, checksum, part FROM tile INDEXED BY tile_list";
 constexpr char kSelectRange[] =
@@ -32,7 +32,7 @@ constexpr char kSelectTile[] =
     "SELECT x, y, z, blocks, planes, checksum, content FROM tile INDEXED BY tile_list WHERE part = ? AND "
     "z = ? AND y = ? AND x = ?";
 
-/// What the library writes into MapInfo::program.
+/// The text that the library writes into MapInfo::program.
 constexpr char kProgram[] = "bki_mapping " BKI_MAPPING_VERSION;
 
 TileEntry readEntry(const Statement& row, const std::string& name) {
@@ -92,7 +92,7 @@ struct MapFile::State {
   State(const std::string& path, Database::Mode mode, const std::string& name)
       : database(path, mode, name), writable(mode != Database::Mode::kRead) {}
 
-  /// Reads and checks all but the content of the tiles.
+  /// Reads and checks everything except the content of the tiles.
   void readAll() {
     std::string table_name;
     totals = readTotals(database);
@@ -112,7 +112,7 @@ struct MapFile::State {
     readList(found);
     if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
   }
-  /// Checks the order of the list, without which tiles are not found.
+  /// Checks the order of the list; searches rely on it.
   void readList(Totals& found) {
     Statement select = database.prepare(kSelectList);
     std::pair<int, GridIndex> last{-1, {}};
@@ -128,7 +128,7 @@ struct MapFile::State {
       addTo(found, key.first, entry, 1);
     }
   }
-  /// Refuses numbers that a file of this size cannot have: they bound the memory that its map takes.
+  /// Refuses counts that are impossible in a file of this size, because memory is allocated by them.
   void checkTotals() const {
     const std::int64_t size = database.fileSize();
     bool too_many = totals.classes > static_cast<std::int64_t>(kMaxClasses);
@@ -136,7 +136,7 @@ struct MapFile::State {
          {totals.classes, totals.drives, totals.tiles, totals.blocks, totals.planes}) {
       too_many |= count < 0 || count > size;
     }
-    // Lists of blocks and planes are not compressed.
+    // The lists of blocks and planes are never compressed.
     if (too_many || 4 * totals.blocks + totals.planes > size) {
       throw damaged(database.name(), "it claims more content than it has room for");
     }
@@ -168,9 +168,9 @@ struct MapFile::State {
       if (!made) throw;
     }
   }
-  /// Finds out what has become of a commit() that failed. If it was the last sync of all that failed, by
-  /// which SQLite gives up its journal, SQLite gives it up again, and the change is made.
-  /// @return whether it is. @throws MapFileError if that cannot be known at present.
+  /// Finds out whether a commit() that failed has changed the file after all. That is so if only its last
+  /// sync failed, with which SQLite discards the journal: SQLite then discards it the next time.
+  /// @return whether the file has changed. @throws MapFileError if that cannot be determined now.
   bool settle() {
     if (!attempted) return false;
     const Totals found = readTotals(database);
@@ -184,7 +184,7 @@ struct MapFile::State {
   bool writable;
   MapInfo info;
   Totals totals;
-  std::optional<Totals> attempted;  ///< by a commit() that failed, if its outcome is not yet known
+  std::optional<Totals> attempted;  ///< the totals after a commit() that failed, until its outcome is known
   std::unique_ptr<TileCodec> codec;
 };
 
@@ -203,7 +203,7 @@ MapFile::MapFile(const std::string& path, Access access) {
   } catch (const MapFileInUse&) {
     throw;
   } catch (const MapFileError&) {
-    checkComplete(database);  // says more of a file that is cut off than SQLite does
+    checkComplete(database);  // describes a truncated file better than SQLite does
     throw;
   }
   checkComplete(database);
@@ -213,7 +213,7 @@ MapFile::MapFile(const std::string& path, Access access) {
 
 MapFile MapFile::create(const std::string& path, const MapInfo& info) {
   if (std::filesystem::exists(path)) {
-    throw MapFileError(path + " is there already; open it for update, or choose another name");
+    throw MapFileError(path + " exists already; open it for update, or choose another name");
   }
   NewMapFile(path, info).commit();
   return MapFile(path, Access::kUpdate);
@@ -235,7 +235,7 @@ MapFile::Size MapFile::size() const {
 
 std::vector<DriveRecord> MapFile::drives() {
   std::int64_t ignored = 0;
-  return readDrives(state_->database, std::nullopt, ignored);  // a change may have put some
+  return readDrives(state_->database, std::nullopt, ignored);  // an open change may have added some
 }
 
 std::vector<int> MapFile::parts() {
@@ -369,8 +369,8 @@ void MapFile::Change::commit() {
 
 namespace {
 
-/// Keeps others from opening a file that is about to be replaced. A journal that a killed process left beside
-/// it is applied first, since it must not be taken for one of the new file.
+/// Keeps others from opening a file that is about to be replaced. A journal that a killed process left is
+/// applied first; otherwise SQLite would apply it to the new file.
 std::optional<Database> lockReplaced(const std::string& path) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   try {
@@ -381,11 +381,12 @@ std::optional<Database> lockReplaced(const std::string& path) {
   } catch (const MapFileInUse&) {
     throw;
   } catch (const MapFileError&) {
-    return std::nullopt;  // no map, or a damaged one: replaced as any other file
+    return std::nullopt;  // not a map, or a damaged one: replaced like any other file
   }
 }
 
-/// Removes what SQLite would take for a part of a new file with this name: for good, before there is one.
+/// Removes files that SQLite would take for a part of a new file with this name. The removal is durable
+/// before the new file appears.
 void removeLeftovers(const std::string& path) {
   std::error_code ignored;
   const std::string target = std::filesystem::weakly_canonical(path, ignored).string();
@@ -396,7 +397,7 @@ void removeLeftovers(const std::string& path) {
   if (removed) syncFolder(target);
 }
 
-/// @param limit for the memory of a map of these tiles [bytes]; 0: none.
+/// @param limit for the memory of a map of these tiles [bytes]; 0: no limit.
 void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, std::size_t limit) {
   std::size_t bytes = 0;
   for (const TileEntry& tile : tiles) {
@@ -406,7 +407,7 @@ void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, s
   if (limit == 0 || bytes <= limit) return;
   throw MapFileError("the map in " + path + " takes " + std::to_string(bytes / 1'000'000) +
                      " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
-                     " MB; raise the limit, or load a part of it");
+                     " MB; raise the limit, or use a smaller map");
 }
 
 }  // namespace

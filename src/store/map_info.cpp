@@ -22,7 +22,7 @@ void checkSame(const std::string& what, const std::string& name, const T& value,
                               " is " + textOf(other) + "; maps can only be added if they agree");
 }
 
-/// Classes in the order of their ids, whatever their order in the table.
+/// The names of classes by id, since the order in the table does not matter.
 std::vector<std::string> classNames(const ClassTable& table) {
   std::vector<std::pair<ClassId, std::string>> sorted;
   for (const SemanticClass& c : table.classes()) sorted.emplace_back(c.id, c.name);

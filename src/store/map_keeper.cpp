@@ -19,31 +19,33 @@ namespace {
 
 constexpr double kEverything = std::numeric_limits<double>::infinity();
 
-/// How much of a scan's time adding tiles from the file may take, beyond one tile.
+/// Time for adding tiles from the file, in addition to the first one, for each call.
 constexpr std::chrono::milliseconds kArrivalTime(2);
 
-/// Parts of memory_limit: above the first, the window shrinks until the map takes the second; below the
+/// Fractions of memory_limit: above the first, the window shrinks until the map takes the second; below the
 /// third, it grows again.
 constexpr double kTooMuch = 0.85, kEnough = 0.7, kLittle = 0.5;
 
-/// While so much waits to be written [bytes], tiles stay in memory: they would only wait, too.
+/// While more than this waits to be written [bytes], tiles stay in the map: handing them over frees no
+/// memory.
 constexpr std::size_t kMostWaiting = 256 << 20;
 
-/// Parts of a tile's edge: how far the sensor moves until tiles are loaded and given away, and how far beyond
-/// the window a tile stays, so that a sensor that goes to and fro does not keep the disk busy.
+/// Fractions of a tile's edge: how far the sensor moves before the keeper looks for tiles to load and to hand
+/// over, and how far outside the window a tile may stay. A sensor that goes to and fro then does not keep the
+/// disk busy.
 constexpr double kStep = 0.25, kMargin = 0.5;
 
 enum class Here {
-  kWhole,    ///< all evidence is in memory; the file's is out of date
-  kPart,     ///< the file has evidence, and memory some more
-  kLoading,  ///< likewise, and the file's has been asked for
-  kDamaged   ///< likewise, but the file's cannot be read; memory keeps the rest
+  kWhole,    ///< all evidence is in memory; a tile in the file is out of date
+  kPart,     ///< the evidence is the sum of what is in memory and in the file
+  kLoading,  ///< likewise, and the tile in the file has been requested
+  kDamaged   ///< likewise, but the tile in the file cannot be read; the rest stays in memory
 };
 
 struct Tile {
   Here here = Here::kWhole;
   bool changed = false;      ///< memory has evidence that is not in the file
-  TileStore::Call load = 0;  ///< whose answer is waited for
+  TileStore::Call load = 0;  ///< the call that requested the tile
 };
 
 MapFile openOrCreate(const std::string& path, const MapInfo& info) {
@@ -63,14 +65,14 @@ struct MapKeeper::State {
         edge(Region::kEdge * of.map().geometry().blockSize()) {
     for (const DriveRecord& known : file.drives()) drives.insert(known.id);
     if (!drives.insert(drive.id).second) {
-      throw std::invalid_argument("the map in " + path + " holds drive '" + drive.id +
-                                  "' already; give the new drive another id");
+      throw std::invalid_argument("the map in " + path + " already holds drive '" + drive.id +
+                                  "'; give the new drive another id");
     }
     for (const TileEntry& tile : file.tiles()) stored.insert(tile.index);
     store = std::make_unique<TileStore>(std::move(file));
   }
 
-  /// From the window's centre to the nearest point of a tile, along the axis on which it is farthest [m].
+  /// Distance of a tile from the window's centre: the largest of its distances on the three axes [m].
   double distance(const GridIndex& tile) const {
     const Eigen::Array3d low = edge * Eigen::Array3d(tile.x, tile.y, tile.z);
     const Eigen::Array3d centre = window.centre.array();
@@ -78,7 +80,7 @@ struct MapKeeper::State {
   }
   double reachNow() const { return std::min(0.5 * window.edge, reach); }
 
-  /// The tiles in the file that are within a distance.
+  /// The tiles in the file within a distance of the window's centre.
   std::vector<GridIndex> storedWithin(double limit) const {
     std::vector<GridIndex> tiles;
     const Eigen::Array3d low = ((window.centre.array() - limit) / edge).floor();
@@ -144,7 +146,7 @@ struct MapKeeper::State {
     }
   }
 
-  /// Adds to the map what has arrived. @param all even if that takes long.
+  /// Adds arrived tiles to the map. @param all adds all of them, even if that takes long.
   void takeArrivals(bool all) {
     for (TileStore::Arrival& arrival : store->takeArrivals()) arrivals.push_back(std::move(arrival));
     const auto end = std::chrono::steady_clock::now() + kArrivalTime;
@@ -152,7 +154,7 @@ struct MapKeeper::State {
       try {
         take(arrivals.front());
       } catch (const std::bad_alloc&) {
-        return;  // until there is memory again
+        return;  // tries again when there is memory
       }
       arrivals.pop_front();
       if (!all && std::chrono::steady_clock::now() > end) return;
@@ -195,8 +197,8 @@ struct MapKeeper::State {
     return limit > 0.0 ? limit : kEverything;
   }
 
-  /// Gives away the farthest tiles until the map takes less memory [bytes]. The window shrinks to what is
-  /// left. @return whether any was given away.
+  /// Hands over the farthest tiles until the map takes less memory than a limit [bytes], and shrinks the
+  /// window to the tiles that are left. @return whether any tile was handed over.
   bool shrinkTo(double bytes) {
     std::vector<std::pair<double, GridIndex>> tiles;
     for (const auto& [index, tile] : here) {
@@ -206,7 +208,7 @@ struct MapKeeper::State {
     bool any = false;
     for (; !tiles.empty() && static_cast<double>(mapper.mapBytes()) > bytes; tiles.pop_back()) {
       const auto& [from_centre, index] = tiles.back();
-      if (from_centre <= 0.0) break;  // the sensor is in it
+      if (from_centre <= 0.0) break;  // the sensor is in this tile
       reach = std::max(0.0, std::min(reach, from_centre - (kMargin + kStep) * edge));
       giveAway(here.find(index));
       any = true;
@@ -229,18 +231,18 @@ struct MapKeeper::State {
   std::string path;
   DriveRecord drive;
   double edge;                   ///< of a tile [m]
-  std::set<std::string> drives;  ///< ids of all in the map
+  std::set<std::string> drives;  ///< ids of all drives in the map
   std::unique_ptr<TileStore> store;
   std::deque<TileStore::Arrival> arrivals;
-  std::map<GridIndex, Tile> here;           ///< the tiles that are in memory, or will be
-  std::set<GridIndex> stored;               ///< the tiles that the file has when all is written
+  std::map<GridIndex, Tile> here;           ///< the tiles that are in memory, or have been requested
+  std::set<GridIndex> stored;               ///< the tiles in the file, once all changes are written
   std::set<GridIndex> damaged;              ///< the tiles of the file that cannot be read
   Window window;                            ///< at the last moveTo()
   Eigen::Vector3d swept_at{0.0, 0.0, 0.0};  ///< centre of the window at the last sweep
-  bool must_sweep = true;                   ///< whatever the window does
-  double reach = kEverything;               ///< what memory_limit leaves of the half of window.edge [m]
-  TileStore::Call reset_call = 0;           ///< the last reset; answers to earlier calls are of no use
-  std::vector<GridIndex> moved;             ///< blocks that arrived or left, for the next moveTo()
+  bool must_sweep = true;                   ///< sweep even if the window has not moved
+  double reach = kEverything;               ///< half the edge of the window that memory_limit allows [m]
+  TileStore::Call reset_call = 0;           ///< the last reset; answers to earlier calls are ignored
+  std::vector<GridIndex> moved;             ///< blocks that were added or removed, for the next moveTo()
   bool closed = false;
 };
 
@@ -298,7 +300,7 @@ std::future<void> MapKeeper::save() {
       s.noteStored(index, s.mapper.map().hasRegion(index));
       tile.changed = false;
       ++entry;
-    } else {  // the file adds the parts; the whole comes back if the tile is in the window
+    } else {  // the file adds up both; their sum is loaded if the tile is in the window
       entry = s.giveAway(entry);
     }
   }
@@ -331,7 +333,8 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
   s.mapper.map().checkAddable(other);
   for (const DriveRecord& drive : drives) {
     if (s.drives.count(drive.id) > 0) {
-      throw std::invalid_argument("drive '" + drive.id + "' is in the map in " + s.path + " already");
+      throw std::invalid_argument("the map in " + s.path + " already holds drive '" + drive.id +
+                                  "', which would count twice");
     }
   }
   for (const GridIndex& tile : other.regions()) {
@@ -366,7 +369,7 @@ std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
     if (!stays && box.intersects({low, low + Eigen::Vector3d::Constant(s.edge)})) in_file.push_back(tile);
   }
   s.store->changeTiles(in_file, [box](SemanticMap& map) { bki_mapping::clearBox(map, box); });
-  for (const GridIndex& tile : in_file) {  // what was asked for before is out of date
+  for (const GridIndex& tile : in_file) {  // requests from before the clearing are out of date
     const auto known = s.here.find(tile);
     if (known != s.here.end() && known->second.here == Here::kLoading) s.load(tile);
   }
@@ -377,7 +380,7 @@ std::string MapKeeper::fault() const {
   const std::string fault = state_->store->fault();
   if (!fault.empty() || state_->damaged.empty()) return fault;
   return state_->path + " is damaged in " + std::to_string(state_->damaged.size()) +
-         " tiles, which cannot be read; they stay as they are, and what is mapped there is lost at the end; "
+         " tiles that cannot be read; they stay as they are, and new evidence there will be lost at the end; "
          "use another copy of the file";
 }
 

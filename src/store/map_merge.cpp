@@ -26,7 +26,7 @@ bool isSamePlace(const std::optional<MapPlacement>& a, const std::optional<MapPl
   return x.translation == y.translation && x.yaw == y.yaw;
 }
 
-/// Opens each input once. That which is to be replaced is locked against others.
+/// Opens each input once. The input that the result replaces is opened for update, so that it is locked.
 Files openAll(const MergeOptions& options) {
   Files files;
   std::vector<const MergeInput*> opened;
@@ -42,11 +42,11 @@ Files openAll(const MergeOptions& options) {
         std::make_shared<PlacedFile>(PlacedFile{std::move(file), transform, input.placement.has_value()}));
     opened.push_back(&input);
   }
-  if (files.empty()) throw std::invalid_argument("there is no map to be merged");
+  if (files.empty()) throw std::invalid_argument("there is no map to merge; give the names of .bkm files");
   return files;
 }
 
-/// The frame of the result: that of the maps that are in it already, or of all.
+/// The frame of the result: that of the inputs without a placement; if all have one, their common frame.
 std::string commonFrame(const Files& files) {
   const bool all_placed =
       std::all_of(files.begin(), files.end(), [](const auto& file) { return file->placed; });
@@ -63,7 +63,7 @@ std::string commonFrame(const Files& files) {
   return first->file.info().frame;
 }
 
-/// What files say of all drives, by id: the file, and the record as it is in the result.
+/// The records of all drives by id: the files that contain the drive, and the record for the result.
 using Records = std::map<std::string, std::vector<std::pair<const PlacedFile*, DriveRecord>>>;
 
 Records recordsOf(const Files& files) {
@@ -98,8 +98,8 @@ void checkSameDrives(const Records& records) {
   }
 }
 
-/// What one may say of a drive besides its scans and stamps may differ between files: one is chosen by its
-/// value, so that the order of the files does not matter.
+/// Names and bounds of a drive may differ between files. The choice depends on their values only, so that the
+/// order of the files does not matter.
 DriveRecord chosenRecord(const std::vector<std::pair<const PlacedFile*, DriveRecord>>& found) {
   const auto key = [](const DriveRecord& r) {
     const Eigen::Vector3d &low = r.bounds.min(), &high = r.bounds.max();
@@ -110,8 +110,8 @@ DriveRecord chosenRecord(const std::vector<std::pair<const PlacedFile*, DriveRec
       ->second;
 }
 
-/// What the result says of itself: that of the file with the latest scan; of several, one chosen by its
-/// value.
+/// The info of the result: that of the file with the latest scan. Among several, the choice depends on values
+/// only.
 MapInfo newestInfo(const Files& files) {
   const auto key = [](const std::shared_ptr<PlacedFile>& file) {
     std::uint64_t latest = 0;
@@ -131,7 +131,7 @@ MapInfo newestInfo(const Files& files) {
       ->file.info();
 }
 
-/// Summands with the same drives, which must hold the same evidence: one of them counts.
+/// Summands with the same drives. They must hold the same evidence, and one of them counts.
 using Group = std::vector<Summand>;
 
 std::vector<Group> groupsOf(const Files& files) {
@@ -156,7 +156,7 @@ DriveSet common(const DriveSet& a, const DriveSet& b) {
   return both;
 }
 
-/// Says why no choice of groups counts each drive once.
+/// The error that says why no choice of groups counts each drive once.
 MapFileError cannotCover(const DriveSet& wanted, const DriveSet& without, const std::vector<Group>& groups) {
   for (const std::string& id : wanted) {
     const Group* bound = nullptr;
@@ -169,7 +169,7 @@ MapFileError cannotCover(const DriveSet& wanted, const DriveSet& without, const 
     return MapFileError("drive " + quoted(common(bound->front().drives(), without)) +
                         " cannot be left out: " + bound->front().path() +
                         " holds its evidence only in a sum with that of '" + id +
-                        "'; leave that out, too, or make the file with --keep-drives");
+                        "'; leave that drive out, too, or make the file with --keep-drives");
   }
   std::vector<const Group*> by_size;
   for (const Group& group : groups) {
@@ -205,7 +205,7 @@ std::vector<Group> choose(std::vector<Group> groups, const DriveSet& wanted, con
   return chosen;
 }
 
-/// Adds a map to another one with a count of the sums that stop at the end of their range.
+/// Adds a map to another one, and counts the sums that saturate.
 std::uint64_t addCounting(SemanticMap& sum, const SemanticMap& other) {
   std::uint64_t saturated = 0;
   for (const auto& [index, block] : other.entries()) {
@@ -214,7 +214,7 @@ std::uint64_t addCounting(SemanticMap& sum, const SemanticMap& other) {
       saturated += to.add(block->classes()[p], block->plane(p));
     }
     to.setOcclusion(to.occlusion() | block->occlusion());
-    if (to.empty()) sum.erase(index);  // negative evidence may have undone all of it
+    if (to.empty()) sum.erase(index);  // negative evidence may have cancelled all of it
   }
   return saturated;
 }
@@ -230,7 +230,7 @@ SemanticMap readTile(const Group& group, const GridIndex& tile) {
   return evidence;
 }
 
-/// The tiles of each group, and of all of them; sorted.
+/// The tiles of each group, and those of all groups together; sorted.
 struct TileLists {
   std::vector<std::vector<GridIndex>> of_group;
   std::vector<GridIndex> all;

@@ -11,14 +11,14 @@
 namespace bki_mapping {
 namespace {
 
-/// All steps up to kFormatVersion. A new version brings the step that leads to it, and a file of the version
-/// before in test/store/data.
+/// All steps up to kFormatVersion. Whoever adds a version adds the step that leads to it, and a file of the
+/// previous version in test/store/data.
 const std::vector<MigrationStep>& allSteps() {
   static const std::vector<MigrationStep> steps = {};
   return steps;
 }
 
-/// Reads all of a file. @param name what errors call it.
+/// Reads all of a file. @param name of the file in errors.
 void checkAll(const std::string& path, const std::string& name) {
   try {
     MapFile file(path, MapFile::Access::kRead);
@@ -44,8 +44,8 @@ void migrate(Database& database, std::int64_t version, std::int64_t to,
     const auto step =
         std::find_if(steps.begin(), steps.end(), [&](const MigrationStep& s) { return s.from == version; });
     if (step == steps.end()) {
-      throw std::logic_error("nothing leads from version " + std::to_string(version) +
-                             " of map files to the next");
+      throw std::logic_error("there is no migration from version " + std::to_string(version) +
+                             " of map files to the next version");
     }
     step->run(database);
     database.run(("PRAGMA user_version = " + std::to_string(version + 1)).c_str());
@@ -54,7 +54,7 @@ void migrate(Database& database, std::int64_t version, std::int64_t to,
 
 std::int64_t migrateMap(const std::string& old_path, const std::string& new_path) {
   if (std::filesystem::exists(new_path)) {
-    throw MapFileError(new_path + " is there already; choose another name");
+    throw MapFileError(new_path + " exists already; choose another name");
   }
   Database old(old_path, Database::Mode::kRead);
   const std::int64_t version = checkIdentity(old);
@@ -67,7 +67,7 @@ std::int64_t migrateMap(const std::string& old_path, const std::string& new_path
       old.copyTo(copy);
       migrate(copy, version, kFormatVersion, allSteps());
     }
-    checkAll(file.temporaryPath(), old_path);  // what is wrong with the copy is wrong with the original
+    checkAll(file.temporaryPath(), old_path);  // a fault of the copy is a fault of the original
     file.commit();
   } catch (const MapFileError&) {
     throw;

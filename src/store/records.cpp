@@ -29,14 +29,14 @@ std::vector<std::uint32_t> parseRaw(const std::string& text, const std::string& 
   while (next != end) {
     const auto [after, error] = std::from_chars(next, end, raw.emplace_back());
     if (error != std::errc() || (after != end && *after != ' ')) {
-      throw damaged(name, "the raw labels of a class are no numbers");
+      throw damaged(name, "the raw labels of a class are not numbers");
     }
     next = after == end ? end : after + 1;
   }
   return raw;
 }
 
-// What follows lists the columns of each table in order, for writing (of const rows) and for reading.
+// The functions below visit the columns of each table in order, for writing (const rows) and for reading.
 
 template <typename Visit, typename Info, typename Text>
 void visitMap(Visit& visit, Info& info, Text& table_name) {
@@ -49,7 +49,7 @@ void visitMap(Visit& visit, Info& info, Text& table_name) {
   visit(info.program);
 }
 
-/// How well things of a class move, as the column `dynamic` says it.
+/// Whether objects of a class move: the values of the column `dynamic`.
 enum Mobility : std::uint8_t { kStays, kDynamic, kLiving };
 
 template <typename Visit, typename Class, typename Position, typename Text, typename Number>
@@ -95,8 +95,8 @@ bool isGood(double value) {
   return std::isfinite(value) && value > 0.0;
 }
 
-/// Calls visit(RowReader&) for each row of a table. SQLite does not sort them: in a hostile file the same row
-/// may come again and again, and sorting takes all rows into memory.
+/// Calls visit(RowReader&) for each row of a table. SQLite does not sort them: a hostile file may repeat a
+/// row without end, and sorting would take all rows into memory.
 template <typename Visit>
 void readRows(Database& database, const std::string& table, std::optional<std::int64_t> expected,
               Visit&& visit) {
@@ -109,7 +109,7 @@ void readRows(Database& database, const std::string& table, std::optional<std::i
     if (text_left < 0) throw damaged(database.name(), "rows of the table '" + table + "' share their texts");
   }
   if (expected && rows != *expected) {
-    throw damaged(database.name(), "the table '" + table + "' has another number of rows than it should");
+    throw damaged(database.name(), "the table '" + table + "' has the wrong number of rows");
   }
 }
 
@@ -233,7 +233,7 @@ std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64
   std::sort(drives.begin(), drives.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
   const auto same = [](const DriveRecord& a, const DriveRecord& b) { return a.id == b.id; };
   if (std::adjacent_find(drives.begin(), drives.end(), same) != drives.end()) {
-    throw damaged(database.name(), "a drive is there twice");
+    throw damaged(database.name(), "it holds a drive twice");
   }
   return drives;
 }

@@ -13,8 +13,8 @@
 
 namespace bki_mapping {
 
-/// CRC-32 (that of zlib) of a row's values: integers and real numbers as 8 bytes, little-endian; texts as
-/// their length, an integer, and their bytes; nothing for NULL.
+/// zlib's CRC-32 of a row's values: integers and real numbers as 8 bytes, little-endian; texts as their
+/// length, an integer, followed by their bytes; NULL as nothing.
 class RowChecksum {
  public:
   void add(std::int64_t value);
@@ -26,7 +26,7 @@ class RowChecksum {
   std::uint32_t value_ = 0;
 };
 
-/// Binds the fields of a row, and the row's checksum after them.
+/// Binds the fields of a row, followed by the row's checksum.
 class RowWriter {
  public:
   explicit RowWriter(Statement& statement) : statement_(statement) {}
@@ -61,7 +61,7 @@ class RowWriter {
   int column_ = 0;
 };
 
-/// Reads the fields of a row, and compares the row's checksum after them.
+/// Reads the fields of a row, and checks the row's checksum, which follows them.
 class RowReader {
  public:
   /// @param name of the file in errors.
@@ -95,7 +95,7 @@ class RowReader {
   }
   /// @return the checksum. @throws MapFileError if it is wrong.
   std::uint32_t finish() const;
-  /// Of all texts of the row [bytes].
+  /// The size of all texts of the row [bytes].
   std::int64_t textSize() const { return text_size_; }
 
  private:
@@ -106,7 +106,7 @@ class RowReader {
   int column_ = 0;
 };
 
-/// How many rows the other tables have, so that none can be lost unnoticed.
+/// The number of rows of the other tables: without it, a lost row would go unnoticed.
 struct Totals {
   std::int64_t classes = 0, drives = 0, tiles = 0, blocks = 0, planes = 0;
   /// Sum of the checksums of all rows of the other tables.
@@ -118,7 +118,7 @@ struct Totals {
   }
 };
 
-/// Each reads or writes one row: the columns in the order of the table. @return the row's checksum.
+/// Each function reads or writes one row, with the columns in the order of the table. @return the checksum.
 std::uint32_t writeMapRow(Database& database, const MapInfo& info);
 std::uint32_t readMapRow(Database& database, MapInfo& info, std::string& table_name);
 std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const SemanticClass& c);
@@ -126,9 +126,9 @@ std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
 void writeTotals(Database& database, const Totals& totals);
 Totals readTotals(Database& database);
 
-/// All rows of a table, sorted by position or id. @param expected number of rows, if it is known.
-/// @param[in,out] checksums is added to.
-/// @throws MapFileError if there are other rows.
+/// All rows of a table, sorted by position or id. @param expected the number of rows, if it is known.
+/// @param[in,out] checksums the checksums of the rows are added to it.
+/// @throws MapFileDamaged if the table has another number of rows, or a row is not valid.
 std::vector<SemanticClass> readClasses(Database& database, std::int64_t expected, std::int64_t& checksums);
 std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64_t> expected,
                                     std::int64_t& checksums);

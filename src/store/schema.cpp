@@ -12,7 +12,7 @@ struct SchemaEntry {
   const char *type, *name, *sql;
 };
 
-// Sorted by name. The index has all columns of the list of tiles, so that listing reads no content.
+// Sorted by name. The index covers the list of tiles, so that a list is read without any content.
 constexpr SchemaEntry kSchema[] = {
     {"table", "class",
      "CREATE TABLE class (position INTEGER, id INTEGER, name TEXT, red INTEGER, green INTEGER, blue INTEGER, "
@@ -90,7 +90,7 @@ void checkSchema(const Database& database) {
       throw damaged(database.name(), "its tables are not those of a map");
     }
   }
-  if (select.step()) throw damaged(database.name(), "it has tables that a map has not");
+  if (select.step()) throw damaged(database.name(), "it has tables that do not belong to a map");
 }
 
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file The tables of a map file, and its versions.
+/// @file The tables of a map file, and the version of its format.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ constexpr std::int64_t kFormatVersion = 1;
 void createSchema(Database& database);
 
 /// Checks that a file is a map, before SQLite interprets any of it. @return the version of its format.
-/// @throws MapFileError if it is no map, or of a newer version.
+/// @throws MapFileError if it is not a map, or has a newer version.
 std::int64_t checkIdentity(const Database& database);
-/// Checks that no part is missing at the end of a file.
+/// Checks that a file has not been cut off at its end.
 void checkComplete(const Database& database);
-/// Checks that the tables are those of kFormatVersion, and nothing else.
+/// Checks that the file has the tables of kFormatVersion, and no others.
 void checkSchema(const Database& database);
 
 }  // namespace bki_mapping

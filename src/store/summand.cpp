@@ -9,8 +9,8 @@
 namespace bki_mapping {
 namespace {
 
-/// Takes the evidence and the marks of a map from those of a sum that holds them.
-/// @return false if that is impossible, because the sum has stopped at the end of its range.
+/// Subtracts the evidence and marks of a map from a sum that contains them.
+/// @return false if that is impossible because the sum is saturated.
 bool subtract(SemanticMap& sum, const SemanticMap& other) {
   bool possible = true;
   for (const auto& [index, block] : other.entries()) {
@@ -33,7 +33,7 @@ bool subtract(SemanticMap& sum, const SemanticMap& other) {
   return possible;
 }
 
-/// A block of the target, made of the voxels of other blocks.
+/// A block of the target, whose voxels come from several blocks of the source.
 void gatherBlock(const SemanticMap& source, const GridTransform& transform, const BlockIndex& index,
                  SemanticMap& target) {
   struct Voxel {
@@ -110,8 +110,8 @@ void Summand::addStored(SemanticMap& map, const GridIndex& tile) const {
     if (!file.addTileTo(other, {tile, part}) || subtract(map, other)) continue;
     throw MapFileError(
         "evidence in " + path() +
-        " has reached its greatest value, 32,768, so that drives cannot be told apart any more; "
-        "leave the drives that are kept apart in the map, and those of it out of other maps");
+        " has reached its greatest value, 32,768, so that its drives can no longer be separated; keep all "
+        "drives of this map, and leave them out of the other maps (--without)");
   }
 }
 
@@ -144,8 +144,8 @@ std::vector<Summand> summandsOf(const std::shared_ptr<PlacedFile>& source) {
     if (source->file.tiles().empty()) return summands;
     throw MapFileError(
         source->file.path() +
-        " does not say which drives are in it, so that none of them can be known to count once; "
-        "map them again with a program that names its drives");
+        " does not say which drives it contains, so that a drive could count twice; map the drives again "
+        "with a program that names them");
   }
   std::set<int> parts;
   for (const auto& [part, drives] : by_part) {

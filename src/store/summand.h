@@ -1,4 +1,4 @@
-/// @file The evidence that a map file holds apart from others, tile by tile.
+/// @file Summands of a map file: the evidence of some of its drives, separate from the others.
 #pragma once
 
 #include <memory>
@@ -11,33 +11,34 @@
 
 namespace bki_mapping {
 
-/// A map file, and where its map lies in another one.
+/// A map file, and the placement of its map in the frame of the result.
 struct PlacedFile {
   MapFile file;
   GridTransform transform;
-  bool placed;  ///< false: its map lies in the frame of the other one already
+  bool placed;  ///< false: the map's own frame is that of the result
 };
 
-/// The evidence of some drives in a map file that cannot be told apart there.
+/// The sum of the evidence of some drives, which a map file holds separate from its other drives. Read tile
+/// by tile.
 class Summand {
  public:
   /// The evidence in a part.
   Summand(std::shared_ptr<PlacedFile> source, std::set<std::string> drives, int part)
       : Summand(std::move(source), std::move(drives), part, {}) {}
-  /// The evidence in a part without that in others, whose sum it holds.
+  /// The evidence in a part minus the evidence in other parts. @param without parts that the part contains.
   Summand(std::shared_ptr<PlacedFile> source, std::set<std::string> drives, int part, std::set<int> without)
       : source_(std::move(source)), drives_(std::move(drives)), part_(part), without_(std::move(without)) {}
 
-  /// Ids; at least one.
+  /// The ids of the drives; at least one.
   const std::set<std::string>& drives() const { return drives_; }
   const std::string& path() const { return source_->file.path(); }
   bool isOf(const PlacedFile& file) const { return source_.get() == &file; }
 
-  /// The tiles of the other map that may hold evidence, sorted. @throws std::invalid_argument if they are too
+  /// The tiles of the result that may receive evidence, sorted. @throws std::invalid_argument if they are too
   /// far from the origin.
   std::vector<GridIndex> tiles() const;
-  /// The evidence in a tile of the other map. @throws MapFileError as MapFile, and if evidence that must be
-  /// taken from a sum has stopped at the end of its range there.
+  /// The evidence for a tile of the result. @throws MapFileError as MapFile does, and if evidence must be
+  /// subtracted from a sum that is saturated there.
   SemanticMap read(const GridIndex& tile) const;
 
  private:
@@ -50,8 +51,8 @@ class Summand {
   std::set<int> without_;
 };
 
-/// What each file holds apart: its parts, what is in none of them, and its sum. Sorted by number of drives,
-/// then by ids. @throws MapFileError if a file has evidence, but no drives.
+/// All summands of a file: each of its parts, the rest that is in no part, and the sum of all. Sorted by
+/// number of drives, then by ids. @throws MapFileError if a file has evidence, but no drives.
 std::vector<Summand> summandsOf(const std::shared_ptr<PlacedFile>& source);
 
 /// Whether two maps hold the same evidence and occlusion marks, to the bit. Neither has empty blocks.

@@ -11,7 +11,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr std::size_t kMaskBytes = kBlockVoxels / 8;
-/// Deflate's limit: a compressed byte stands for no more bytes than this.
+/// Deflate's limit: a compressed byte expands to at most this many bytes.
 constexpr std::size_t kMostInflation = 1032;
 constexpr std::size_t kLengthBytes = 4;
 
@@ -51,7 +51,7 @@ Block::Occlusion readMask(const char* bytes) {
   return marks;
 }
 
-/// Fills a plane with the values of the voxels in a mask. @return the first value that is left.
+/// Fills a plane with values at the voxels of a mask, and with 0 elsewhere. @return the next unused value.
 const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, EvidenceUnits* plane) {
   for (std::size_t byte = 0; byte < kMaskBytes; ++byte, plane += 8) {
     for (unsigned bits = static_cast<unsigned char>(mask[byte]), v = 0; v < 8; ++v, bits >>= 1) {
@@ -67,7 +67,7 @@ const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, Ev
 /// The streams of zlib, which take a quarter of a megabyte to set up.
 struct TileCodec::Zlib {
   Zlib() {
-    // Runs are all that repeats here: looking for longer matches costs time and gains nothing.
+    // Only runs of equal bytes repeat here; a search for longer matches costs time and gains nothing.
     if (deflateInit2(&packing, 1, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
       throw std::bad_alloc();
     }
@@ -163,7 +163,7 @@ void TileCodec::appendPacked(Section section) {
   if (section != kList && !bytes.empty()) {
     z_stream& stream = zlib_->packing;
     deflateReset(&stream);
-    packed_.resize(before + bytes.size() - 1);  // no better than stored otherwise
+    packed_.resize(before + bytes.size() - 1);  // room for a stream that is shorter than the section itself
     stream.next_in = const_cast<Bytef*>(bytesOf(bytes));
     stream.avail_in = static_cast<uInt>(bytes.size());
     stream.next_out = bytesOf(packed_) + before;
@@ -336,7 +336,7 @@ void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
       block.setOcclusion(block.occlusion() | readMask(marks));
       marks += kMaskBytes;
     }
-    if (block.empty()) map.erase(index);  // negative evidence may have undone all of it
+    if (block.empty()) map.erase(index);  // negative evidence may have cancelled all of it
   }
 }
 

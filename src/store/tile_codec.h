@@ -1,4 +1,4 @@
-/// @file The content of a tile as bytes: packed without loss. docs/map_file.md specifies it.
+/// @file Packs the content of a tile into bytes, without loss. docs/map_file.md specifies the format.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace bki_mapping {
 
-/// Packs and unpacks tiles. Keeps its working memory. Not thread-safe.
+/// Packs and unpacks tiles. Keeps its working memory from tile to tile. Not thread-safe.
 class TileCodec {
  public:
   /// @param classes of the map.
@@ -22,27 +22,27 @@ class TileCodec {
   TileCodec(const TileCodec&) = delete;
   TileCodec& operator=(const TileCodec&) = delete;
 
-  /// Packs the blocks that a map has in a tile; blocks and planes without content are left out. The bytes
-  /// stay in packed() until the next call. @return an entry with 0 blocks if none is left.
+  /// Packs the blocks that a map has in a tile, and leaves out empty blocks and planes. The bytes stay in
+  /// packed() until the next call. @return the tile's entry; it has 0 blocks if all are empty.
   /// @throws std::invalid_argument if a block has a class that is not in the table.
   TileEntry pack(const SemanticMap& map, const TileKey& key);
   const std::string& packed() const { return packed_; }
 
-  /// Unpacks a tile and checks it. Takes at most kMemoryPerByte times the memory of the packed bytes.
-  /// @return what is wrong; "" if nothing is. The content then waits for addTo().
+  /// Unpacks a tile and checks it. Uses at most kMemoryPerByte bytes of memory for each packed byte.
+  /// @return what is wrong with it; "" if nothing is, and the content is ready for addTo().
   std::string unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
                      std::size_t size);
-  /// Adds what unpack() has read to a map, as SemanticMap::add does.
+  /// Adds the content that unpack() has read to a map, as SemanticMap::add does.
   void addTo(SemanticMap& map, const TileKey& key) const;
 
   /// A plane has one byte in the list of classes, which is not compressed.
   static constexpr std::size_t kMemoryPerByte = kBlockVoxels * sizeof(EvidenceUnits);
 
  private:
-  /// The content, in the pieces that are compressed one by one.
+  /// The sections of the content, each compressed by itself.
   enum Section : std::size_t {
-    kList,   ///< 2 bytes a block: its number; 1: how many planes; 1: whether it has marks; 1 a plane: class
-    kMasks,  ///< 512 bits for the occlusion marks of each block with marks, then for each plane: evidence?
+    kList,  ///< for each block its number (2 bytes), number of planes, and whether it has marks; then classes
+    kMasks,  ///< 512 bits for the marks of each block that has any; then for each plane, where evidence is
     kByte0,  ///< the lowest byte of each evidence other than 0
     kByte1,
     kByte2,
@@ -61,13 +61,13 @@ class TileCodec {
   /// Checks the list. @param[out] marked number of blocks with occlusion marks.
   std::string checkList(const TileEntry& entry, std::size_t& marked) const;
 
-  std::bitset<256> allowed_;  ///< classes that a plane may have
+  std::bitset<256> allowed_;  ///< the class ids that planes may have
   std::array<std::string, kSections> sections_;
   std::string packed_, bytes_;
-  // Pieces of kList and kMasks:
+  // Parts of kList and kMasks:
   std::string numbers_, plane_counts_, marked_, classes_, marks_, evidence_masks_;
   std::vector<std::uint32_t> values_;  ///< evidence other than 0, plane after plane
-  int blocks_ = 0;                     ///< that unpack() has read
+  int blocks_ = 0;                     ///< number of blocks that unpack() has read
   std::unique_ptr<Zlib> zlib_;
 };
 

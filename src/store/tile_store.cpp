@@ -8,10 +8,10 @@
 namespace bki_mapping {
 namespace {
 
-/// A change of the file takes jobs until they hold so much memory [bytes].
+/// One change of the file takes jobs until they hold this much memory [bytes].
 constexpr std::size_t kChangeBytes = 64 << 20;
 
-/// std::function wants to be copied, and maps cannot be.
+/// std::function requires that its target can be copied, and maps cannot be copied.
 std::shared_ptr<SemanticMap> shared(SemanticMap map) {
   return std::make_shared<SemanticMap>(std::move(map));
 }
@@ -163,7 +163,7 @@ std::string TileStore::close() {
   if (thread_.joinable()) thread_.join();
   file_.reset();
   if (jobs_.empty()) return "";
-  return fault_ + "; what was not yet written to the map file is lost";
+  return fault_ + "; evidence that was not yet in the map file is lost";
 }
 
 TileStore::Call TileStore::enqueue(Job job) {
@@ -216,12 +216,12 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
       any |= !job->done;
     }
     if (any) change.commit();
-  } catch (const MapFileLateCommit&) {  // the last trial has succeeded after all
+  } catch (const MapFileLateCommit&) {  // the previous trial succeeded after all
     jobs.resize(last_trial_);
     bytes = 0;
     for (const Job* job : jobs) bytes += job->bytes;
   } catch (const std::bad_alloc&) {
-    fault = "the computer's memory does not suffice to write to " + file_->path();
+    fault = "there is not enough memory to write to " + file_->path();
   } catch (const std::exception& error) {
     fault = error.what();
   }
@@ -243,7 +243,7 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
   }
   tried_.notify_all();
   lock.unlock();
-  ended.clear();  // frees the maps while others may call
+  ended.clear();  // frees the maps while the lock is released
   lock.lock();
   return fault.empty();
 }

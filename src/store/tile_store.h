@@ -1,4 +1,4 @@
-/// @file A map file on a thread of its own, so that nobody waits for the disk.
+/// @file A map file with a thread of its own, so that callers never wait for the disk.
 #pragma once
 
 #include <chrono>
@@ -18,75 +18,77 @@
 
 namespace bki_mapping {
 
-/// Reads and changes a map file in the order of the calls. Changes become durable together with what was
-/// called before them; what fails, as on a full disk, is tried again until it succeeds. All functions return
-/// at once, and are for one thread.
+/// Reads and changes a map file, in the order of the calls. A change becomes durable only after, or together
+/// with, all earlier ones. A change that fails, for example because the disk is full, is tried again until it
+/// succeeds. Functions return at once unless they say otherwise. Not thread-safe.
 class TileStore {
  public:
   /// Number of a call, 1 for the first one.
   using Call = std::uint64_t;
-  /// Evidence that comes back, to be added to the map in memory.
+  /// The answer to a call: evidence for the map in memory.
   struct Arrival {
     enum class Kind {
-      kLoaded,   ///< what the file has in the tile; nothing if it has no such tile
-      kDamaged,  ///< the tile in the file cannot be read, and stays there as it is: nothing
-      kReturned  ///< likewise: what was to be added to it
+      kLoaded,   ///< `map` is the tile in the file; empty if the file has no such tile
+      kDamaged,  ///< the tile in the file cannot be read, and stays there as it is; `map` is empty
+      kReturned  ///< the tile in the file cannot be read; `map` is the evidence that add() should have added
     };
     Kind kind;
     GridIndex tile;
     SemanticMap map;
-    Call call;  ///< whose answer this is
+    Call call;  ///< the call that this answers
   };
 
-  /// @param retry time between two trials of what fails.
+  /// @param retry time between two trials of a change that fails.
   explicit TileStore(MapFile file, std::chrono::milliseconds retry = std::chrono::seconds(1));
-  /// As close().
+  /// Does what close() does.
   ~TileStore();
 
-  /// Asks for a tile.
+  /// Requests a tile; it comes as an Arrival.
   Call load(const GridIndex& tile);
   /// Replaces a tile in the file. @param map as in MapFile::Change::writeTile.
   void replace(const GridIndex& tile, SemanticMap map);
-  /// Adds to a tile in the file. If that is damaged, the evidence arrives again.
+  /// Adds evidence to a tile in the file. If the tile is damaged, the evidence comes back as an Arrival.
   void add(const GridIndex& tile, SemanticMap map);
 
-  /// Replaces tiles in the file by copies of those in memory, and writes the drive. @return ready when this
-  /// and all that was called before is durable.
+  /// Replaces tiles in the file by copies of those in memory, and writes the drive. @return becomes ready
+  /// when this and all earlier changes are durable.
   std::future<void> save(SemanticMap snapshot, std::vector<GridIndex> tiles, const DriveRecord& drive);
   /// Empties the file.
   Call clear();
-  /// Changes the tiles of the file. @param change adds to, or takes from, a map with one tile.
+  /// Changes tiles of the file. @param change is called with a map that holds one of the tiles, and changes
+  /// it.
   void changeTiles(std::vector<GridIndex> tiles, std::function<void(SemanticMap&)> change);
   void putDrive(const DriveRecord& drive);
-  /// Copies the file. @return ready when the copy is complete, or with the error.
+  /// Copies the file. @return becomes ready when the copy is complete, or throws the error.
   std::future<void> copyTo(const std::string& path);
 
-  /// What has arrived, in the order of the calls.
+  /// Takes the arrivals since the last call, in the order of the calls that they answer.
   std::vector<Arrival> takeArrivals();
-  /// Waits until all that was called has been tried.
+  /// Waits until every call so far has been tried at least once.
   void waitForTrial();
-  /// Why changes fail at present; "" if they do not.
+  /// Why changes fail at the moment; "" if they do not.
   std::string fault() const;
-  /// Memory of what is not yet durable [bytes].
+  /// Memory of the changes that are not yet durable [bytes].
   std::size_t waitingBytes() const;
 
-  /// Tries what is left once more, and ends the thread. @return what was lost and why; "" if nothing was.
+  /// Tries the remaining changes once more, ends the thread, and waits for it. @return what was lost, and
+  /// why; "" if nothing was.
   std::string close();
 
  private:
-  /// @return whether it must be done again if the change fails.
+  /// @return whether the work must be repeated if the change fails.
   using Work = std::function<bool(MapFile& file, MapFile::Change& change, Call call)>;
   struct Job {
     Work work;
     std::size_t bytes = 0;
     std::optional<std::promise<void>> durable = std::nullopt;
-    bool first = false;  ///< what was called before must be durable: it asks the file for its drives
+    bool first = false;  ///< all earlier jobs must be durable before this one, which reads the list of drives
     bool done = false;
   };
 
   Call enqueue(Job job);
   void run();
-  /// Tries the first jobs, as one change. @return whether they are durable.
+  /// Tries the first jobs as one change. @return whether they are durable.
   bool tryJobs(std::unique_lock<std::mutex>& lock);
   void arrive(Arrival arrival);
 
@@ -103,7 +105,7 @@ class TileStore {
   std::size_t last_trial_ = 0;  ///< number of jobs in the last trial that failed
   std::size_t failures_ = 0;    ///< number of trials that failed
   bool closing_ = false;
-  std::thread thread_;  ///< last, so that it starts when all else is there
+  std::thread thread_;  ///< last, so that it starts after all other members
 };
 
 }  // namespace bki_mapping

@@ -151,7 +151,7 @@ TEST(MapFile, RefusesOtherFiles) {
   EXPECT_NE(fault(path).find("cannot be opened"), std::string::npos) << fault(path);
   std::ofstream(path) << std::string(5000, 'x');
   EXPECT_NE(fault(path).find("is not a map of bki_mapping"), std::string::npos) << fault(path);
-  EXPECT_NE(fault("/dev/null").find("no regular file"), std::string::npos) << fault("/dev/null");
+  EXPECT_NE(fault("/dev/null").find("not a regular file"), std::string::npos) << fault("/dev/null");
   // Somebody else's file is replaced, as by any program that saves.
   saveMap(path, infoOf(), {}, randomMap(1));
   EXPECT_EQ(fault(path), "");

@@ -230,11 +230,10 @@ TEST_F(MapMerge, TakesDrivesOut) {
   EXPECT_TRUE(bytesOf(folder_ / "c") == bytesOf(folder_ / "d"));
   merge({kept}, folder_ / "c", false, {"a", "b", "c", "d"});
   EXPECT_EQ(loadMap(folder_ / "c").map.size(), 0u);
-  EXPECT_EQ(
-      refusal({kept, b}, false, {"c"}),
-      "drive 'c' cannot be left out: " + kept +
-          " holds its evidence only in a sum with that of 'd'; leave that out, too, or make the file with "
-          "--keep-drives");
+  EXPECT_EQ(refusal({kept, b}, false, {"c"}), "drive 'c' cannot be left out: " + kept +
+                                                  " holds its evidence only in a sum with that of 'd'; leave "
+                                                  "that drive out, too, or make the file with "
+                                                  "--keep-drives");
   EXPECT_EQ(refusal({cd, a}, false, {"x"}), "drive 'x' is in none of the maps; they hold 'a', 'c', 'd'");
 }
 

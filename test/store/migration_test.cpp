@@ -63,7 +63,7 @@ TEST(Migration, RefusesWhatItCannotRead) {
   EXPECT_NE(fault().find(old + " is damaged"), std::string::npos) << fault();
   change(old, kVersionByte, kFormatVersion);
   EXPECT_EQ(fault(), "");
-  EXPECT_EQ(fault(), output + " is there already; choose another name");
+  EXPECT_EQ(fault(), output + " exists already; choose another name");
   std::filesystem::remove(output);
   // A byte in the content of a tile.
   const std::size_t content = bytesOf(old).find("\x78\x01");  // a zlib stream

@@ -398,9 +398,9 @@ class Tools(unittest.TestCase):
     def test_what_is_no_file_is_refused_before_the_work(self):
         pipe, good = self.path('pipe'), self.path('good.json')
         os.mkfifo(pipe)
-        self.fails('pipe is a pipe, no regular file', 'map_sequence', '--sequence', self.drive, '--report', pipe)
-        self.fails('pipe is a pipe, no regular file', 'evaluate_map', '--sequence', self.drive, '--json', pipe)
-        self.fails('pipe is a pipe, no regular file', 'benchmark_sequence', '--sequence', self.drive, '--csv', pipe)
+        self.fails('pipe is a pipe, not a regular file', 'map_sequence', '--sequence', self.drive, '--report', pipe)
+        self.fails('pipe is a pipe, not a regular file', 'evaluate_map', '--sequence', self.drive, '--json', pipe)
+        self.fails('pipe is a pipe, not a regular file', 'benchmark_sequence', '--sequence', self.drive, '--csv', pipe)
         self.assertTrue(stat.S_ISFIFO(os.stat(pipe).st_mode))
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--report', good, '--output',
                    '/no/such/map.ply')
@@ -560,7 +560,7 @@ class Tools(unittest.TestCase):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
         self.assertIn('version 1, from version 1', self.succeeds('migrate_map', a, copy).stdout)
         self.assertEqual(self.tiles_of(copy), self.tiles_of(a))
-        self.fails('is there already', 'migrate_map', a, copy)
+        self.fails('exists already', 'migrate_map', a, copy)
         self.fails('there must be two files', 'migrate_map', a)
         self.fails('must end in .bkm', 'migrate_map', a, self.path('copy.db'))
         self.fails('is not a map', 'migrate_map', os.path.join(self.drive, 'poses.txt'), self.path('never.bkm'))

@@ -12,15 +12,15 @@
 
 namespace bki_mapping {
 
-/// The tile of 8 x 8 x 8 blocks with an index, as Region::regionOf gives it, in one part of the file.
-/// Part 0 is the map, the sum of all drives. Each of the other parts holds the evidence of one drive alone,
-/// or of several that cannot be told apart (DriveRecord::part).
+/// Names a tile of 8 x 8 x 8 blocks: its index, as Region::regionOf gives it, and the part of the file that
+/// holds it. Part 0 is the map, the sum of all drives. Each other part holds the evidence of a single drive,
+/// or the sum of several (DriveRecord::part).
 struct TileKey {
   GridIndex index;
   int part = 0;
 };
 
-/// What the list of tiles says of one.
+/// A row of the list of tiles.
 struct TileEntry {
   GridIndex index;
   int blocks = 0;              ///< 1 to 512
@@ -32,21 +32,21 @@ struct TileEntry {
   }
 };
 
-/// An open map file. Many may read a file, or one may update it: who comes second is refused. The lock goes
-/// with the process, however that ends. What was committed stays, whatever happens to the process or the
-/// power; what was not is gone.
+/// An open map file. Either one object updates a file, or any number of them read it; the constructor refuses
+/// other combinations. The lock is released when the process ends, even if it is killed. Committed changes
+/// survive a killed process and a power failure; other changes are undone.
 ///
 /// Not thread-safe, but may move between threads. Each function throws MapFileError if the file cannot be
-/// read or written, is damaged, or is no map file. A failed call changes nothing.
+/// read or written, is damaged, or is not a map file. A failed call changes nothing.
 class MapFile {
  public:
   enum class Access { kRead, kUpdate };
 
-  /// Opens a file and checks all of it but the content of the tiles. A file that a killed process left in
-  /// the middle of a change is restored to the state before it.
+  /// Opens a file and checks all of it except the content of the tiles. If a process was killed in the middle
+  /// of a change, the change is undone first.
   MapFile(const std::string& path, Access access);
   /// Creates a file without tiles or drives, and opens it for update.
-  /// @throws MapFileError if there is such a file already, std::invalid_argument if the info is invalid.
+  /// @throws MapFileError if the file exists already, std::invalid_argument if the info is invalid.
   static MapFile create(const std::string& path, const MapInfo& info);
   ~MapFile();
   MapFile(MapFile&&) noexcept;
@@ -54,7 +54,7 @@ class MapFile {
 
   const std::string& path() const;
   const MapInfo& info() const;
-  /// Of all parts together.
+  /// The size of all parts together.
   struct Size {
     std::uint64_t tiles, blocks, planes;
     std::uint64_t bytes;  ///< of the file
@@ -66,18 +66,19 @@ class MapFile {
   std::vector<int> parts();
   /// All tiles of a part, sorted by index (z, then y, then x). Reads no content.
   std::vector<TileEntry> tiles(int part = 0);
-  /// The tiles from `low` to `high`, both included. The cost grows with the tiles in the range along z.
+  /// The tiles from `low` to `high`, both included. The cost grows with the number of tiles between them in
+  /// z.
   std::vector<TileEntry> tilesIn(const GridIndex& low, const GridIndex& high, int part = 0);
   std::optional<TileEntry> findTile(const TileKey& key);
 
-  /// Adds a stored tile to a map, as SemanticMap::add does. Where the map has no block, it then holds the
-  /// stored one to the bit. @return false if the file has no such tile; the map is then unchanged.
-  /// @throws std::invalid_argument if resolution, prior or number of classes of the map differ,
-  /// std::bad_alloc; blocks of the tile may then be missing in the map.
+  /// Adds a stored tile to a map, as SemanticMap::add does. Where the map has no block, it gets an exact copy
+  /// of the stored one. @return false if the file has no such tile; the map is then unchanged.
+  /// @throws std::invalid_argument if resolution, prior or number of classes of the map differ.
+  /// @throws std::bad_alloc; the map may then lack some blocks of the tile.
   bool addTileTo(SemanticMap& map, const TileKey& key);
 
-  /// A change of the file: becomes durable as a whole by commit(), or not at all. The file must outlive it,
-  /// and have only one at a time.
+  /// A change of the file. commit() makes it durable as a whole; without it, the change is undone. The file
+  /// must outlive the change, and can have only one change at a time.
   class Change {
    public:
     ~Change();
@@ -91,8 +92,8 @@ class MapFile {
     /// @throws std::invalid_argument if the record is invalid.
     void putDrive(const DriveRecord& drive);
     void eraseDrive(const std::string& id);
-    /// Returns when the change is on the disk. The object must not be used after it.
-    /// If it throws, the change is not made; see MapFile::change() for the one exception.
+    /// Writes the change to the disk, and returns when it is durable. The object must not be used afterwards.
+    /// If the function throws, the change is not made; MapFile::change() describes the one exception.
     void commit();
 
    private:
@@ -101,8 +102,9 @@ class MapFile {
     explicit Change(MapFile& file);
     std::unique_ptr<State> state_;
   };
-  /// @throws std::logic_error if the file is open for reading; MapFileLateCommit, once, if the disk failed at
-  /// the very end of the last commit(), which then threw another error.
+  /// Begins a change. @throws std::logic_error if the file is open for reading only.
+  /// @throws MapFileLateCommit, once, if the last commit() threw an error at its very end, but the change has
+  /// reached the disk.
   Change change();
 
  private:
@@ -112,20 +114,21 @@ class MapFile {
   std::unique_ptr<State> state_;
 };
 
-/// A map file in the making. It replaces what `path` holds when commit() returns, and nothing before
-/// (AtomicFile). A map that is there is locked for others until then.
+/// A map file that is being written. It replaces the file at `path` as a whole when commit() is called, as
+/// AtomicFile does. Until then an existing map at `path` is locked.
 class NewMapFile {
  public:
-  /// @param info MapInfo::program is set by the library.
-  /// @param replaced the map at `path`, if it is open for update here; it must not be used after commit().
-  /// @throws MapFileError if the file cannot be written, MapFileInUse if it is open in another place,
+  /// @param info without MapInfo::program, which the library sets.
+  /// @param replaced the map at `path`, if the caller has it open for update; it must not be used after
+  /// commit(). @throws MapFileError if the file cannot be written, MapFileInUse if it is open elsewhere,
   /// std::invalid_argument if the info is invalid.
   NewMapFile(const std::string& path, const MapInfo& info, const MapFile* replaced = nullptr);
   ~NewMapFile();
 
-  /// What to write into the file. Its commit() must not be called.
+  /// The change that fills the file. Call NewMapFile::commit() instead of the commit() of the change.
   MapFile::Change& content();
-  /// Returns when the file is on the disk. The object must not be used after it. @throws MapFileError.
+  /// Replaces the file at `path`, and returns when the new one is on the disk. The object must not be used
+  /// afterwards. @throws MapFileError.
   void commit();
 
  private:
@@ -133,31 +136,31 @@ class NewMapFile {
   std::unique_ptr<State> state_;
 };
 
-/// A whole map in memory: the sum of all drives, without the parts of single ones.
+/// A whole map in memory: the sum of all drives, without the parts of single drives.
 struct StoredMap {
   MapInfo info;
-  std::vector<DriveRecord> drives;  ///< all of part 0
+  std::vector<DriveRecord> drives;  ///< their part is 0
   SemanticMap map;
 };
 
-/// Writes a map to a file by NewMapFile.
-/// @param info resolution and prior are taken from the map. @param drives their parts are set to 0.
-/// @throws as NewMapFile, and std::invalid_argument if a drive is invalid.
+/// Writes a map to a file, as NewMapFile does.
+/// @param info without resolution and prior, which come from the map. @param drives are written with part 0.
+/// @throws as NewMapFile; std::invalid_argument if a drive is invalid.
 void saveMap(const std::string& path, const MapInfo& info, const std::vector<DriveRecord>& drives,
              const SemanticMap& map);
 
-/// Copies a map file, all parts of it, to another one by NewMapFile. @throws as NewMapFile, MapFileError.
+/// Copies a map file with all its parts, as NewMapFile does. @throws MapFileError, and as NewMapFile.
 void copyMap(MapFile& file, const std::string& path);
 
 /// Reads a whole map (part 0) and checks every byte of it.
-/// @param memory_limit for the map [bytes]; 0: none. @throws MapFileError, also if the map would exceed the
-/// limit, then before its memory is taken; std::bad_alloc.
+/// @param memory_limit for the map [bytes]; 0: no limit. @throws MapFileError, also if the map would exceed
+/// the limit, and then before its memory is allocated; std::bad_alloc.
 StoredMap loadMap(const std::string& path, std::size_t memory_limit = 0);
 /// The same of an open file.
 StoredMap readMap(MapFile& file, std::size_t memory_limit = 0);
 
-/// Checks that what is mapped elsewhere can be added to the map in a file: same frame and same grid.
-/// @param own what the other map is; without a frame, any is right.
+/// Checks that another map can be added to the map in a file: they must have the same frame and grid.
+/// @param own describes the other map; an empty frame matches every frame.
 /// @throws MapFileError in one sentence with the file and both values.
 void checkFits(const MapFile& file, const MapInfo& own);
 

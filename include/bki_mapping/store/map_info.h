@@ -1,4 +1,4 @@
-/// @file What a map file says of its map.
+/// @file What a map file says about its map.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -19,18 +19,18 @@ class MapFileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
-/// What a map file holds is not what was written.
+/// The content of a map file is not what was written.
 class MapFileDamaged : public MapFileError {
  public:
   using MapFileError::MapFileError;
 };
-/// A change of which MapFile::Change::commit() could but say that it failed is in the file after all, as a
-/// whole, and must not be made again.
+/// A change whose MapFile::Change::commit() reported a failure has reached the file completely after all. It
+/// must not be repeated.
 class MapFileLateCommit : public MapFileError {
  public:
   using MapFileError::MapFileError;
 };
-/// Another process, or another place in this one, has the file open.
+/// The file is open elsewhere, in another process or in this one.
 class MapFileInUse : public MapFileError {
  public:
   using MapFileError::MapFileError;
@@ -47,7 +47,7 @@ struct MapInfo {
   int unit_exponent = kUnitExponent;
   std::string frame;                          ///< name of the map frame
   std::shared_ptr<const ClassTable> classes;  ///< never nullptr
-  std::string parameters;  ///< the mapper's settings, for humans and for resuming; YAML, at most 1 MB
+  std::string parameters;  ///< the mapper's settings, for people and for resuming; YAML, at most 1 MB
   /// Name and version of the program that created the file; set by the library.
   std::string program;
 
@@ -57,14 +57,14 @@ struct MapInfo {
 
 /// A drive whose scans are in a map.
 struct DriveRecord {
-  std::string id;    ///< unique to the drive, wherever it was recorded; not empty, at most 1 MB
-  std::string name;  ///< for humans
-  /// The part of the file that holds the drive's evidence, > 0, together with that of the other drives of the
-  /// same part; 0: the evidence is in the sum only.
+  std::string id;    ///< identifies the drive in every map that contains it; not empty, at most 1 MB
+  std::string name;  ///< for people
+  /// 0: the file holds the drive's evidence only in the sum of all drives. > 0: the number of the part that
+  /// also stores it separately; drives with the same number share a part.
   int part = 0;
   std::uint64_t scans = 0;
   std::uint64_t first_stamp = 0, last_stamp = 0;  ///< of the scans [ns], below 2^63
-  Eigen::AlignedBox3d bounds;                     ///< of the voxels that it saw, map frame [m]; may be empty
+  Eigen::AlignedBox3d bounds;  ///< bounding box of the blocks that it touched, map frame [m]; may be empty
 
   bool operator==(const DriveRecord& other) const;
 
@@ -72,9 +72,9 @@ struct DriveRecord {
   void addScan(std::uint64_t stamp, const GridGeometry& geometry, const std::vector<GridIndex>& touched);
 };
 
-/// Checks that maps can be added: same resolution, unit, prior, and classes with the same ids and names.
-/// Colours and flags of classes may differ.
-/// @param name, other_name what the error calls the two maps, such as their files.
+/// Checks that two maps can be added: they must have the same resolution, unit and prior, and classes with
+/// the same ids and names. Colours and flags of classes may differ.
+/// @param name, other_name names of the two maps for the error, such as their files.
 /// @throws std::invalid_argument in one sentence with both values of the first difference.
 void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,
                    const MapInfo& other);

@@ -21,39 +21,38 @@ struct MapPlacement {
 
 struct MergeInput {
   std::string path;
-  /// In the frame of the result; without it, the map is in that frame already.
+  /// Where the map lies in the frame of the result. Without a placement, its frame is the result's frame.
   std::optional<MapPlacement> placement;
 };
 
 struct MergeOptions {
   std::vector<MergeInput> inputs;
-  std::string output;        ///< may be one of the inputs
-  bool keep_drives = false;  ///< stores the evidence of each drive apart as well, as far as the inputs do
-  std::vector<std::string> without;  ///< ids of drives to be left out
-  /// Is told how many tiles are done.
+  std::string output;                ///< may be one of the inputs
+  bool keep_drives = false;          ///< also stores each drive separately, as far as the inputs allow
+  std::vector<std::string> without;  ///< ids of the drives to leave out
+  /// Called with the number of tiles done, and of all.
   std::function<void(std::size_t done, std::size_t all)> progress;
 };
 
 struct MergeReport {
-  std::vector<DriveRecord> drives;    ///< of the result, sorted by id
-  std::vector<std::string> repeated;  ///< ids of the drives that more than one input has, sorted
-  std::vector<std::string>
-      resampled;  ///< inputs that were not moved by whole voxels and turned by 90 degrees
-  std::uint64_t tiles = 0, blocks = 0;  ///< of the result, parts not counted
-  /// Sums that stopped at the end of their range (kMostUnits), over voxels and classes.
+  std::vector<DriveRecord> drives;      ///< of the result, sorted by id
+  std::vector<std::string> repeated;    ///< ids of the drives that more than one input contains, sorted
+  std::vector<std::string> resampled;   ///< paths of the inputs whose placement is not exact
+  std::uint64_t tiles = 0, blocks = 0;  ///< in part 0 of the result
+  /// Number of sums of a voxel and class that were cut at the greatest evidence (kMostUnits).
   std::uint64_t saturated = 0;
 };
 
-/// Merges maps: the result is the sum of the drives that are in any of them, each counted once. It does not
-/// depend on the order of the inputs, and is written by NewMapFile. Holds one tile of each file, or those
-/// tiles from which one is resampled, and the lists of tiles, but never a map.
+/// Merges maps: the result is the sum of all drives in the inputs, each counted once. It does not depend on
+/// the order of the inputs. It is written as NewMapFile does. The memory needed is that of the lists of tiles
+/// and of one tile for each file (where a map is resampled, of the tiles that one tile is made from).
 ///
 /// Placements by whole voxels and multiples of 90 degrees are exact. With others, each voxel takes the
-/// evidence of the voxel in which its centre lies, so that some evidence is doubled or lost.
-/// @throws MapFileError if a file cannot be read or written, or if a drive is in two inputs and cannot be
-/// counted once, differs between them, or cannot be left out; std::invalid_argument if grids, classes or
-/// frames differ, a placement is not finite or moves blocks beyond GridGeometry::kMaxCoordinate, or a drive
-/// to be left out is in no input.
+/// evidence of the voxel that contains its centre, so that some evidence is doubled or lost.
+/// @throws MapFileError if a file cannot be read or written, or if a drive differs between two inputs, cannot
+/// be counted once, or cannot be left out; std::invalid_argument if grids, classes or frames differ, a
+/// placement is not finite or moves blocks beyond GridGeometry::kMaxCoordinate, or no input contains a drive
+/// that is to be left out.
 MergeReport mergeMaps(const MergeOptions& options);
 
 }  // namespace bki_mapping
