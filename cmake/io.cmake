@@ -14,7 +14,7 @@ bki_mapping_room(io SOURCES
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io PRIVATE pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
 target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
-# In builds for debugging OctoMap would tell standard error what it writes.
+# In debug builds OctoMap would print what it writes to standard error.
 set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG)
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)

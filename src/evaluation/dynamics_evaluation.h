@@ -63,8 +63,8 @@ class DynamicsEvaluation {
   /// SemanticKITTI's raw labels of moving objects, 252 to 259.
   static std::set<std::uint32_t> movingOfSemanticKitti();
 
-  /// Whether something that can move is in a voxel at the end, where that is known. Such a voxel need not be
-  /// cleared.
+  /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known. The map
+  /// need not clear such a voxel.
   using Taken = std::function<bool(const VoxelIndex&)>;
 
   /// @param scans number of scans that will be added. @param late voxels hit in this many last scans need not

@@ -1,4 +1,4 @@
-/// @file Wrong labels, to measure how a map bears them.
+/// @file Wrong labels, to measure how well a map copes with them.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-/// @file Wrong poses, to measure how a map bears them.
+/// @file Wrong poses, to measure how well a map copes with them.
 #pragma once
 
 #include <Eigen/Geometry>

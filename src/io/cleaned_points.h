@@ -25,10 +25,10 @@ struct CleanedCount {
   std::uint64_t kept = 0;    ///< of these in the file
 };
 
-/// Writes the points of scans that lie in occupied voxels of a map, as a binary PCD file by AtomicFile. So
-/// what moved away is not in it. Reads the scans again and holds one at a time.
-/// @param scans indices in the sequence. @param progress is told how many scans are done.
-/// @throws std::runtime_error if a scan cannot be read, or the file not written.
+/// Writes the points of scans that lie in occupied voxels of a map to a binary PCD file, as AtomicFile does.
+/// Objects that moved away, and that the map has cleared, are not in it. Reads the scans one at a time.
+/// @param scans indices in the sequence. @param progress called with the number of scans done.
+/// @throws std::runtime_error if a scan cannot be read, or the file cannot be written.
 CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,
                                 const std::vector<std::size_t>& scans, const SemanticMap& map,
                                 const std::function<void(std::size_t)>& progress = nullptr);

@@ -11,7 +11,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr Color kBackground = {255, 255, 255};
-/// Brightness of what is farthest from the viewer, as a fraction of that of the nearest.
+/// Brightness of the farthest voxels, as a fraction of that of the nearest.
 constexpr double kFarthest = 0.45;
 
 Color darkened(const Color& color, double brightness) {

@@ -44,7 +44,7 @@ class MapPicture {
 
  private:
   static constexpr int kNothing = std::numeric_limits<int>::min();
-  /// The nearest voxel behind a point of the picture.
+  /// The voxel that a point of the picture shows: the one nearest to the viewer.
   struct Cell {
     int nearness = kNothing;  ///< coordinate towards the viewer; kNothing: no occupied voxel
     ClassId label = kFreeClass;
@@ -59,7 +59,7 @@ class MapPicture {
   View view_;
   bool along_y_;                 ///< in a profile, whether the map extends along y
   Seen first_{}, last_{};        ///< least and greatest coordinates
-  int voxels_ = 1, pixels_ = 1;  ///< so many voxels beside each other are so many pixels; one of them is 1
+  int voxels_ = 1, pixels_ = 1;  ///< `voxels_` adjacent voxels take `pixels_` pixels; one of the two is 1
   int width_ = 0, height_ = 0;   ///< [cells]
   std::vector<Cell> cells_;      ///< rows from below
 };

@@ -77,7 +77,7 @@ std::string binaryTree(const SemanticMap& map, std::ostringstream& out) {
   });
   tree.updateInnerOccupancy();
   tree.prune();
-  // As writeBinaryConst(), which tells standard error about it.
+  // The same as writeBinaryConst(), which also prints to standard error.
   out << "# Octomap OcTree binary file\nid " << tree.getTreeType() << "\nsize " << tree.size() << "\nres "
       << tree.getResolution() << "\ndata\n";
   tree.writeBinaryData(out);

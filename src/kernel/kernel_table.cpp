@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Melkumyan and Ramos (2009), see kernel.h.
+/// Melkumyan and Ramos (2009), see sparse_kernel.h.
 double formula(double r) {
   const double turn = 2.0 * kPi * r;
   return (2.0 + std::cos(turn)) / 3.0 * (1.0 - r) + std::sin(turn) / (2.0 * kPi);

@@ -255,8 +255,8 @@ ScanStats SemanticMapper::addOrWithdraw(const Scan& scan, bool withdraws) {
   }
 }
 
-/// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or takes it
-/// back.
+/// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or subtracts
+/// it.
 ScanStats SemanticMapper::add(const Scan& scan, bool withdraws) {
   Pipeline& p = pipeline();
   ScanStats stats;

@@ -67,7 +67,7 @@ class PointBins {
 
   void start(std::size_t groups, const ThreadPool& pool);
   void binGroup(const TileGrid& grid, const MergedPoints& points, Scratch& scratch, Group& group) const;
-  /// Makes room for so many points.
+  /// Makes room for this many points.
   void reserve(std::size_t points, Scratch& scratch) const;
   template <bool kWeighted>
   void binBatch(std::size_t count, Scratch& scratch, Group& group) const;

@@ -13,7 +13,7 @@
 namespace bki_mapping::ros_interface {
 namespace {
 
-/// An id that no other drive has, whatever robot records it: a random UUID of the kernel.
+/// An id that no other drive of any robot has: a random UUID from the kernel.
 std::string newId() {
   std::string id;
   std::ifstream("/proc/sys/kernel/random/uuid") >> id;

@@ -20,19 +20,19 @@ class KeptMap {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Opens the map file, and loads it without a window or if it is read only.
-  /// @param name of the drive that begins, for humans.
+  /// Opens the map file, and loads it if there is no window or the map is read-only.
+  /// @param name of the drive that begins, for people.
   /// @throws MapFileError; std::invalid_argument if settings contradict each other.
   KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name);
 
-  // Each returns the blocks that changed, for the publishers.
+  // These return the blocks that changed, for the publishers.
   /// Notes what a scan changed, and moves the window. @param stamp of the scan [ns].
   std::vector<GridIndex> addScan(std::uint64_t stamp, const Eigen::Vector3d& sensor,
                                  const ServerConfig& config);
-  /// What there is to do without a scan: evidence arrives from the file, and the map is saved now and then.
+  /// Does what is due between scans: adds evidence that has been read from the file, and saves the map.
   std::vector<GridIndex> update(const ServerConfig& config, Clock::time_point now);
 
-  /// Makes room for a scan that was refused for lack of memory. @return whether that is possible.
+  /// Makes room for a scan that was refused for lack of memory. @return whether memory was gained.
   bool makeRoom() { return keeper_ && keeper_->makeRoom(); }
   /// Clears the map, also in the file, and begins a drive. @throws std::invalid_argument if it is read only.
   void reset();
@@ -44,25 +44,26 @@ class KeptMap {
   /// if the map is read only.
   std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
 
-  /// What must be known to write the map to a file in another thread.
+  /// The data with which another thread can write the map to a file.
   struct Saving {
     MapInfo info;
     std::vector<DriveRecord> drives;
-    std::future<void> done;  ///< ready when the map is written; invalid if that is left to the caller
+    std::future<void> done;  ///< ready when the map is written; invalid if the caller has to write it
   };
-  /// Prepares to write the map to a map file, or writes it where a part of it is in the map file of the node.
+  /// Prepares the data for another thread, or, if a part of the map is in the node's map file, writes the
+  /// map.
   Saving saveTo(const std::string& path);
 
   bool hasFile() const { return keeper_ != nullptr; }
   bool readOnly() const { return read_only_; }
-  /// What is wrong with the map file at present, in one sentence; "" if nothing is.
+  /// What is wrong with the map file at the moment, in one sentence; "" if nothing is.
   std::string fault() const { return keeper_ ? keeper_->fault() : ""; }
-  /// Wall time from which on nothing was added that the map file does not have; 0: never.
+  /// Wall time up to which the map file has everything that was added; 0: nothing was saved yet.
   ros::WallTime saved() const { return saved_; }
-  /// Saves, and closes the map file. @return what was lost and why; "" if nothing was.
+  /// Saves and closes the map file. @return what was lost, and why; "" if nothing was.
   std::string close() { return keeper_ ? keeper_->close() : ""; }
 
-  /// What a map file says of this map.
+  /// The info that a map file needs about this map.
   MapInfo info() const;
 
  private:
@@ -74,7 +75,7 @@ class KeptMap {
   bool read_only_;
   MapKeeper::Window window_;
   DriveRecord drive_;                ///< without a keeper
-  std::vector<DriveRecord> drives_;  ///< likewise, of maps that were added
+  std::vector<DriveRecord> drives_;  ///< of maps that were added, without a keeper
   std::unique_ptr<MapKeeper> keeper_;
   bool unsaved_ = false;  ///< something has been added since the last save
   std::future<void> saving_;

@@ -51,7 +51,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
 }
 
 MappingServer::~MappingServer() {
-  // First those who ask for snapshots, while the mapping thread still answers.
+  // First the threads that request snapshots, while the mapping thread still answers.
   saving_.stop();
   publishing_->stop();
   running_ = false;

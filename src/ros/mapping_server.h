@@ -31,15 +31,15 @@
 namespace bki_mapping::ros_interface {
 
 /// Owns a mapper and three threads, each with a callback queue of its own, so that mapping never blocks the
-/// threads of a nodelet manager. The mapping thread takes clouds and adds them to the map; it alone touches
-/// the mapper. The map topics, and ~save_map and ~load_map, have a thread each, and work on snapshots that
-/// the mapping thread makes between two scans.
+/// threads of a nodelet manager. The mapping thread takes clouds and adds them to the map; only this thread
+/// uses the mapper. One more thread publishes the map topics, and one serves ~save_map and ~load_map. Both
+/// work on snapshots, which the mapping thread makes between two scans.
 class MappingServer {
  public:
   /// @param node resolves topics. @param private_node holds parameters and services.
   /// @throws std::invalid_argument if a parameter is unknown or not allowed.
   MappingServer(ros::NodeHandle node, ros::NodeHandle private_node);
-  /// Finishes the present scan and stops the thread.
+  /// Finishes the current scan and stops the threads.
   ~MappingServer();
 
  private:

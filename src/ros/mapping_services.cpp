@@ -13,7 +13,7 @@ namespace {
 /// Maximum length of an answer, which contains a path given by the client [bytes].
 constexpr std::size_t kLongestAnswer = 1000;
 
-/// How often one who waits for the map file looks whether it can be written.
+/// Interval at which a service that waits for the map file checks whether the file can be written.
 constexpr std::chrono::milliseconds kFaultPoll(200);
 
 /// @throws std::invalid_argument if a file of a client cannot have this path.

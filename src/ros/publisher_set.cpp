@@ -18,8 +18,8 @@ struct Wake : ros::CallbackInterface {
   CallResult call() override { return Success; }
 };
 
-/// Lets other threads of the process go first: publishing may wait, a scan may not. (On Linux the niceness of
-/// the process means that of the calling thread.)
+/// Gives other threads of the process priority: publishing may wait, a scan may not. (On Linux, niceness is a
+/// property of the thread, although POSIX speaks of the process.)
 void yieldToOthers() {
   constexpr int kNiceness = 19;  // the most
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);

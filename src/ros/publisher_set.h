@@ -38,9 +38,9 @@ class PublisherSet {
   void stop();
   /// Records blocks that were changed, created or erased. For the mapping thread, as closeChanges().
   void changed(const std::vector<GridIndex>& blocks);
-  /// What was recorded until now is in the snapshot that is made next, and what comes later is not.
+  /// Separates the changes recorded so far, which the next snapshot contains, from later ones.
   void closeChanges();
-  /// Lets every publisher send the whole map again. For any thread.
+  /// Makes every publisher send the whole map again. For any thread.
   void startOver();
 
  private:
@@ -48,7 +48,7 @@ class PublisherSet {
 
   void work();
   void wake();
-  /// Takes a snapshot, and passes on to the publishers what has changed until then.
+  /// Takes a snapshot, and passes the changes that it contains on to the publishers.
   std::shared_ptr<const MapSnapshot> takeSnapshot();
   /// The topics that are due. Drops the changes if nobody listens to any topic.
   std::vector<MapPublisher*> findDue();

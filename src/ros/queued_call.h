@@ -1,4 +1,4 @@
-/// @file Lets other threads ask the mapping thread.
+/// @file Calls that other threads make in the mapping thread.
 #pragma once
 
 #include <ros/callback_queue.h>
@@ -34,7 +34,7 @@ class QueuedCall : public ros::CallbackInterface {
     boost::shared_ptr<QueuedCall> request(new QueuedCall(std::move(make)));
     std::future<Answer> answer = request->answer_.get_future();
     queue.addCallback(request);
-    request.reset();  // the queue's alone, so that clearing the queue ends the wait
+    request.reset();  // only the queue owns it now, so that clearing the queue ends the wait
     return answer.get();
   }
 

@@ -1,4 +1,4 @@
-/// @file What times of messages tell: how long one waited, and that time jumped back.
+/// @file Infers from the times of messages how long one has waited, and whether time jumped back.
 #pragma once
 
 #include <ros/time.h>
@@ -11,8 +11,8 @@ namespace bki_mapping::ros_interface {
 enum class OnTimeJump { kKeep, kReset };
 
 /// How long a message has waited for its callback [s of wall time], at most a minute. @param simulated
-/// whether both times are of /clock, which does not tell: a replay's first step goes from 0 to its start, and
-/// a replay may be fast. The result is then 0.
+/// whether both times are of /clock. The result is then 0, because /clock does not measure waits: its first
+/// step goes from 0 to the start of the replay, and a replay may be fast.
 inline double secondsSince(const ros::Time& receipt, const ros::Time& now, bool simulated) {
   return simulated ? 0.0 : std::clamp(now.toSec() - receipt.toSec(), 0.0, 60.0);
 }

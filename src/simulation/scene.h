@@ -11,7 +11,7 @@ namespace bki_mapping::simulation {
 
 enum class ShapeType { kBox, kCylinder, kEllipsoid };
 
-/// A part of a way, with constant velocity.
+/// A leg of a path, with constant velocity.
 struct Leg {
   double until = 0.0;                                  ///< when it ends [s]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
@@ -54,7 +54,7 @@ struct Scene {
   std::optional<std::uint32_t> labelAt(const Eigen::Vector3d& point, double time) const;
 };
 
-/// What a street is full of.
+/// What moves in a street.
 enum class SceneKind {
   kStreet,   ///< cars that pass or are parked, and a few pedestrians
   kTraffic,  ///< stop-and-go traffic in both directions, and parked cars of which some drive off
@@ -65,10 +65,10 @@ SceneKind sceneKindNamed(const std::string& name);
 /// "street", "traffic" or "crowd".
 std::string nameOf(SceneKind kind);
 
-/// A street along x with buildings, fences, trees, poles, signs, and what its kind brings.
-/// @param length of the street, which begins at x = -30 m [m]. @param duration time during which somebody
-/// looks [s]. @param speed of the sensor, which drives at y = -1.5 m and is at x = 0 at time 0 [m/s]. @param
-/// seed equal arguments give equal streets.
+/// A street along x with buildings, fences, trees, poles, signs, and the road users of its kind.
+/// @param length of the street, which begins at x = -30 m [m]. @param duration of the drive [s]. @param speed
+/// of the sensor, which drives at y = -1.5 m and is at x = 0 at time 0 [m/s]. @param seed equal arguments
+/// give equal streets.
 Scene makeScene(SceneKind kind, double length, double duration, double speed, std::uint64_t seed);
 
 }  // namespace bki_mapping::simulation

@@ -137,8 +137,7 @@ void addTraffic(double length, std::vector<Shape>& shapes, Dice& dice) {
     addCar(x, 1.5, Motion::constant(-9.0), shapes);
 }
 
-/// Queues that move up and wait in turn: one ahead of the sensor, which they never let come too near, and one
-/// oncoming.
+/// Queues that move and wait in turn: one ahead of the sensor, at a safe distance, and one oncoming.
 void addQueues(double length, double duration, double speed, Dice& dice, std::vector<Shape>& shapes) {
   const double go = 3.0, stand = 4.0, own_speed = 1.1 * speed * (go + stand) / go;
   const double ahead = dice.between(-go, 0.0);
@@ -149,7 +148,7 @@ void addQueues(double length, double duration, double speed, Dice& dice, std::ve
     addCar(x, 1.5, Motion::inTurns(-5.0, go, stand, oncoming, duration), shapes);
 }
 
-/// Pedestrians and cyclists on the whole street, but where the sensor drives.
+/// Pedestrians and cyclists on the whole street, except where the sensor drives.
 void addCrowd(double length, double duration, Dice& dice, std::vector<Shape>& shapes) {
   for (double x = kStart; x < kStart + length; x += dice.between(0.5, 1.5)) {
     const double y = dice.between(0.0, 1.0) < 0.3 ? dice.between(-8.0, -3.2) : dice.between(0.2, 8.0);

@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
   return tools::run("clear_map", [&] {
     const auto given = tools::parse(argc, argv,
                                     "clear_map FILE.bkm --box \"X0 Y0 Z0 X1 Y1 Z1\"\n"
-                                    "Clears a box of a map: what was mapped there is forgotten.",
+                                    "Clears a box of a map: its voxels become unknown.",
                                     options(), "files");
     return given ? clearFile(*given) : 0;
   });

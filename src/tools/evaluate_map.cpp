@@ -72,7 +72,7 @@ struct Evaluation {
     }
   }
 
-  /// What can move and is in a voxel at the end, where the truth is known.
+  /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known.
   DynamicsEvaluation::Taken taken() const {
     if (!truth) return {};
     return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };

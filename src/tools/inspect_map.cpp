@@ -1,4 +1,4 @@
-// Says what is in a map file, and draws it.
+// Prints what is in a map file, and draws it.
 #include <ctime>
 #include <iomanip>
 #include <iostream>
@@ -176,7 +176,7 @@ int main(int argc, char** argv) {
   return tools::run("inspect_map", [&] {
     const auto given = tools::parse(argc, argv,
                                     "inspect_map FILE.bkm\n"
-                                    "Says what is in a map file, checks every byte of its map, and draws it.",
+                                    "Prints what is in a map file, checks every byte of it, and draws it.",
                                     options(), "files");
     return given ? inspect(*given) : 0;
   });

@@ -46,7 +46,7 @@ std::string progressText(const ScanReport& scan) {
   return text.str();
 }
 
-/// The id of a drive is the same whenever the same scans are mapped, so that no map holds them twice.
+/// The id of a drive, which depends only on its scans, so that no map holds them twice.
 std::string driveId(const po::variables_map& given, const Sequence& sequence, std::size_t first,
                     std::size_t last) {
   if (given.count("drive")) return given["drive"].as<std::string>();
@@ -54,25 +54,25 @@ std::string driveId(const po::variables_map& given, const Sequence& sequence, st
   return folder.filename().string() + "/" + sequence.name(first) + "-" + sequence.name(last - 1);
 }
 
-/// Says that drives which a map keeps apart are only in the sum of the continued one.
+/// Warns that the continued map holds only the sum of drives that the given map stores separately.
 void warnOfParts(const std::string& path) {
   for (const DriveRecord& drive : MapFile(path, MapFile::Access::kRead).drives()) {
     if (drive.part == 0) continue;
     std::cerr << "warning: " << path
-              << " keeps drives apart, and the continued map does not; to keep them, map the "
-                 "scans by themselves, and add them with merge_maps --keep-drives\n";
+              << " stores drives separately, and the continued map will not; to keep them separate, map the "
+                 "new scans without --resume, and add them with merge_maps --keep-drives\n";
     return;
   }
 }
 
-/// Loads the map to be continued. @return the drives in it. @throws std::invalid_argument if `id` is among
+/// Loads the map that is continued. @return the drives in it. @throws std::invalid_argument if `id` is one of
 /// them.
 std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path, const std::string& id) {
   StoredMap stored = loadMapFor(mapper, path, kFrame);
   for (const DriveRecord& drive : stored.drives) {
     if (drive.id != id) continue;
-    throw std::invalid_argument("the map in " + path + " holds drive '" + id +
-                                "' already; give other scans, or another name with --drive");
+    throw std::invalid_argument("the map in " + path + " already holds drive '" + id +
+                                "'; give other scans, or another id with --drive");
   }
   mapper.addMap(stored.map);
   return stored.drives;

@@ -95,12 +95,10 @@ int mergeFiles(const po::variables_map& given) {
   for (const std::string& path : report.resampled) {
     std::cerr << "warning: " << path
               << " is not turned by a multiple of 90 degrees and moved by whole voxels; each voxel takes the "
-                 "evidence "
-                 "of the nearest one, which is approximate\n";
+                 "evidence of the nearest one, which is approximate\n";
   }
   if (report.saturated > 0) {
-    std::cerr << "warning: " << counted(report.saturated, "sum")
-              << " of evidence stopped at the greatest value, 32,768\n";
+    std::cerr << "warning: " << counted(report.saturated, "sum") << " of evidence saturated at 32,768\n";
   }
   std::cout << options.output << ": " << counted(report.drives.size(), "drive") << ", "
             << counted(report.blocks, "block") << " in " << counted(report.tiles, "tile") << "\n";

@@ -1,4 +1,4 @@
-// Brings a map file of an older version to the present one.
+// Converts a map file of an older version to the current one.
 #include "store/migration.h"
 
 #include <iostream>
@@ -16,7 +16,7 @@ int migrateFile(const tools::po::variables_map& given) {
   const auto files =
       given.count("files") ? given["files"].as<std::vector<std::string>>() : std::vector<std::string>();
   if (files.size() != 2) {
-    throw std::invalid_argument("there must be two files, the old and the new one (see --help)");
+    throw std::invalid_argument("migrate_map needs two files, the old and the new one (see --help)");
   }
   if (!isMapFileName(files[1]))
     throw std::invalid_argument("the new file, " + files[1] + ", must end in .bkm");
@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
     const auto given =
         tools::parse(argc, argv,
                      "migrate_map OLD.bkm NEW.bkm\n"
-                     "Copies a map file of any older version to one of the present version, and checks it.",
+                     "Converts a map file of any version to the current version, and checks it.",
                      tools::po::options_description("Options"), "files");
     return given ? migrateFile(*given) : 0;
   });

@@ -37,8 +37,8 @@ po::typed_value<double>* realOption(const std::string& option, double least,
 /// The value of a countOption.
 std::size_t count(const po::variables_map& given, const std::string& name);
 
-/// The only one of the words that parse() has found as "files". @throws std::invalid_argument if there is
-/// another number of them.
+/// The only word that parse() has found as "files". @throws std::invalid_argument if there is none, or more
+/// than one.
 std::string onlyMapFile(const po::variables_map& given);
 
 /// Options of all programs with a mapper: --classes, --config, --set, --threads.
@@ -50,9 +50,8 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 
 /// Options of all programs that read a sequence: --sequence, --labels, --first, --scans.
 po::options_description sequenceOptions();
-/// Opens the sequence of these options; reports missing scans on standard error. @throws
-/// std::invalid_argument if
-/// --sequence is missing, std::runtime_error as Sequence.
+/// Opens the sequence of these options; reports missing scans on standard error.
+/// @throws std::invalid_argument if --sequence is missing, std::runtime_error as Sequence.
 Sequence openSequence(const po::variables_map& given);
 /// The half-open range of indices that --first and --scans select. @throws std::invalid_argument if it is
 /// empty.

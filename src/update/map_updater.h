@@ -17,7 +17,7 @@ struct ScanEvidence {
   Evidence* hits = nullptr;
   Evidence* free = nullptr;        ///< of free space
   BlockPass* occlusion = nullptr;  ///< sets its marks after the sums are added
-  bool withdraws = false;          ///< takes back what adding the same evidence has added
+  bool withdraws = false;          ///< subtracts the evidence instead of adding it
 };
 
 struct MapUpdateStats {

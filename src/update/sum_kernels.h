@@ -8,11 +8,11 @@
 
 namespace bki_mapping {
 
-/// Voxels of which a sum did not become the evidence that it should.
+/// Numbers of voxels whose sum could not be added exactly.
 struct SumCounts {
   std::size_t not_finite = 0;  ///< the sum is not a number, and was left out
-  std::size_t saturated = 0;   ///< the evidence stopped at the end of its range
-  std::size_t negative = 0;    ///< more was taken back than had been added
+  std::size_t saturated = 0;   ///< the evidence saturated
+  std::size_t negative = 0;    ///< more was withdrawn than had been added
 
   SumCounts& operator+=(const SumCounts& other) {
     not_finite += other.not_finite;
@@ -25,8 +25,8 @@ struct SumCounts {
 /// The loop for one instruction set.
 struct SumKernels {
   const char* instruction_set;
-  /// Rounds sums to the nearest unit, halves up, and adds them to a plane, or takes them back. Evidence stops
-  /// at kMostUnits and at -kMostUnits. All instruction sets give the same bits.
+  /// Rounds sums to the nearest unit, halves up, and adds them to a plane, or subtracts them. Evidence
+  /// saturates at kMostUnits and -kMostUnits. All instruction sets give the same bits.
   /// @param sums 512 of them, >= 0. @param layers those that may hold sums other than 0.
   /// @param[in,out] counts increased. @return whether any evidence in those layers is not 0.
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);

@@ -11,9 +11,9 @@
 
 namespace bki_mapping {
 
-/// Takes the sums of the blocks of one group, applies the rules, and adds the result, rounded to units, to
-/// the map's blocks, or takes it back: first the hits of all blocks, then their free space. One for each
-/// thread.
+/// Receives the sums of the blocks of one group, applies the rules, rounds the result to units, and adds it
+/// to the map's blocks, or subtracts it: first the hits of all blocks, then their free space. Each thread has
+/// one.
 class alignas(kThreadsApart) SumSink {
  public:
   /// Call before an update. @param classes most classes for a block; their memory is allocated here.

@@ -433,7 +433,7 @@ class Tools(unittest.TestCase):
         self.assertEqual(self.tiles_of(merged), self.tiles_of(back))
         self.assertIn("drive 'drive/000002-000003' is in more than one map, and counts once\n", result.stdout)
         more = self.succeeds('map_sequence', '--sequence', self.drive, '--drive', 'more', '--resume', kept, '--output', merged)
-        self.assertIn('keeps drives apart, and the continued map does not', more.stderr)
+        self.assertIn('stores drives separately, and the continued map will not', more.stderr)
 
     def test_moving_maps(self):
         a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
@@ -561,7 +561,7 @@ class Tools(unittest.TestCase):
         self.assertIn('version 1, from version 1', self.succeeds('migrate_map', a, copy).stdout)
         self.assertEqual(self.tiles_of(copy), self.tiles_of(a))
         self.fails('exists already', 'migrate_map', a, copy)
-        self.fails('there must be two files', 'migrate_map', a)
+        self.fails('needs two files', 'migrate_map', a)
         self.fails('must end in .bkm', 'migrate_map', a, self.path('copy.db'))
         self.fails('is not a map', 'migrate_map', os.path.join(self.drive, 'poses.txt'), self.path('never.bkm'))
 

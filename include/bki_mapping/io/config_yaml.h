@@ -13,8 +13,8 @@ namespace bki_mapping {
 /// is a list, or a name that occurs twice.
 std::map<std::string, std::string> loadParameterFile(const std::string& file);
 
-/// The same of a text, as parameterYaml gives. @throws std::invalid_argument likewise, without a name of a
-/// file.
+/// The same for the text of such a file, as parameterYaml returns it. @throws std::invalid_argument as above,
+/// but without the name of a file.
 std::map<std::string, std::string> parseParameters(const std::string& yaml);
 
 /// The mapper's parameters as such a file, with the meaning, allowed values and unit of each as a comment.

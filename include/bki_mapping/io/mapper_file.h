@@ -11,18 +11,18 @@ namespace bki_mapping {
 /// Whether a path ends in .bkm.
 bool isMapFileName(const std::string& path);
 
-/// What a map file says of a mapper's map. @param frame name of the map frame.
+/// The info that a map file needs about a mapper's map. @param frame name of the map frame.
 MapInfo mapInfoOf(const SemanticMapper& mapper, const std::string& frame);
 
-/// Loads a map file, to be added to a mapper's map: StoredMap::map goes to SemanticMapper::addMap.
-/// @param frame of the mapper; "": any.
-/// @throws MapFileError as loadMap; with memory_limit as the limit; and if the file has another frame,
-/// resolution, unit, prior or class table than the mapper: in one sentence with both values.
+/// Loads a map file for a mapper; pass StoredMap::map to SemanticMapper::addMap.
+/// @param frame the mapper's map frame; "" matches every frame.
+/// @throws MapFileError as loadMap, with memory_limit as the limit. @throws MapFileError, in one sentence
+/// with both values, if the file has another frame, resolution, unit, prior or class table than the mapper.
 StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, const std::string& frame);
 
-/// An empty map as MapInfo::emptyMap, with the gains that the parameters and the class table of a file set,
-/// so that voxels have the states that the mapper gave them. Parameters that this version does not know are
-/// ignored. @param path of the file, for errors. @throws MapFileError if the parameters are no YAML.
+/// An empty map as MapInfo::emptyMap, with the gains that a file's parameters and class table set, so that
+/// voxels have the states that the mapper gave them. Parameters that this version does not know are ignored.
+/// @param path of the file, for errors. @throws MapFileError if the parameters are not YAML.
 SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
 
 }  // namespace bki_mapping

@@ -14,16 +14,16 @@
 namespace bki_mapping {
 
 /// Evidence in fixed point: whole numbers of kEvidenceUnit. A scan's sum for a voxel and a class is rounded
-/// to the nearest unit once, and then added as an integer. So the sum of scans has no rounding of its own: it
-/// is the same to the bit in any order, and a scan can be taken back. docs/method.md gives the reasons for
+/// to the nearest unit once, and then added as an integer. Adding scans rounds nothing further, so that the
+/// sum is the same to the bit in any order, and a scan can be withdrawn. docs/method.md gives the reasons for
 /// the size of the unit.
 using EvidenceUnits = std::int32_t;
 constexpr float kEvidenceUnit = 0x1.0p-16f;
-/// Evidence stops here, at 32,768, instead of overflowing.
+/// Evidence saturates here, at 32,768, instead of overflowing.
 constexpr EvidenceUnits kMostUnits = std::numeric_limits<EvidenceUnits>::max();
 
-/// Evidence as a number. Negative evidence, which only withdrawing what was never added leaves, counts as
-/// none.
+/// Evidence as a number. Negative evidence counts as 0; it can only remain after a scan was withdrawn that
+/// had never been added.
 inline float evidenceOf(EvidenceUnits units) {
   return kEvidenceUnit * static_cast<float>(std::max(units, 0));
 }
@@ -81,7 +81,7 @@ class Block {
                                                   [&](ClassId id) { return !has(id, positionOf(id)); }));
   }
 
-  /// Returns unused memory that reserve() took, unless memory is too short to move the planes.
+  /// Returns unused memory that reserve() allocated, unless too little memory is left to move the planes.
   void shrink() noexcept {
     if (planes_.capacity() > planes_.size()) planes_.shrink_to_fit();
     if (classes_.capacity() > classes_.size()) classes_.shrink_to_fit();
@@ -107,8 +107,7 @@ class Block {
     planes_.erase(first, last);
   }
 
-  /// Adds a plane of another block. @return the number of voxels whose evidence stopped at the end of its
-  /// range.
+  /// Adds a plane of another block. @return the number of voxels whose evidence has saturated.
   std::size_t add(ClassId id, const EvidenceUnits* units) {
     std::size_t saturated = 0;
     change(id, [&](EvidenceUnits* plane) {

@@ -78,7 +78,7 @@ class Region {
   }
 
   /// A copy that shares all blocks with this region, and owns none. This region must not be written to any
-  /// more: it still takes its blocks for its own.
+  /// more, although it still regards its blocks as its own.
   std::shared_ptr<Region> sharingCopy() const {
     auto copy = std::make_shared<Region>(*this);
     copy->own_ = {};

@@ -16,8 +16,8 @@
 namespace bki_mapping {
 
 /// A sparse grid of Dirichlet posteriors. A voxel's concentrations are alpha[k] = prior + evidence[k] for
-/// every class of the table and for `free`. Maps and their snapshots share what they have in common: a map
-/// copies a region or a block before it writes to it for the first time after a snapshot.
+/// every class of the table and for `free`. A map and its snapshots share regions and blocks: the map copies
+/// a region or a block before it writes to it for the first time after a snapshot.
 class SemanticMap {
  public:
   struct Entry {
@@ -61,9 +61,9 @@ class SemanticMap {
   Entries entries() const;
   std::size_t size() const { return size_; }
 
-  /// The same map, as it stays: nothing that happens to this one shows in it. Takes time and memory for each
-  /// region, not for each block; a block is copied when this map next writes to it. Snapshots may be read and
-  /// destroyed in any thread while this map is written to in another one.
+  /// A copy of the map as it is now; later changes of this map do not affect it. Its time and memory grow
+  /// with the number of regions, not of blocks; this map copies a block when it next writes to it. Other
+  /// threads may read and destroy snapshots while this map is written to.
   SemanticMap snapshot();
 
   /// @return nullptr if the map has no such block.

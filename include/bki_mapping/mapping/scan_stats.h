@@ -31,8 +31,8 @@ struct ScanStats {
   std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
   std::size_t blocks = 0;      ///< blocks touched
   std::size_t not_finite = 0;  ///< sums left out because they were not finite
-  std::size_t saturated = 0;   ///< voxels and classes whose evidence stopped at the end of its range
-  std::size_t negative = 0;    ///< voxels and classes from which withdraw() took more than they had
+  std::size_t saturated = 0;   ///< number of voxels and classes whose evidence saturated
+  std::size_t negative = 0;    ///< number of voxels and classes that withdraw() left with negative evidence
   double observe_ms = 0.0;     ///< filtering, down-sampling
   double evidence_ms = 0.0;    ///< sampling, sorting, indexing
   double collect_ms = 0.0;     ///< listing and allocating blocks

@@ -25,26 +25,26 @@ class SemanticMapper {
   ~SemanticMapper();
 
   /// Adds one scan to the map, either all of it or nothing. Bad points are skipped and counted.
-  /// @throws std::invalid_argument if the scan has not one label for each point, or its origin has no valid
+  /// @throws std::invalid_argument if the numbers of labels and points differ, or the origin has no valid
   /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
   ScanStats integrate(const Scan& scan);
 
-  /// Takes back a scan that was integrated with the present settings: the map is then the same to the bit as
-  /// if the scan had never been there, whatever came after it, unless evidence had stopped at the end of its
-  /// range (ScanStats::saturated). A scan that was not in the map leaves negative evidence, which reads as
-  /// none (ScanStats::negative). @throws as integrate(), and std::logic_error with free_space/extent `mapped`
-  /// or occlusion marks, which depend on the order of scans.
+  /// Withdraws a scan that was integrated with the current settings. The map is then the same, to the bit, as
+  /// if the scan had never been integrated, regardless of later scans; voxels whose evidence had saturated
+  /// are an exception (ScanStats::saturated). Withdrawing a scan that is not in the map leaves negative
+  /// evidence, which counts as 0 (ScanStats::negative). @throws as integrate(), and std::logic_error with
+  /// free_space/extent `mapped` or occlusion marks, which depend on the order of scans.
   ScanStats withdraw(const Scan& scan);
 
-  /// Adds another map, as of a file: the map is then the same to the bit as if the scans of both had been
-  /// integrated here.
+  /// Adds another map, for example from a file. The map is then the same, to the bit, as if the scans of both
+  /// had been integrated here.
   /// @throws std::invalid_argument as SemanticMap::add, std::bad_alloc; the map is then unchanged.
   void addMap(const SemanticMap& other);
 
   /// Moves a region of the map to a map of its own (SemanticMap::takeRegion).
   SemanticMap takeRegion(const GridIndex& region);
 
-  /// Clears a box of the map, as the function of this name does. @return the blocks that changed.
+  /// Clears a box of the map (bki_mapping::clearBox). @return the blocks that changed.
   std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
 
   /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
@@ -70,7 +70,7 @@ class SemanticMapper {
     return erased;
   }
 
-  /// The map as it is now, for other threads and for later (SemanticMap::snapshot).
+  /// A copy of the map as it is now, which other threads may read (SemanticMap::snapshot).
   SemanticMap snapshot() { return map_.snapshot(); }
 
   /// The blocks that the last integrate() or withdraw() may have changed, created or erased, each once.

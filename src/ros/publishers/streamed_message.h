@@ -16,7 +16,7 @@
 
 namespace bki_mapping::ros_interface {
 
-/// @return count * size. @throws std::length_error if subscribers would refuse a message of so many bytes.
+/// @return count * size. @throws std::length_error if subscribers would refuse a message of that size.
 inline std::uint32_t messageBytes(std::size_t count, std::size_t size) {
   constexpr std::size_t kMostBytes = 1000000000;
   if (count > kMostBytes / size) {
@@ -25,8 +25,8 @@ inline std::uint32_t messageBytes(std::size_t count, std::size_t size) {
   return static_cast<std::uint32_t>(count * size);
 }
 
-/// Asks for large pages for memory that is about to be written. A buffer of many MB is fresh from the system:
-/// with pages of 4 kB, taking it costs as much time as filling it.
+/// Asks for large pages for memory that is about to be written. The system hands out a buffer of many MB
+/// anew each time; with pages of 4 kB, mapping them takes as long as filling them.
 inline void useLargePages(std::uint8_t* data, std::size_t bytes) {
   constexpr std::uintptr_t kPage = std::uintptr_t{1} << 21;
   const auto begin = (reinterpret_cast<std::uintptr_t>(data) + kPage - 1) / kPage * kPage,
