@@ -6,39 +6,28 @@
 // (default 2000), or BKI_MAPPING_HOSTILE_SECONDS: duration. BKI_MAPPING_HOSTILE_SETTINGS: use only this set
 // of settings. BKI_MAPPING_HOSTILE_JOURNAL: file to which the kind of each message is written before it is
 // sent.
-#include <bki_mapping/ElevationMap.h>
 #include <bki_mapping/MappingStatus.h>
-#include <bki_mapping/OccupancyMap.h>
-#include <bki_mapping/OccupancyUpdate.h>
 #include <bki_mapping/SaveMap.h>
-#include <bki_mapping/VoxelCloudUpdate.h>
 #include <dynamic_reconfigure/Reconfigure.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <map_msgs/OccupancyGridUpdate.h>
-#include <nav_msgs/OccupancyGrid.h>
-#include <nav_msgs/Path.h>
-#include <nodelet/loader.h>
 #include <ros/ros.h>
-#include <rosgraph_msgs/Log.h>
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
 #include <sys/stat.h>
 #include <tf2_msgs/TFMessage.h>
 #include <unistd.h>
-#include <visualization_msgs/MarkerArray.h>
 
-#include <condition_variable>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <mutex>
 #include <set>
 #include <sstream>
-#include <thread>
 
 #include "hostile/kinds.h"
+#include "hostile/settings.h"
+#include "hostile/watchers.h"
 #include "ros/point_account.h"
 #include "ros/scan_ledger.h"
 #include "temporary_folder.h"
@@ -47,7 +36,6 @@ namespace bki_mapping::ros_interface {
 namespace {
 
 using namespace bki_mapping::hostile;
-using Clock = std::chrono::steady_clock;
 using sensor_msgs::PointCloud2;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -55,16 +43,10 @@ constexpr bool kSanitized = true;  // sanitizers keep freed memory, and need sha
 #else
 constexpr bool kSanitized = false;
 #endif
-/// Maximum resident memory [MB]. A pose that is far off lets a grid from above grow to 256 MB
+/// Maximum resident memory [MB]. If a pose is far off, a grid from above grows to 256 MB
 /// (ColumnPublisher::fits) until the map is reset; if it is published before that, the publisher has it
-/// twice, and the listener once. Sanitizers keep freed memory, and need shadow memory.
+/// twice, and the listener once.
 constexpr double kMaxMemory = 1000.0;
-/// Maximum time for an answer [s].
-constexpr double kLongestAnswer = 20.0;
-/// Maximum length of the message of a refusal, which a sender must not control [bytes].
-constexpr std::size_t kShortestText = 20, kLongestText = 3000;
-
-const std::string kName = "/hostile_mapping";
 
 std::string environment(const char* name, const std::string& standard) {
   const char* text = std::getenv(name);
@@ -79,95 +61,6 @@ double residentMemory() {
   return pages * static_cast<double>(sysconf(_SC_PAGESIZE)) * 1e-6;
 }
 
-/// Settings under which the mapper is attacked.
-struct Settings {
-  std::string name;
-  std::map<std::string, std::string> values;
-};
-
-const std::vector<Settings>& allSettings() {
-  static const std::vector<Settings> all = {
-      {"robot",
-       {{"kernel/scale", "100"},
-        {"free_space/hits_before_misses", "true"},
-        {"free_space/evidence_before_misses", "true"},
-        {"scan_limit/hits", "0.2"},
-        {"scan_limit/free", "0.1"},
-        {"free_gain/static", "0.1"},
-        {"free_gain/dynamic", "8"},
-        {"free_gain/persistence", "0.5"},
-        {"sensor_model/max_range", "60"}}},
-      {"window_below_a_block", {{"window", "0.5"}, {"sensor_model/max_range", "20"}}},
-      {"defaults", {{"window", "0"}}},
-      {"coarse",
-       {{"resolution", "5"},
-        {"downsample_resolution", "1"},
-        {"free_space/mode", "linear"},
-        {"window", "400"}}},
-      {"fine",
-       {{"resolution", "0.02"},
-        {"downsample_resolution", "0.01"},
-        {"window", "2"},
-        {"free_space/mode", "even"},
-        {"free_space/gap", "0.2"},
-        {"sensor_model/max_range", "3"}}},
-      {"counting",
-       {{"kernel/type", "counting"},
-        {"occlusion", "all"},
-        {"downsample_resolution", "0"},
-        {"sensor_model/max_range", "15"}}},
-      {"colours",
-       {{"label_encoding", "rgb"},
-        {"label_field", "rgb"},
-        {"color_match", "nearest"},
-        {"free_space/mode", "none"},
-        {"occlusion", "mapped"},
-        {"sensor_model/max_range", "30"}}},
-      {"scores",
-       {{"label_encoding", "scores"},
-        {"label_field", ""},
-        {"score_fields", "scores"},
-        {"free_space/mode", "uniform"},
-        {"free_space/samples_per_beam", "3"},
-        {"sensor_model/max_range", "30"}}},
-      {"top_k",
-       {{"label_encoding", "top_k"},
-        {"label_field", "labels"},
-        {"score_fields", "label_scores"},
-        {"score_type", "logit"},
-        {"free_space/extent", "mapped"},
-        {"sensor_model/max_range", "60"}}},
-      {"moving_sensor",
-       {{"sensor_frame_id", "honest_base"},
-        {"time_field", "seconds"},
-        {"free_space/beam_index", "rtree"},
-        {"unknown_labels", "unlabelled"},
-        {"on_time_jump", "reset"},
-        {"sensor_model/max_range", "30"}}},
-      {"no_returns",
-       {{"clear_no_returns", "true"},
-        {"time_field", "ns"},
-        {"unlabelled_points", "ignore"},
-        {"queue_policy", "drop_newest"},
-        {"memory_limit", "2"},
-        {"free_space/weight", "uniform"},
-        {"sensor_model/max_range", "10"}}},
-      {"two_lidars",
-       {{"inputs/front/topic", "/hostile_cloud"},
-        {"inputs/front/time_field", "seconds"},
-        {"inputs/front/clear_no_returns", "true"},
-        {"inputs/front/max_range", "12"},
-        {"inputs/rear/topic", "/hostile_cloud_2"},
-        {"inputs/rear/label_encoding", "bgr"},
-        {"inputs/rear/label_field", "rgb"},
-        {"inputs/rear/sensor_frame_id", "honest_base"},
-        {"inputs/rear/min_range", "1"},
-        {"inputs/rear/max_range", "40"},
-        {"window", "30"}}},
-  };
-  return all;
-}
-
 /// The results of a run.
 struct Results {
   std::map<std::string, std::map<std::string, std::size_t>> answers;  ///< count by kind and answer
@@ -176,216 +69,6 @@ struct Results {
   std::map<std::string, std::string> sentences;  ///< example for each kind and answer
   std::size_t messages = 0;
   double most_memory = 0.0;
-};
-
-/// Ends the process when it hangs, because an exception cannot end a hang.
-class Watchdog {
- public:
-  Watchdog() : thread_([this] { watch(); }) {}
-  ~Watchdog() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      over_ = true;
-    }
-    wake_.notify_all();
-    thread_.join();
-  }
-  void feed(const std::string& doing) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    doing_ = doing;
-    since_ = Clock::now();
-  }
-
- private:
-  void watch() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!wake_.wait_for(lock, std::chrono::seconds(1), [this] { return over_; })) {
-      if (Clock::now() - since_ < std::chrono::duration<double>(6.0 * kLongestAnswer)) continue;
-      std::printf("[hostile] hangs: %s\n", doing_.c_str());
-      std::fflush(stdout);
-      std::_Exit(3);
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool over_ = false;
-  std::string doing_ = "start";
-  Clock::time_point since_ = Clock::now();
-  std::thread thread_;
-};
-
-/// Reads the log of this process: counts refusals of clouds, and checks the length of messages.
-class LogReader {
- public:
-  explicit LogReader(ros::NodeHandle& node) {
-    subscriber_ = node.subscribe<rosgraph_msgs::Log>(
-        "/rosout", 10000, [this](const rosgraph_msgs::Log::ConstPtr& m) { read(*m); });
-  }
-  std::size_t refusals() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return refusals_;
-  }
-  std::string longest() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return longest_;
-  }
-  std::size_t bytes() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return bytes_;
-  }
-
- private:
-  void read(const rosgraph_msgs::Log& log) {
-    if (log.file.find("src/ros/") == std::string::npos) return;  // logged by a library
-    const std::lock_guard<std::mutex> lock(mutex_);
-    bytes_ += log.msg.size();
-    if (log.msg.size() > longest_.size()) longest_ = log.msg;
-    const std::string beginning = "Dropped the cloud of ";
-    refusals_ +=
-        log.level == rosgraph_msgs::Log::WARN && log.msg.compare(0, beginning.size(), beginning) == 0;
-  }
-
-  mutable std::mutex mutex_;
-  std::size_t refusals_ = 0, bytes_ = 0;
-  std::string longest_;
-  ros::Subscriber subscriber_;
-};
-
-/// Loads and unloads the mapper, and checks the sums of its status.
-class Mapper {
- public:
-  explicit Mapper(ros::NodeHandle& node) : node_(node), loader_(true) {
-    status_ = node.subscribe<MappingStatus>(kName + "/status", 10000,
-                                            [this](const MappingStatus::ConstPtr& m) { onStatus(*m); });
-  }
-  ~Mapper() { unload(); }
-
-  void load(const Settings& settings) {
-    ros::param::del(kName);
-    const std::map<std::string, std::string> common = {
-        {"classes", "toy"},      {"tf_timeout", "0.02"}, {"publish_rate", "20"}, {"diagnostic_period", "0.2"},
-        {"memory_limit", "100"}, {"window", "60"},       {"threads", "2"}};
-    for (const auto& [name, value] : common) ros::param::set(kName + "/" + name, value);
-    for (const auto& [name, value] : settings.values) ros::param::set(kName + "/" + name, value);
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      last_ = MappingStatus();
-      fresh_ = false;
-      reasons_.clear();
-    }
-    ASSERT_TRUE(loader_.load(kName, "bki_mapping/MappingNodelet", {{"/cloud_in", "/hostile_cloud"}}, {}));
-    loaded_ = true;
-    ASSERT_TRUE(waitFor([this] { return fresh_; })) << "no status after loading";
-  }
-  void unload() {
-    if (loaded_) loader_.unload(kName);
-    loaded_ = false;
-  }
-
-  /// Waits for a status with `received` clouds, none of them waiting. @return whether it arrived in time.
-  bool settle(std::uint64_t received, MappingStatus& status) {
-    const bool came = waitFor([&] { return last_.received == received && last_.waiting == 0; });
-    const std::lock_guard<std::mutex> lock(mutex_);
-    status = last_;
-    return came;
-  }
-
-  std::size_t faults() const { return faults_; }
-  std::size_t statuses() const { return statuses_; }
-  /// The reasons for which this mapper has dropped clouds.
-  std::size_t reasons() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return reasons_.size();
-  }
-
-  template <typename Service>
-  bool call(const std::string& name, Service& service) {
-    return ros::service::call(kName + "/" + name, service);
-  }
-
- private:
-  bool waitFor(const std::function<bool()>& condition) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    return came_.wait_for(lock, std::chrono::duration<double>(kLongestAnswer), condition);
-  }
-
-  void onStatus(const MappingStatus& status) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++statuses_;
-    std::uint64_t dropped = 0;
-    for (const DropKind& kind : dropKinds()) {
-      dropped += status.*kind.count;
-      if (status.*kind.count > 0) reasons_.insert(kind.reason);
-    }
-    if (status.received != status.integrated + status.waiting + dropped) {
-      ++faults_;
-      ADD_FAILURE() << "the books do not add up: " << status;
-    }
-    std::uint64_t points = status.points_used + status.points_no_returns;
-    for (const PointKind& kind : pointKinds()) points += status.*kind.in_status;
-    if (status.points_received != points) {
-      ++faults_;
-      ADD_FAILURE() << "points are lost: " << status;
-    }
-    const bool refused = !status.integrated_last && status.integrated + dropped > 0;
-    if (refused && (status.last_drop.size() < kShortestText || status.last_drop.size() > kLongestText)) {
-      ++faults_;
-      ADD_FAILURE() << "this is no sentence: " << status.last_drop.substr(0, 300);
-    }
-    if (status.last_refusal.size() > kLongestText) {
-      ++faults_;
-      ADD_FAILURE() << "this is too long: " << status.last_refusal.substr(0, 300);
-    }
-    last_ = status;
-    fresh_ = true;
-    came_.notify_all();
-  }
-
-  ros::NodeHandle& node_;
-  nodelet::Loader loader_;
-  bool loaded_ = false;
-  mutable std::mutex mutex_;
-  std::condition_variable came_;
-  MappingStatus last_;
-  bool fresh_ = false;
-  std::set<DropReason> reasons_;
-  std::atomic<std::size_t> faults_{0}, statuses_{0};
-  ros::Subscriber status_;
-};
-
-/// Subscribers of all topics that come and go at random.
-class Listeners {
- public:
-  explicit Listeners(ros::NodeHandle& node) : node_(node) {}
-
-  void change(Dice& dice) {
-    toggle<visualization_msgs::MarkerArray>(dice, "occupied_cells_vis_array");
-    toggle<visualization_msgs::MarkerArray>(dice, "free_cells_vis_array");
-    toggle<PointCloud2>(dice, "voxel_cloud");
-    toggle<VoxelCloudUpdate>(dice, "voxel_cloud_updates");
-    toggle<nav_msgs::OccupancyGrid>(dice, "projected_map");
-    toggle<map_msgs::OccupancyGridUpdate>(dice, "projected_map_updates");
-    toggle<ElevationMap>(dice, "elevation_map");
-    toggle<OccupancyMap>(dice, "occupancy");
-    toggle<OccupancyUpdate>(dice, "occupancy_updates");
-    toggle<nav_msgs::Path>(dice, "trajectory");
-  }
-  void leave() { subscribers_.clear(); }
-  std::size_t received() const { return received_; }
-
- private:
-  template <typename Message>
-  void toggle(Dice& dice, const std::string& topic) {
-    if (dice.oneIn(2)) return;
-    if (subscribers_.erase(topic) > 0) return;
-    subscribers_[topic] =
-        node_.subscribe<Message>(topic, 2, [this](const typename Message::ConstPtr&) { ++received_; });
-  }
-
-  ros::NodeHandle& node_;
-  std::map<std::string, ros::Subscriber> subscribers_;
-  std::atomic<std::size_t> received_{0};
 };
 
 /// One mapper under one set of settings, from loading it to comparing it with a fresh one.

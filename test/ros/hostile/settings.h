@@ -1,0 +1,99 @@
+/// @file The sets of settings under which the hostile publisher attacks the mapper.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace bki_mapping::hostile {
+
+/// Parameters of the mapper by name, in addition to those that all sets share (Mapper::load).
+struct Settings {
+  std::string name;
+  std::map<std::string, std::string> values;
+};
+
+inline const std::vector<Settings>& allSettings() {
+  static const std::vector<Settings> all = {
+      {"robot",
+       {{"kernel/scale", "100"},
+        {"free_space/hits_before_misses", "true"},
+        {"free_space/evidence_before_misses", "true"},
+        {"scan_limit/hits", "0.2"},
+        {"scan_limit/free", "0.1"},
+        {"free_gain/static", "0.1"},
+        {"free_gain/dynamic", "8"},
+        {"free_gain/persistence", "0.5"},
+        {"sensor_model/max_range", "60"}}},
+      {"window_below_a_block", {{"window", "0.5"}, {"sensor_model/max_range", "20"}}},
+      {"defaults", {{"window", "0"}}},
+      {"coarse",
+       {{"resolution", "5"},
+        {"downsample_resolution", "1"},
+        {"free_space/mode", "linear"},
+        {"window", "400"}}},
+      {"fine",
+       {{"resolution", "0.02"},
+        {"downsample_resolution", "0.01"},
+        {"window", "2"},
+        {"free_space/mode", "even"},
+        {"free_space/gap", "0.2"},
+        {"sensor_model/max_range", "3"}}},
+      {"counting",
+       {{"kernel/type", "counting"},
+        {"occlusion", "all"},
+        {"downsample_resolution", "0"},
+        {"sensor_model/max_range", "15"}}},
+      {"colours",
+       {{"label_encoding", "rgb"},
+        {"label_field", "rgb"},
+        {"color_match", "nearest"},
+        {"free_space/mode", "none"},
+        {"occlusion", "mapped"},
+        {"sensor_model/max_range", "30"}}},
+      {"scores",
+       {{"label_encoding", "scores"},
+        {"label_field", ""},
+        {"score_fields", "scores"},
+        {"free_space/mode", "uniform"},
+        {"free_space/samples_per_beam", "3"},
+        {"sensor_model/max_range", "30"}}},
+      {"top_k",
+       {{"label_encoding", "top_k"},
+        {"label_field", "labels"},
+        {"score_fields", "label_scores"},
+        {"score_type", "logit"},
+        {"free_space/extent", "mapped"},
+        {"sensor_model/max_range", "60"}}},
+      {"moving_sensor",
+       {{"sensor_frame_id", "honest_base"},
+        {"time_field", "seconds"},
+        {"free_space/beam_index", "rtree"},
+        {"unknown_labels", "unlabelled"},
+        {"on_time_jump", "reset"},
+        {"sensor_model/max_range", "30"}}},
+      {"no_returns",
+       {{"clear_no_returns", "true"},
+        {"time_field", "ns"},
+        {"unlabelled_points", "ignore"},
+        {"queue_policy", "drop_newest"},
+        {"memory_limit", "2"},
+        {"free_space/weight", "uniform"},
+        {"sensor_model/max_range", "10"}}},
+      {"two_lidars",
+       {{"inputs/front/topic", "/hostile_cloud"},
+        {"inputs/front/time_field", "seconds"},
+        {"inputs/front/clear_no_returns", "true"},
+        {"inputs/front/max_range", "12"},
+        {"inputs/rear/topic", "/hostile_cloud_2"},
+        {"inputs/rear/label_encoding", "bgr"},
+        {"inputs/rear/label_field", "rgb"},
+        {"inputs/rear/sensor_frame_id", "honest_base"},
+        {"inputs/rear/min_range", "1"},
+        {"inputs/rear/max_range", "40"},
+        {"window", "30"}}},
+  };
+  return all;
+}
+
+}  // namespace bki_mapping::hostile
