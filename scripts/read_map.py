@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads a map file (.bkm) with SQLite and NumPy alone: a reader to start from, and a test of docs/map_file.md."""
+"""Reads a map file (.bkm) with only SQLite and NumPy: an example of a reader, and a test of docs/map_file.md."""
 import pathlib
 import sqlite3
 import sys
@@ -9,12 +9,12 @@ import numpy
 
 
 def read_planes(file, part=0):
-    """Yields for each plane the index of its block, the id of its class (255: free), and its evidence as an array
-    [z, y, x]: without the prior, in the kernel's unit."""
+    """Yields for each plane the index of its block, the id of its class (255: free), and its evidence, without the prior,
+    as an array [z, y, x]."""
     database = sqlite3.connect(pathlib.Path(file).absolute().as_uri() + '?mode=ro', uri=True)
     (application,), (version,) = (database.execute(f'PRAGMA {name}').fetchone() for name in ('application_id', 'user_version'))
     if application != 0x424b494d or version != 1:
-        raise ValueError(f'{file} is no map of version 1')
+        raise ValueError(f'{file} is not a map file of version 1')
     exponent, = database.execute('SELECT unit_exponent FROM map').fetchone()
     for z, y, x, blocks, planes, content in database.execute(
             'SELECT z, y, x, blocks, planes, content FROM tile WHERE part = ? ORDER BY z, y, x', (part,)):

@@ -21,9 +21,8 @@ inline std::vector<NamedParameter<KernelConfig>> kernelParameters() {
       realParameter(
           "scale", &C::scale, NumberRange::atLeast(0.001).upTo(1000.0), "", Changes::kAtStart,
           "Value sigma0 of the sparse kernel at distance 0: the evidence that a hit adds at its own "
-          "position. Only its ratio to prior and to the limits of a scan matters, and that it is far from "
-          "both ends of "
-          "the range of evidence, 1.5e-5 to 32768."),
+          "position. Only its ratio to prior and to scan_limit matters. Keep it far from both ends of the "
+          "range of evidence, 1.5e-5 to 32768."),
   };
 }
 

@@ -19,9 +19,9 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
       realParameter("living", &C::living_classes,
                     NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
                     Changes::kWhileMapping,
-                    "The same for classes with the flag living: people, riders, animals. They may stand for "
-                    "a while, but "
-                    "nobody parks them, so that a far larger factor is right. 0: that of free_gain/dynamic."),
+                    "Factor on the evidence for free for classes with the flag living: people, riders, "
+                    "animals. They may stand for a while, but are never parked, so set it far above "
+                    "free_gain/dynamic; 0 uses free_gain/dynamic."),
       realParameter(
           "static", &C::static_classes, gain, "", Changes::kWhileMapping,
           "Factor on the evidence for free when deciding the state of a voxel whose likeliest class does not "

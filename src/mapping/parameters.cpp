@@ -41,8 +41,8 @@ std::vector<Parameter> mapperParameters() {
           "Clear space up to sensor_model/max_range along beams whose hit lies beyond it. Set false "
           "if hits beyond the range can be false returns."),
       choiceParameter("occlusion", &C::occlusion, {"none", "mapped", "all"}, Changes::kWhileMapping,
-                      "Which voxels behind hits, without evidence of their own, are marked as occluded: "
-                      "none; mapped, those in blocks that exist already; all, those in every block that "
+                      "Which voxels without evidence are marked as occluded if they lie behind hits: none; "
+                      "mapped marks those in blocks that exist already; all marks those in every block that "
                       "beams cross. Use all to plan views of hidden space."),
       choiceParameter("unlabelled_points", &C::unlabelled_points, {"occupied", "ignore"},
                       Changes::kWhileMapping,
@@ -52,11 +52,11 @@ std::vector<Parameter> mapperParameters() {
                       "What to do with hits whose label is not in the class table: ignore drops them; "
                       "unlabelled maps them as the class with the flag unlabelled."),
       choiceParameter("label_values", &C::label_values, {"raw", "id"}, Changes::kAtStart,
-                      "What the labels of points are: raw, the numbers of the data set, which the class "
-                      "table translates; id, the ids of the class table."),
+                      "What the labels of points are: raw means the numbers of the data set, which the class "
+                      "table translates; id means the ids of the class table."),
       realParameter("memory_limit", &C::memory_limit, NumberRange::atLeast(0.0).slider(0.0, 1e6), "MB",
                     Changes::kWhileMapping,
-                    "Most memory that the map may take; a scan that would exceed it is refused whole. Set it "
+                    "Largest memory that the map may take; a scan that would exceed it is refused. Set it "
                     "below the computer's memory; 0 sets no limit."),
       integerParameter(
           "threads", &C::threads, NumberRange::atLeast(0).upTo(1024), Changes::kAtStart,

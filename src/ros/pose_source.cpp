@@ -140,7 +140,7 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
                                 const ros::Time& stamp) const {
   if (source.empty()) {
     return {DropReason::kUnknownFrame,
-            "its header has no frame_id; let the driver set one, or set sensor_frame_id"};
+            "its header has no frame_id; configure the driver, or set sensor_frame_id"};
   }
   const std::string from = shortText(source), to = shortText(target);
   const auto newest = find(target, source, ros::Time());
@@ -164,12 +164,12 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
     return {DropReason::kTransformLate,
             "the latest transform from '" + from + "' to '" + to + "' is " +
                 numberText(std::round(1e3 * (stamp.toSec() - latest.toSec()))) +
-                " ms older than the cloud; raise tf_timeout, or let the localisation publish sooner"};
+                " ms older than the cloud; raise tf_timeout, or make the localisation publish sooner"};
   }
   return {DropReason::kTooOld, "the transforms held from '" + from + "' to '" + to +
                                    "' do not reach back to it: the latest is " +
                                    numberText(std::round(1e3 * (latest.toSec() - stamp.toSec())) / 1e3) +
-                                   " s newer; let clouds come sooner, or check the clocks"};
+                                   " s newer; send clouds sooner, or check the clocks"};
 }
 
 }  // namespace bki_mapping::ros_interface

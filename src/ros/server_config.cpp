@@ -95,7 +95,7 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "Map file that the mapper continues: loaded at the start, and saved every save_period and "
           "at the end. It is created if missing. Without it, the map ends with the mapper."),
       truthParameter("read_only", &C::read_only, Changes::kAtStart,
-                     "Publish the map in map_file, and take no clouds. Set true for a map that is finished."),
+                     "Publish the map in map_file, and take no clouds. Set true for a finished map."),
       realParameter("save_period", &C::save_period, NumberRange::atLeast(0.0).slider(0.0, 3600.0), "s",
                     Changes::kWhileMapping,
                     "Time between two saves of map_file. Lower it to lose less when the power fails; 0 saves "

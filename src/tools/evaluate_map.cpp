@@ -38,7 +38,7 @@ po::options_description options() {
       "label-errors", po::value<std::string>()->value_name("KIND")->default_value("even"),
       "which labels --label-noise replaces: even, similar, objects, borders or far")(
       "predictions", po::value<std::string>()->value_name("FOLDER"),
-      "name of a folder with predicted labels: these are mapped, and those of --labels judge")(
+      "name of a folder with predicted labels to map; those of --labels are the truth")(
       "pose-noise", po::value<std::string>()->value_name("M,DEG"),
       "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
       "pose-drift", po::value<std::string>()->value_name("M,DEG"),

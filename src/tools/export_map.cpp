@@ -21,7 +21,7 @@ po::options_description options() {
   const ColumnRules rules;
   options.add_options()(
       "output", text("FILE"),
-      "file to write; its ending chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
+      "file to write; its extension chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
       "the colours of classes; .bt, OctoMap of occupied and free; .yaml, with an image .pgm beside it, "
       "for map_server")("include", text("STATES")->default_value("occupied"),
                         "voxels in a .ply or .pcd file: occupied,free,occluded")(
@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
   return tools::run("export_map", [&] {
     const auto given = tools::parse(argc, argv,
                                     "export_map FILE.bkm --output FILE\n"
-                                    "Writes a map for other programs.",
+                                    "Converts a map for other programs.",
                                     options(), "files");
     return given ? exportFile(*given) : 0;
   });

@@ -22,10 +22,10 @@ using Json = nlohmann::ordered_json;
 po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("json", text("FILE.json"), "write the figures as JSON, too")(
+  options.add_options()("json", text("FILE.json"), "also write the figures as JSON")(
       "top", text("FILE.png"), "draw the map as seen from above")(
       "profile", text("FILE.png"), "draw the map as seen from its longer side")(
-      "parameters", po::bool_switch(), "print the parameters it was made with as YAML, and exit");
+      "parameters", po::bool_switch(), "print the parameters in the file as YAML, and exit");
   return options;
 }
 
@@ -88,7 +88,7 @@ void printDrive(std::ostream& out, const DriveRecord& drive) {
     out << ", from " << timeText(drive.first_stamp) << ", "
         << 1e-9 * static_cast<double>(drive.last_stamp - drive.first_stamp) << " s";
   }
-  if (drive.part > 0) out << ", kept apart in part " << drive.part;
+  if (drive.part > 0) out << ", separate in part " << drive.part;
   out << "\n";
 }
 

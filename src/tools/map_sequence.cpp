@@ -27,13 +27,14 @@ po::options_description options() {
   po::options_description options("Options");
   const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   options.add_options()("output", text("FILE.bkm|FILE.ply|FILE.pcd"),
-                        "file for the map: .bkm to keep it, .ply or .pcd to look at it")(
+                        "file for the map: .bkm holds all of it, .ply or .pcd its voxels as points")(
       "resume", text("FILE.bkm"), "continue the map in this file")(
       "drive", text("ID"),
-      "what the map file calls these scans (default: name of the sequence's folder, first and last scan)")(
+      "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
       "include", text("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
-      "points", text("FILE.pcd"), "file for the points of the scans that lie in occupied voxels at the end")(
+      "points", text("FILE.pcd"),
+      "file for the points of the scans that lie in occupied voxels of the final map")(
       "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
                                                         "print the effective parameters as YAML, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());

@@ -19,14 +19,12 @@ po::options_description options() {
   po::options_description options("Options");
   options.add_options()("output", po::value<std::string>()->value_name("FILE.bkm"),
                         "the merged map; may be one of the inputs")(
-      "keep-drives", po::bool_switch(),
-      "store the evidence of each drive apart, too, so that it can be taken out")(
+      "keep-drives", po::bool_switch(), "also store each drive separately, so that it can be taken out")(
       "without", po::value<Words>()->value_name("DRIVE")->composing(),
       "leave a drive out, by its id; repeatable")(
       "transform", po::value<Words>()->value_name("FILE=X,Y,Z,YAW")->composing(),
       "turn the map in FILE about the z axis by YAW degrees, then move it by X, Y, Z metres; repeatable. "
-      "Whole "
-      "voxels and multiples of 90 degrees are exact, others approximate");
+      "Whole voxels and multiples of 90 degrees are exact, others approximate");
   return options;
 }
 
@@ -61,7 +59,7 @@ Words words(const po::variables_map& given, const char* name) {
 MergeOptions mergeOptions(const po::variables_map& given) {
   MergeOptions options;
   for (const std::string& path : words(given, "inputs")) options.inputs.push_back({path, std::nullopt});
-  if (options.inputs.empty()) throw std::invalid_argument("the maps to be merged are missing (see --help)");
+  if (options.inputs.empty()) throw std::invalid_argument("the names of the maps are missing (see --help)");
   if (!given.count("output")) throw std::invalid_argument("--output FILE.bkm is missing (see --help)");
   options.output = given["output"].as<std::string>();
   if (!isMapFileName(options.output)) {

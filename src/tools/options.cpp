@@ -74,7 +74,7 @@ std::string onlyMapFile(const po::variables_map& given) {
     const auto files = given["files"].as<std::vector<std::string>>();
     if (files.size() == 1) return files[0];
   }
-  throw std::invalid_argument("there must be one map file (see --help)");
+  throw std::invalid_argument("name one map file (see --help)");
 }
 
 po::options_description mapperOptions() {

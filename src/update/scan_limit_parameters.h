@@ -14,16 +14,17 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
   return {
       realParameter(
           "hits", &C::hits, evidence, "", Changes::kWhileMapping,
-          "Most evidence that the hits of one scan add to a voxel, all classes together; larger sums "
+          "Largest evidence that the hits of one scan add to a voxel, all classes together; larger sums "
           "are scaled down to it. Set it so that scans count alike however dense their points are; 0 "
           "sets no limit."),
-      realParameter("free", &C::free, evidence, "", Changes::kWhileMapping,
-                    "Most evidence for free that one scan adds to a voxel. Set it so that scans count alike "
-                    "however many beams cross the voxel; 0 sets no limit."),
+      realParameter(
+          "free", &C::free, evidence, "", Changes::kWhileMapping,
+          "Largest evidence for free that one scan adds to a voxel. Set it so that scans count alike "
+          "however many beams cross the voxel; 0 sets no limit."),
       integerParameter(
           "blocks", &C::blocks, NumberRange::atLeast(0).upTo(1e9), Changes::kWhileMapping,
-          "Most blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "
-          "touch; a larger scan is refused whole. Lower it to protect memory; 0 allows the blocks "
+          "Largest number of blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "
+          "touch; a larger scan is refused. Lower it to protect memory; 0 allows the blocks "
           "within the sensor's reach, at most " +
               std::to_string(ScanLimitConfig::kMostBlocks) + "."),
   };

@@ -50,7 +50,7 @@ class ReadMap(unittest.TestCase):
             with open(path, 'r+b') as file:
                 file.seek(63)
                 file.write(b'\2')
-            with self.assertRaisesRegex(ValueError, 'is no map of version 1'):
+            with self.assertRaisesRegex(ValueError, 'is not a map file of version 1'):
                 list(read_map.read_planes(path))
 
     def test_as_a_program(self):

@@ -26,7 +26,7 @@ struct SemanticClass {
   bool ground = false;                  ///< robots can drive on it
   bool ignored = false;                 ///< navigation ignores it: it is neither ground nor an obstacle
   std::optional<double> free_gain;      ///< replaces the gain of the mapper's settings, > 0
-  bool living = false;                  ///< people, riders, animals: `dynamic`, and nobody parks them
+  bool living = false;                  ///< people, riders, animals: `dynamic`, but never parked
 };
 
 /// Maps the labels of clouds to classes. Immutable.

@@ -5,12 +5,12 @@
 
 namespace bki_mapping {
 
-/// Most evidence that one scan adds to a voxel; 0: no limit.
+/// Largest evidence that one scan adds to a voxel; 0: no limit.
 struct ScanLimitConfig {
   double hits = 0.0;  ///< for all classes together; larger sums are scaled down
   double free = 0.0;  ///< for `free`; larger sums are cut off
-  /// Most blocks that the hits of a scan, or its free space, may touch; 0: as many as lie within the sensor's
-  /// reach, at most kMostBlocks. A larger scan is refused whole.
+  /// Largest number of blocks that the hits of a scan, or its free space, may touch; 0: the number within the
+  /// sensor's reach, at most kMostBlocks. A larger scan is refused.
   std::int64_t blocks = 0;
 
   static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< 0.5 GB for each class that they all hold
