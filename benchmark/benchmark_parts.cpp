@@ -1,5 +1,5 @@
-// Times the parts of the mapper separately on a simulated scan. Takes Google Benchmark's options, for
-// instance
+// Times the parts of the mapper separately on a simulated scan. Takes the options of Google Benchmark, such
+// as
 // --benchmark_filter=Lines.
 #include <benchmark/benchmark.h>
 

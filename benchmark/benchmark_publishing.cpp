@@ -12,6 +12,7 @@
 
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "core/quantile.h"
 #include "core/stopwatch.h"
 #include "ros/publisher_set.h"
 #include "ros/queued_call.h"
@@ -36,15 +37,6 @@ po::options_description options() {
                                   "instead, send scans at this rate, without and with subscribers, and "
                                   "measure how long each takes to be in the map; keeps all scans in memory");
   return options;
-}
-
-/// @param share 0 for the smallest value, 1 for the largest.
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
-}
-double median(const std::vector<double>& values) {
-  return quantile(values, 0.5);
 }
 
 /// Receives all topics of this node and drops what it receives.
@@ -133,8 +125,8 @@ int measureTopics(const po::variables_map& given) {
   const std::size_t n = snapshots.size(), fifth = std::max<std::size_t>(n / 5, 1);
   const auto print = [&](const std::string& name, const std::vector<double>& of_all) {
     const auto part = static_cast<std::ptrdiff_t>(fifth);
-    std::printf("%-60s %10.2f %10.2f\n", name.c_str(), median({of_all.begin(), of_all.begin() + part}),
-                median({of_all.end() - part, of_all.end()}));
+    std::printf("%-60s %10.2f %10.2f\n", name.c_str(), quantile({of_all.begin(), of_all.begin() + part}, 0.5),
+                quantile({of_all.end() - part, of_all.end()}, 0.5));
   };
   std::printf("map: %zu blocks after %zu scans, %zu in the end\n", blocks[fifth / 2], (fifth / 2) * every,
               blocks.back());
@@ -144,7 +136,7 @@ int measureTopics(const po::variables_map& given) {
   return 0;
 }
 
-/// Maps scans that come at a fixed rate. @return for each, the time from its coming to its being in the map
+/// Maps scans that arrive at a fixed rate. @return for each, the time from its arrival until it is in the map
 /// [ms].
 std::vector<double> waits(const std::vector<Scan>& scans, double rate, bool listens) {
   const ServerConfig config;
