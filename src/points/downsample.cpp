@@ -84,7 +84,7 @@ std::uint32_t Downsampler::Input::findPosition(const GridIndex& tile, KnownTile&
 
 void Downsampler::Input::flush() {
   const std::size_t count = count_;
-  owner_->kernels_->place_cells(*owner_->grid_, {{x_, y_, z_}}, count, places_);
+  owner_->kernels_->locate_cells(*owner_->grid_, {{x_, y_, z_}}, count, positions_);
   if (points_.size() < size_ + count) {
     tile_of_.resize(2 * (size_ + count));
     points_.resize(tile_of_.size());
@@ -95,9 +95,9 @@ void Downsampler::Input::flush() {
     points[i].x = x_[i];
     points[i].y = y_[i];
     points[i].z = z_[i];
-    points[i].cell = static_cast<std::uint16_t>(places_.cell[i]);
+    points[i].cell = static_cast<std::uint16_t>(positions_.cell[i]);
     points[i].label = labels_[i];
-    const GridIndex tile = places_.tileOf(i);
+    const GridIndex tile = positions_.tileOf(i);
     KnownTile& known = known_[shortCode(tile)];
     const bool is_known = known.index == tile && known.position != kNoPosition;
     tile_of[i] = is_known ? known.position : findPosition(tile, known);

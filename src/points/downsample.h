@@ -62,7 +62,7 @@ class Downsampler {
     alignas(64) float x_[kBatch], y_[kBatch], z_[kBatch];
     ClassId labels_[kBatch];
     std::size_t count_ = 0;
-    TilePlaces places_;
+    TilePositions positions_;
     std::vector<KnownTile> known_;           ///< a cache of recent tiles, by shortCode()
     std::size_t size_ = 0;                   ///< points in the next two arrays, which may be longer
     std::vector<TilePoint> points_;          ///< of the chunk

@@ -15,7 +15,7 @@ struct Neighbour {
   int blocks[3];
   float voxels[3];
 };
-/// In the order of the bits of TilePlaces::reached.
+/// In the order of the bits of TilePositions::reached.
 constexpr std::array<Neighbour, 27> kNeighbours = [] {
   std::array<Neighbour, 27> neighbours{};
   for (int bit = 0; bit < 27; ++bit) {
@@ -41,9 +41,9 @@ template <bool kWeighted, typename Scratch, typename Group>
   if (block + 1 == group.begin.size()) group.begin.push_back(0);
   ++group.begin[block + 1];
   LocalPoint& point = scratch.points[scratch.size];
-  point.x = scratch.places.inside[0][i] - offset[0];
-  point.y = scratch.places.inside[1][i] - offset[1];
-  point.z = scratch.places.inside[2][i] - offset[2];
+  point.x = scratch.positions.inside[0][i] - offset[0];
+  point.y = scratch.positions.inside[1][i] - offset[1];
+  point.z = scratch.positions.inside[2][i] - offset[2];
   point.label = scratch.labels[i];
   point.voxel = static_cast<std::uint16_t>(voxel);
   if constexpr (kWeighted) scratch.weight[scratch.size] = scratch.weights[i];
@@ -61,12 +61,12 @@ PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, co
 template <bool kWeighted>
 void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& group) const {
   for (std::size_t i = 0; i < count; ++i) {
-    const GridIndex containing = scratch.places.tileOf(i);
+    const GridIndex containing = scratch.positions.tileOf(i);
     if (scratch.containing != containing) {
       scratch.containing = containing;
       scratch.neighbours.fill(kNoPosition);
     }
-    for (auto left = static_cast<std::uint32_t>(scratch.places.reached[i]); left != 0; left &= left - 1) {
+    for (auto left = static_cast<std::uint32_t>(scratch.positions.reached[i]); left != 0; left &= left - 1) {
       const auto bit = static_cast<std::size_t>(__builtin_ctz(left));
       const Neighbour& offset = kNeighbours[bit];
       std::uint32_t& block = scratch.neighbours[bit];
@@ -75,7 +75,8 @@ void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& grou
                                      containing.z + offset.blocks[2]});
       }
       append<kWeighted>(block, i, offset.voxels,
-                        bit == kContaining ? scratch.places.cell[i] : LocalPoint::kOutside, scratch, group);
+                        bit == kContaining ? scratch.positions.cell[i] : LocalPoint::kOutside, scratch,
+                        group);
     }
   }
 }
@@ -83,11 +84,11 @@ void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& grou
 /// For kernels of any length.
 template <bool kWeighted>
 void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
-  const GridIndex containing = scratch.places.tileOf(i);
+  const GridIndex containing = scratch.positions.tileOf(i);
   const double reach = kernel_.reach;
-  const AxisBlocks xs(containing.x, scratch.places.inside[0][i], reach),
-      ys(containing.y, scratch.places.inside[1][i], reach),
-      zs(containing.z, scratch.places.inside[2][i], reach);
+  const AxisBlocks xs(containing.x, scratch.positions.inside[0][i], reach),
+      ys(containing.y, scratch.positions.inside[1][i], reach),
+      zs(containing.z, scratch.positions.inside[2][i], reach);
   // A long kernel may reach hundreds of blocks.
   const std::size_t needed = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
   reserve(needed, scratch);
@@ -101,7 +102,7 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
                                  static_cast<float>(kBlockEdge * (block.y - containing.y)),
                                  static_cast<float>(kBlockEdge * (block.z - containing.z))};
         append<kWeighted>(group.blocks.insert(block), i, offset,
-                          block == containing ? scratch.places.cell[i] : LocalPoint::kOutside, scratch,
+                          block == containing ? scratch.positions.cell[i] : LocalPoint::kOutside, scratch,
                           group);
         reaches_containing |= block == containing;
       }
@@ -110,7 +111,7 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
   // A kernel shorter than half a voxel's diagonal may reach no centre.
   if (keep_containing_ && !reaches_containing) {
     append<kWeighted>(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels,
-                      scratch.places.cell[i], scratch, group);
+                      scratch.positions.cell[i], scratch, group);
   }
 }
 
@@ -127,11 +128,11 @@ void PointBins::binBatch(std::size_t count, Scratch& scratch, Group& group) cons
   reserve(scratch.size + kNeighbours.size() * count, scratch);
   if (kernel_.type == KernelType::kCounting) {
     for (std::size_t i = 0; i < count; ++i) {
-      append<kWeighted>(group.blocks.insert(scratch.places.tileOf(i)), i, kNeighbours[kContaining].voxels,
-                        scratch.places.cell[i], scratch, group);
+      append<kWeighted>(group.blocks.insert(scratch.positions.tileOf(i)), i, kNeighbours[kContaining].voxels,
+                        scratch.positions.cell[i], scratch, group);
     }
   } else if (kernel_.reach >= kVoxelHalfDiagonal && kernel_.reach <= static_cast<float>(kBlockEdge)) {
-    kernels_.reach_blocks(count, kernel_.reach, scratch.places);
+    kernels_.reach_blocks(count, kernel_.reach, scratch.positions);
     binToNeighbours<kWeighted>(count, scratch, group);
   } else {
     for (std::size_t i = 0; i < count; ++i) binToAll<kWeighted>(i, scratch, group);
@@ -163,7 +164,7 @@ void PointBins::binGroup(const TileGrid& grid, const MergedPoints& points, Scrat
   for (std::size_t begin = 0; begin < size; begin += kBatch) {
     const std::size_t count = std::min(size - begin, kBatch);
     const PointSpan span{{points.x.data() + begin, points.y.data() + begin, points.z.data() + begin}};
-    kernels_.place_points(grid, span, count, scratch.places);
+    kernels_.locate_points(grid, span, count, scratch.positions);
     scratch.labels = points.labels.data() + begin;
     if (weighted_) {
       scratch.weights = points.weights.data() + begin;

@@ -43,7 +43,7 @@ class PointBins {
  private:
   /// Working memory of one thread.
   struct alignas(kThreadsApart) Scratch {
-    TilePlaces places;
+    TilePositions positions;
     const ClassId* labels = nullptr;  ///< of the batch
     const float* weights = nullptr;   ///< of the batch, if its points have weights
     GridIndex containing;             ///< containing block of the last point

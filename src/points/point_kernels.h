@@ -20,12 +20,14 @@ struct PointKernels {
   Block::Layers (*sum_points)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
   /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
   /// GridGeometry::voxelAt, to the bit.
-  void (*place_points)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
+  void (*locate_points)(const TileGrid& grid, const PointSpan& points, std::size_t count,
+                        TilePositions& positions);
   /// The same, of cells and tiles only; `inside` is left as it is.
-  void (*place_cells)(const TileGrid& grid, const PointSpan& points, std::size_t count, TilePlaces& places);
+  void (*locate_cells)(const TileGrid& grid, const PointSpan& points, std::size_t count,
+                       TilePositions& positions);
   /// Finds the blocks that points reach whose tiles, found before, are blocks. @param reach [voxels], at
   /// most 8.
-  void (*reach_blocks)(std::size_t count, float reach, TilePlaces& places);
+  void (*reach_blocks)(std::size_t count, float reach, TilePositions& positions);
 };
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.

@@ -11,7 +11,7 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsAvx512() {
-  static const PointKernels kernels = {"avx512", sumPoints, placePoints, placeCells, reachBlocks};
+  static const PointKernels kernels = {"avx512", sumPoints, locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

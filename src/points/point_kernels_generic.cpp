@@ -9,7 +9,7 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsGeneric() {
-  static const PointKernels kernels = {"generic", sumPoints, placePoints, placeCells, reachBlocks};
+  static const PointKernels kernels = {"generic", sumPoints, locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

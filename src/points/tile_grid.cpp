@@ -11,12 +11,12 @@ TileGrid::TileGrid(const GridGeometry& cell_grid, const Eigen::Vector3d& sensor,
       per_metre(1.0 / cell_grid.resolution()) {
   for (int axis = 0; axis < 3; ++axis) {
     const double quotient = origin[axis] * per_metre;
-    home[axis] = floorToInt(std::clamp(quotient, -kFarthest, kFarthest) / edge);
-    from_home[axis] = static_cast<float>(quotient - static_cast<double>(home[axis]) * edge);
+    origin_tile[axis] = floorToInt(std::clamp(quotient, -kFarthest, kFarthest) / edge);
+    origin_in_tile[axis] = static_cast<float>(quotient - static_cast<double>(origin_tile[axis]) * edge);
   }
 }
 
-void TileGrid::placeExactly(const PointSpan& points, std::size_t i, TilePlaces& places) const {
+void TileGrid::locateExactly(const PointSpan& points, std::size_t i, TilePositions& positions) const {
   Eigen::Vector3d point;
   const double farthest = kFarthest / per_metre;
   for (int axis = 0; axis < 3; ++axis) {
@@ -24,13 +24,13 @@ void TileGrid::placeExactly(const PointSpan& points, std::size_t i, TilePlaces& 
   }
   const VoxelIndex index = cells.voxelAt(point);
   const std::int32_t floors[3] = {index.x, index.y, index.z};
-  places.cell[i] = 0;
+  positions.cell[i] = 0;
   for (int axis = 2; axis >= 0; --axis) {
     const std::int32_t tile = floorToInt((floors[axis] + 0.5) / edge);
-    places.tile[axis][i] = tile;
-    places.inside[axis][i] =
+    positions.tile[axis][i] = tile;
+    positions.inside[axis][i] =
         static_cast<float>(point[axis] * per_metre - (static_cast<double>(tile) * edge + 0.5));
-    places.cell[i] = places.cell[i] * edge + floors[axis] - tile * edge;
+    positions.cell[i] = positions.cell[i] * edge + floors[axis] - tile * edge;
   }
 }
 

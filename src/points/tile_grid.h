@@ -17,7 +17,7 @@ struct PointSpan {
 };
 
 /// The tile and the cell of each point of a batch.
-struct TilePlaces {
+struct TilePositions {
   alignas(64) std::int32_t tile[3][kBatch];  ///< index of the tile, by axis
   alignas(
       64) float inside[3][kBatch];  ///< the point, relative to the tile's first cell centre [cells], by axis
@@ -40,15 +40,15 @@ struct TileGrid {
   TileGrid(const GridGeometry& cells, const Eigen::Vector3d& origin, int edge);
 
   /// Finds the tile and the cell of one point with the exact quotients of GridGeometry.
-  void placeExactly(const PointSpan& points, std::size_t i, TilePlaces& places) const;
+  void locateExactly(const PointSpan& points, std::size_t i, TilePositions& positions) const;
 
   GridGeometry cells;
   int edge;
   // Copies in plain arrays for the vector loops:
   double origin[3];
-  double per_metre;      ///< cells per metre
-  std::int32_t home[3];  ///< index of the tile that contains the origin
-  float from_home[3];    ///< the origin, relative to that tile's lowest corner [cells]
+  double per_metre;             ///< cells per metre
+  std::int32_t origin_tile[3];  ///< index of the tile that contains the origin
+  float origin_in_tile[3];      ///< the origin, relative to that tile's lowest corner [cells]
 };
 
 }  // namespace bki_mapping

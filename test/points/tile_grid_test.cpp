@@ -52,7 +52,7 @@ int floorDivide(int a, int b) {
   return a >= 0 ? a / b : -((-a + b - 1) / b);
 }
 
-TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
+TEST(TileGrid, LocatesPointsWhereGridGeometryDoes) {
   for (const std::string& set : instructionSets()) {
     for (const double cell : {0.1, 0.3, 1.0}) {
       for (const int edge : {1, 7, 8, 24, 32}) {
@@ -61,22 +61,22 @@ TEST(TileGrid, PlacesPointsWhereGridGeometryDoes) {
           const Points points = nastyPoints(cell, origin);
           const GridGeometry geometry(cell);
           const TileGrid grid(geometry, origin, edge);
-          TilePlaces places;
-          pointKernelsFor(set).place_points(grid, points.span(), kBatch - 3, places);
-          TilePlaces cells;
-          pointKernelsFor(set).place_cells(grid, points.span(), kBatch - 3, cells);
+          TilePositions positions;
+          pointKernelsFor(set).locate_points(grid, points.span(), kBatch - 3, positions);
+          TilePositions cells;
+          pointKernelsFor(set).locate_cells(grid, points.span(), kBatch - 3, cells);
           for (std::size_t i = 0; i < kBatch - 3; ++i) {
-            ASSERT_EQ(cells.tileOf(i), places.tileOf(i)) << set << ", edge " << edge << ", point " << i;
-            ASSERT_EQ(cells.cell[i], places.cell[i]) << set << ", edge " << edge << ", point " << i;
+            ASSERT_EQ(cells.tileOf(i), positions.tileOf(i)) << set << ", edge " << edge << ", point " << i;
+            ASSERT_EQ(cells.cell[i], positions.cell[i]) << set << ", edge " << edge << ", point " << i;
             const Eigen::Vector3d p = origin + points.at(i);
             const VoxelIndex v = geometry.voxelAt(p);
             const GridIndex tile{floorDivide(v.x, edge), floorDivide(v.y, edge), floorDivide(v.z, edge)};
-            ASSERT_EQ(places.tileOf(i), tile) << set << ", edge " << edge << ", point " << i;
+            ASSERT_EQ(positions.tileOf(i), tile) << set << ", edge " << edge << ", point " << i;
             const int inside =
                 v.x - tile.x * edge + edge * (v.y - tile.y * edge + edge * (v.z - tile.z * edge));
-            ASSERT_EQ(places.cell[i], inside) << set << ", edge " << edge << ", point " << i;
-            ASSERT_NEAR(places.inside[0][i], p.x() / cell - tile.x * edge - 0.5, 1e-5) << set;
-            ASSERT_NEAR(places.inside[2][i], p.z() / cell - tile.z * edge - 0.5, 1e-5) << set;
+            ASSERT_EQ(positions.cell[i], inside) << set << ", edge " << edge << ", point " << i;
+            ASSERT_NEAR(positions.inside[0][i], p.x() / cell - tile.x * edge - 0.5, 1e-5) << set;
+            ASSERT_NEAR(positions.inside[2][i], p.z() / cell - tile.z * edge - 0.5, 1e-5) << set;
           }
         }
       }
@@ -90,13 +90,14 @@ TEST(TileGrid, ClampsPointsTooFarAway) {
   for (const std::string& set : instructionSets()) {
     const PointKernels& kernels = pointKernelsFor(set);
     for (const int edge : {8, 24, 32}) {
-      for (const auto place : {kernels.place_points, kernels.place_cells}) {
-        TilePlaces places;
-        place(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(), points.x.size(), places);
+      for (const auto locate : {kernels.locate_points, kernels.locate_cells}) {
+        TilePositions positions;
+        locate(TileGrid(GridGeometry(0.1), {0, 0, 0}, edge), points.span(), points.x.size(), positions);
         for (std::size_t i = 0; i < points.x.size(); ++i) {
-          EXPECT_GE(places.cell[i], 0) << set << ", point " << i;
-          EXPECT_LT(places.cell[i], edge * edge * edge) << set << ", point " << i;
-          EXPECT_GT(std::abs(static_cast<double>(places.tile[0][i])) * edge, 9e8) << set << ", point " << i;
+          EXPECT_GE(positions.cell[i], 0) << set << ", point " << i;
+          EXPECT_LT(positions.cell[i], edge * edge * edge) << set << ", point " << i;
+          EXPECT_GT(std::abs(static_cast<double>(positions.tile[0][i])) * edge, 9e8)
+              << set << ", point " << i;
         }
       }
     }
@@ -119,18 +120,18 @@ TEST(TileGrid, FindsTheBlocksThatPointsReach) {
   std::uniform_real_distribution<float> in_block(-0.5f, 7.5f);
   for (const std::string& set : instructionSets()) {
     for (const float reach : {0.87f, 1.0f, 2.3f, 5.0f, 8.0f}) {
-      TilePlaces places;
+      TilePositions positions;
       constexpr std::size_t kCount = 37;
       for (std::size_t i = 0; i < kCount; ++i) {
-        for (auto& axis : places.inside) axis[i] = in_block(random);
+        for (auto& axis : positions.inside) axis[i] = in_block(random);
       }
-      pointKernelsFor(set).reach_blocks(kCount, reach, places);
+      pointKernelsFor(set).reach_blocks(kCount, reach, positions);
       for (std::size_t i = 0; i < kCount; ++i) {
-        const Eigen::Vector3d p(places.inside[0][i], places.inside[1][i], places.inside[2][i]);
+        const Eigen::Vector3d p(positions.inside[0][i], positions.inside[1][i], positions.inside[2][i]);
         for (int code = 0; code < 27; ++code) {
           const double distance = distanceTo(p, {code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1});
           if (std::abs(distance - static_cast<double>(reach)) < 1e-5) continue;  // rounding decides
-          EXPECT_EQ(places.reached[i] >> code & 1, distance < static_cast<double>(reach))
+          EXPECT_EQ(positions.reached[i] >> code & 1, distance < static_cast<double>(reach))
               << set << ", reach " << reach << ", block " << code;
         }
       }
