@@ -98,7 +98,7 @@ std::string nameOf(const std::string& file, const YAML::Node& node, const std::s
 
 /// @param number position of the class in the list, counted from 1.
 SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::size_t number) {
-  if (!node.IsMap()) fail(file, "class " + std::to_string(number) + " of the list is no map");
+  if (!node.IsMap()) fail(file, "class " + std::to_string(number) + " of the list is not a map");
   checkKeys(file, node, "a class", {"id", "name", "color", "raw", "flags", "free_gain"});
   for (const char* key : {"id", "name", "color"}) {
     if (!node[key]) fail(file, std::string("a class has no '") + key + "'");

@@ -37,7 +37,7 @@ std::vector<std::vector<double>> readNumberLines(const fs::path& path, const std
       numbers.push_back(std::strtod(word.c_str(), &end));
       if (*end != '\0' || !std::isfinite(numbers.back())) {
         fail(path.string() + " line " + std::to_string(lines.size() + 1) + ": '" + word +
-             "' is no finite number");
+             "' is not a finite number");
       }
     }
     lines.push_back(numbers);
@@ -53,7 +53,7 @@ Eigen::Isometry3d rigid(const std::vector<double>& numbers, const std::string& w
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
   if (!(std::abs(rotation.determinant() - 1.0) < 0.1)) {
-    fail(what + " is no rigid transform: its rotation has determinant " +
+    fail(what + " is not a rigid transform: its rotation has determinant " +
          std::to_string(rotation.determinant()) + " instead of 1");
   }
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -81,7 +81,7 @@ std::vector<T> readBinary(const fs::path& path, std::size_t record) {
   std::ifstream file = openFile(path, "check the sequence's folder");
   const auto bytes = static_cast<std::size_t>(fs::file_size(path));
   if (bytes % record != 0) {
-    fail(path.string() + " has " + std::to_string(bytes) + " bytes, no multiple of " +
+    fail(path.string() + " has " + std::to_string(bytes) + " bytes, which is not a multiple of " +
          std::to_string(record) + "; it is truncated or of another format");
   }
   std::vector<T> values(bytes / sizeof(T));
@@ -93,7 +93,7 @@ std::vector<T> readBinary(const fs::path& path, std::size_t record) {
 /// The file names of the scans, without their extension, by number.
 std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
-    fail(folder.string() + " is no folder; give the folder of a sequence, with velodyne/ inside");
+    fail(folder.string() + " is not a folder; give the folder of a sequence, with velodyne/ inside");
   }
   std::map<std::size_t, std::string> names;
   for (const auto& entry : fs::directory_iterator(folder)) {

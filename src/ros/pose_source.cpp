@@ -51,7 +51,7 @@ void PoseSource::add(const geometry_msgs::TransformStamped& transform, bool is_s
   if (const std::string fault = faultOf(transform.transform); !fault.empty()) {
     const std::string why = "the transform from '" + shortText(withoutSlash(transform.header.frame_id)) +
                             "' to '" + shortText(child) + "' of time " +
-                            numberText(transform.header.stamp.toSec()) + " is no pose: " + fault +
+                            numberText(transform.header.stamp.toSec()) + " is not a pose: " + fault +
                             "; correct its publisher";
     if (const auto before = findRefused(child); before != refused_.end()) refused_.erase(before);
     refused_.push_back({child, transform.header.stamp, why});

@@ -139,7 +139,7 @@ TEST(ClassTable, NamesEveryFault) {
                  "free_gain of class 'b' must be a number > 0");
   }
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], id: 3}\n"), "'id' is given twice");
-  EXPECT_NAMES(faultOf(head + "  - some text\n"), "class 2 of the list is no map");
+  EXPECT_NAMES(faultOf(head + "  - some text\n"), "class 2 of the list is not a map");
   EXPECT_NAMES(faultOf(head + "nmae: garden\n"), "'nmae' of the table is unknown; did you mean 'name'?");
   EXPECT_NAMES(faultOf("name: ''\n" + head), "the name of the table is empty");
   EXPECT_NAMES(faultOf("classs:\n  - {id: 1, name: a, color: [1, 2, 3]}\n"), "did you mean 'classes'?");

@@ -86,16 +86,16 @@ TEST_F(SequenceFolder, NamesMissingThings) {
   std::filesystem::remove(folder_ / "drive/calib.txt");
   expectFault("calib.txt cannot be read");
   std::filesystem::remove_all(folder_ / "drive/velodyne");
-  expectFault("velodyne is no folder");
+  expectFault("velodyne is not a folder");
 }
 
 TEST_F(SequenceFolder, NamesFaultsOfLabelsAndScans) {
   replace("labels/000001.label", "12345678ABCD");
   expectFault("has 3 labels, but");
   replace("labels/000001.label", "123");
-  expectFault("no multiple of 4");
+  expectFault("not a multiple of 4");
   replace("velodyne/000001.bin", "0123456789");
-  expectFault("no multiple of 16");
+  expectFault("not a multiple of 16");
 }
 
 TEST_F(SequenceFolder, NamesFaultsOfPoses) {
@@ -104,9 +104,9 @@ TEST_F(SequenceFolder, NamesFaultsOfPoses) {
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n");
   expectFault("has 11 numbers, but needs 12");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 nan 0 1 0 0 0 0 1 0\n");
-  expectFault("'nan' is no finite number");
+  expectFault("'nan' is not a finite number");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 0 0 0 0 0 0 0 0 0 0 0\n");
-  expectFault("no rigid transform");
+  expectFault("not a rigid transform");
 }
 
 TEST_F(SequenceFolder, NamesFaultsOfCalibrationAndTimes) {

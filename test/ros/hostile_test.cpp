@@ -481,9 +481,8 @@ std::vector<std::pair<std::string, std::string>> allRows() {
   for (const CloudKind& kind : cloudKinds()) add(kind.name, kind.sent, join(kind.answers));
   for (const TransformKind& kind : transformKinds()) add(kind.name, kind.sent, join(kind.answers));
   for (const PathKind& kind : pathKinds()) add(kind.name, kind.sent, kind.written ? "written" : "refused");
-  for (const SettingsKind& kind : settingsKinds())
-    add(kind.name, kind.sent, "taken over or refused as a whole");
-  for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud alone");
+  for (const SettingsKind& kind : settingsKinds()) add(kind.name, kind.sent, "applied or refused as a whole");
+  for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud by itself");
   return rows;
 }
 

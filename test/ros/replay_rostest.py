@@ -128,9 +128,9 @@ class Replay(unittest.TestCase):
             pass
         self.ends(f"bag '{self.path('empty.bag')}' has no clouds (sensor_msgs/PointCloud2); record some",
                   'replay.launch', 'bag:=empty.bag')
-        self.ends(f"{self.path('none/velodyne')} is no folder; give the folder of a sequence", 'semantic_kitti.launch',
+        self.ends(f"{self.path('none/velodyne')} is not a folder; give the folder of a sequence", 'semantic_kitti.launch',
                   'sequence:=none')
-        self.ends(f"{self.path('none/velodyne')} is no folder; give the folder of a sequence", 'demo.launch',
+        self.ends(f"{self.path('none/velodyne')} is not a folder; give the folder of a sequence", 'demo.launch',
                   'sequence:=none')
         self.ends(f"{self.path('drive/predictions/000000.label')} cannot be read; check", 'semantic_kitti.launch',
                   'sequence:=drive', 'labels:=predictions')

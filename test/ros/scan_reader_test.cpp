@@ -148,7 +148,7 @@ TEST_F(Reader, ATransformThatIsNoPoseIsNamed) {
            {INFINITY, 1.0, "its translation is not finite"}}) {
     poses_.add(transform("/map", "/sensor", 100.0, x, w));
     expectNamed(words);
-    expectNamed("the transform from 'map' to 'sensor' of time 100 is no pose");
+    expectNamed("the transform from 'map' to 'sensor' of time 100 is not a pose");
   }
   pose("sensor", 100.0, {1, 2, 3});  // finally a valid one
   EXPECT_TRUE(ready(scan));

@@ -119,18 +119,18 @@ const std::vector<PathKind>& pathKinds() {
   static const std::vector<PathKind> kinds = {
       {"path/ply", "a file", true, [](Text folder) { return folder + "/map.ply"; }},
       {"path/pcd", "a file", true, [](Text folder) { return folder + "/map.pcd"; }},
-      {"path/not_utf8", "a file's name that is no UTF-8", true,
+      {"path/not_utf8", "a file's name that is not UTF-8", true,
        [](Text folder) { return folder + "/\xff\n%s.ply"; }},
       {"path/empty", "no path", false, [](Text) { return std::string(); }},
       {"path/relative", "a relative path", false, [](Text) { return std::string("map.ply"); }},
       {"path/ending", "an unknown ending", false, [](Text folder) { return folder + "/map.txt"; }},
       {"path/folder", "a folder", false, folderIn},
-      {"path/no_folder", "a folder that is not there", false,
+      {"path/no_folder", "a folder that does not exist", false,
        [](Text folder) { return folder + "/none/map.ply"; }},
       {"path/in_a_file", "a file as folder", false, [](Text folder) { return folder + "/map.ply/map.ply"; }},
       {"path/long", "a name of 5000 letters", false,
        [](Text folder) { return folder + "/" + std::string(5000, 'm') + ".ply"; }},
-      {"path/zero", "a path with a zero in it", false,
+      {"path/zero", "a path with a zero byte", false,
        [](Text folder) { return folder + std::string("/map\0.ply", 9); }},
       {"path/device", "a device, or a pipe", false, nodeIn},
   };
@@ -154,12 +154,12 @@ const std::vector<SettingsKind>& settingsKinds() {
            set(config, dice.oneOf(kNumbers), dice.oneOf<double>({1e300, -1e300, 0.0, -0.0}));
          set(config, "queue_size", dice.oneOf<int>({0, -1, 2147483647, -2147483647 - 1}));
        }},
-      {"settings/word", "words that are no choice",
+      {"settings/word", "words that are not among the choices",
        [](Config& config, Dice& dice) {
          set(config, dice.oneOf(kWords),
              dice.oneOf<std::string>({"", "liner", std::string(100000, 'w'), std::string("\xff\0%s", 4)}));
        }},
-      {"settings/unknown", "names of no setting",
+      {"settings/unknown", "names of unknown settings",
        [](Config& config, Dice&) {
          set(config, "resolutoin", 0.1);
          set(config, std::string(10000, 'n'), true);

@@ -193,7 +193,7 @@ std::vector<CloudKind> sizeKinds() {
          c.point_step += 1 + static_cast<std::uint32_t>(dice.below(kMax - 500));
        }},
       {"size/row_step",
-       "a row_step of 0, or at random",
+       "a row_step of 0, or a random one",
        {"mapped", "bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          c.row_step = dice.oneIn(2) ? 0 : static_cast<std::uint32_t>(dice.bits());
@@ -203,11 +203,11 @@ std::vector<CloudKind> sizeKinds() {
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) { c.data.resize(dice.below(c.data.size())); }},
       {"size/data_long",
-       "data longer than said",
+       "more data than the sizes say",
        {"mapped"},
        [](PointCloud2& c, Dice& dice) { c.data.resize(c.data.size() + dice.below(100000), 0xff); }},
       {"size/random",
-       "all sizes at random",
+       "random sizes",
        {"mapped", "bad cloud", "empty"},
        [](PointCloud2& c, Dice& dice) {
          const auto small = [&] {
@@ -280,7 +280,7 @@ std::vector<CloudKind> fieldKinds() {
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) { c.fields[dice.below(3)].name.assign(1000000, 'x'); }},
       {"field/name_not_utf8",
-       "names that are no UTF-8, with zeros, line ends and codes of terminals",
+       "names that are not UTF-8, with zeros, line ends and codes of terminals",
        {"bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          c.fields[dice.below(3)].name = std::string("x\0\xff\xfe\xc0\x80\n\033[2J%s%n", 16);
@@ -414,7 +414,7 @@ std::vector<CloudKind> labelKinds() {
        {"mapped"},
        labelled(PointField::UINT32, {7777.0, 4.0, 255.0, 256.0, 65535.0})},
       {"label/many",
-       "a number of its own for each point",
+       "a different number for each point",
        {"mapped"},
        [](PointCloud2& c, Dice& dice) {
          replaceField(c, "label", PointField::UINT32, [&] { return static_cast<double>(dice.below(kMax)); });
@@ -497,7 +497,7 @@ std::vector<CloudKind> timeKinds() {
        {"mapped", "bad cloud"},
        [](PointCloud2& c, Dice& dice) { setAll(c, "seconds", 1, [&] { return dice.oneOf(kOddTimes); }); }},
       {"time/odd_last",
-       "such a time of the last point alone",
+       "such a time, of the last point only",
        {"mapped", "bad cloud", "transform late", "too old"},
        [](PointCloud2& c, Dice& dice) {
          put(c, "seconds", std::max<std::size_t>(pointsOf(c), 1) - 1, 0, dice.oneOf(kOddTimes));
@@ -553,7 +553,7 @@ std::vector<CloudKind> headerKinds() {
       {"header/frame_slash", "a frame that begins with a slash", {"unknown frame"}, framed("/honest_sensor")},
       {"header/frame_long", "a frame's name of 1 MB", {"unknown frame"}, framed(std::string(1000000, 'f'))},
       {"header/frame_not_utf8",
-       "a frame's name with zeros, line ends and no UTF-8",
+       "a frame's name that is not UTF-8, with zeros and line ends",
        {"unknown frame"},
        framed(std::string("f\0\xff\xc0\n\033[2J%s", 10))},
       {"header/frame_map", "the map frame", {"mapped"}, framed("map")},

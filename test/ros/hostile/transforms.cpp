@@ -141,7 +141,7 @@ std::vector<TransformKind> treeKinds() {
          return Messages{{false, {honestTransform(std::string(100000, 'p'), frame, stamp)}}};
        }},
       {"tf/name_not_utf8",
-       "a parent's name that is no UTF-8",
+       "a parent's name that is not UTF-8",
        {"no transform"},
        [](const std::string& frame, const ros::Time& stamp, Dice&) {
          return Messages{{false, {honestTransform(std::string("\xff\0\n%s\033[2J", 9), frame, stamp)}}};
