@@ -7,7 +7,8 @@
 namespace bki_mapping {
 namespace {
 
-/// Adds the weights of beams to the voxels that they cross, some at a time.
+/// Adds the weights of beams to the voxels that they cross. Collects some projections first, so that the
+/// vector loop computes their weights: the only definition of the weights is raster/beam_weight_inl.h.
 class CrossingSums {
  public:
   CrossingSums(BeamWeight weight, const LineKernels& kernels, float* sums)
