@@ -114,7 +114,7 @@ PointCounts& PointCounts::operator+=(const PointCounts& other) {
   return *this;
 }
 
-void ScanPreprocessor::sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first,
+void ScanPreprocessor::sortPoints(const ScanView& scan, const ClassTable& classes, std::size_t first,
                                   std::size_t last, const Sorted& into) const {
   const float safe_range = cells_.safeRange(scan.origin);
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
@@ -132,12 +132,12 @@ void ScanPreprocessor::sortPoints(const Scan& scan, const ClassTable& classes, s
       }
     } else if (!(range < safe_range) && !cells_.contains(scan.origin + point.cast<double>())) {
       ++counts.outside_map;
-    } else if (!scan.soft.empty() && !areShares(scan.soft.begin(i), scan.soft.end(i))) {
+    } else if (scan.soft && !areShares(scan.soft->begin(i), scan.soft->end(i))) {
       ++counts.not_finite;
     } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
       ++counts.used;
       into.hits.add(point, *id);
-      if (!scan.soft.empty()) into.used.push_back({static_cast<std::uint32_t>(i), *id});
+      if (scan.soft) into.used.push_back({static_cast<std::uint32_t>(i), *id});
     }
   }
   into.counts = counts;
@@ -148,7 +148,7 @@ void ScanPreprocessor::addCut(const Eigen::Vector3d& origin, const Eigen::Vector
   if (cells_.contains(origin + end.cast<double>())) cut.add(end, kFreeClass);
 }
 
-void ScanPreprocessor::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
+void ScanPreprocessor::addNoReturns(const ScanView& scan, Downsampler::Input& cut) {
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     const float length = direction.norm();
@@ -162,21 +162,21 @@ void ScanPreprocessor::addNoReturns(const Scan& scan, Downsampler::Input& cut) {
   }
 }
 
-const PreprocessedScan& ScanPreprocessor::process(const Scan& scan, const ClassTable& classes,
+const PreprocessedScan& ScanPreprocessor::process(const ScanView& scan, const ClassTable& classes,
                                                   ThreadPool& pool, bool beams) {
   if (scan.labels.size() != scan.points.size()) {
     throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) + " points but " +
                                 std::to_string(scan.labels.size()) + " labels; give each point one label");
   }
-  if (!scan.soft.empty() && scan.soft.size() != scan.points.size()) {
+  if (scan.soft && scan.soft->size() != scan.points.size()) {
     throw std::invalid_argument("the scan has " + std::to_string(scan.points.size()) +
-                                " points but soft labels for " + std::to_string(scan.soft.size()) +
+                                " points but soft labels for " + std::to_string(scan.soft->size()) +
                                 "; give each point its soft labels");
   }
   const Chunks chunks(scan.points.size());
   if (used_.size() < chunks.count()) used_.resize(chunks.count());
   for (auto& used : used_) used.clear();
-  const bool ordered = beams || !scan.soft.empty();
+  const bool ordered = beams || scan.soft;
   const std::size_t no_returns = chunks.count();  // position of their own chunk, after those of the points
   hits_.start(scan.origin, chunks.count(), pool, ordered);
   cut_.start(scan.origin, chunks.count() + 1, pool, true);
@@ -198,8 +198,7 @@ const PreprocessedScan& ScanPreprocessor::process(const Scan& scan, const ClassT
   hit_groups_ = hits_.merged();
   processed_.hit_count = sizeOf(hits_.merged());
   soft_.clear();
-  if (!scan.soft.empty())
-    soft_ = mergeSoftLabels(scan, used_, config_.downsample_resolution, processed_.hits);
+  if (scan.soft) soft_ = mergeSoftLabels(scan, used_, config_.downsample_resolution, processed_.hits);
   if (!soft_.empty()) hit_groups_.clear();
   for (const MergedPoints& group : soft_) hit_groups_.push_back(&group);
   processed_.beams.origin = scan.origin;

@@ -34,7 +34,7 @@ class ScanPreprocessor {
   /// Filters and down-samples a scan. @param beams whether to make beams, too. @return the result, valid
   /// until the next call.
   /// @throws std::invalid_argument if the scan has not one label for each point.
-  const PreprocessedScan& process(const Scan& scan, const ClassTable& classes, ThreadPool& pool,
+  const PreprocessedScan& process(const ScanView& scan, const ClassTable& classes, ThreadPool& pool,
                                   bool beams = true);
 
   /// The hits of the last scan; where some have several classes, each once for each of them.
@@ -49,14 +49,14 @@ class ScanPreprocessor {
     PointCounts& counts;
   };
   /// Sorts the points `first` to `last` - 1 into hits, cut beams and counts.
-  void sortPoints(const Scan& scan, const ClassTable& classes, std::size_t first, std::size_t last,
+  void sortPoints(const ScanView& scan, const ClassTable& classes, std::size_t first, std::size_t last,
                   const Sorted& into) const;
 
   /// Adds a beam that is cut at the sensor's range, unless its end has no valid index.
   void addCut(const Eigen::Vector3d& origin, const Eigen::Vector3f& end, Downsampler::Input& cut) const;
 
   /// Adds the scan's beams without a return to the cut beams.
-  void addNoReturns(const Scan& scan, Downsampler::Input& cut);
+  void addNoReturns(const ScanView& scan, Downsampler::Input& cut);
   /// Appends one beam for each end that is not at the sensor.
   void appendBeams(const std::vector<Eigen::Vector3f>& ends, ThreadPool& pool);
 

@@ -62,7 +62,7 @@ UpdateRules rulesOf(const MapperConfig& config) {
 }
 
 /// The limits of the update of a scan. @param map_bytes present memory of the map.
-UpdateLimits limitsFor(const Scan& scan, const MapperConfig& config, const GridGeometry& geometry,
+UpdateLimits limitsFor(const ScanView& scan, const MapperConfig& config, const GridGeometry& geometry,
                        std::size_t map_bytes) {
   UpdateLimits limits;
   if (config.scan_limit.blocks > 0) {
@@ -215,11 +215,11 @@ const std::vector<GridIndex>& SemanticMapper::touchedBlocks() const {
   return pipeline_ ? pipeline_->updater.touched() : no_blocks_;
 }
 
-ScanStats SemanticMapper::integrate(const Scan& scan) {
+ScanStats SemanticMapper::integrate(const ScanView& scan) {
   return addOrWithdraw(scan, false);
 }
 
-ScanStats SemanticMapper::withdraw(const Scan& scan) {
+ScanStats SemanticMapper::withdraw(const ScanView& scan) {
   const bool mapped = pipeline().free_space->dependsOnMap();
   if (mapped || config_.occlusion != OcclusionExtent::kNone) {
     throw std::logic_error(std::string("scans cannot be withdrawn with ") +
@@ -230,7 +230,7 @@ ScanStats SemanticMapper::withdraw(const Scan& scan) {
   return addOrWithdraw(scan, true);
 }
 
-ScanStats SemanticMapper::addOrWithdraw(const Scan& scan, bool withdraws) {
+ScanStats SemanticMapper::addOrWithdraw(const ScanView& scan, bool withdraws) {
   if (!map_.geometry().contains(scan.origin)) {
     throw std::invalid_argument(
         "the sensor's origin is not finite or too far from the map's origin; check the sensor's pose");
@@ -257,7 +257,7 @@ ScanStats SemanticMapper::addOrWithdraw(const Scan& scan, bool withdraws) {
 
 /// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or subtracts
 /// it.
-ScanStats SemanticMapper::add(const Scan& scan, bool withdraws) {
+ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
   Pipeline& p = pipeline();
   ScanStats stats;
   Stopwatch watch;

@@ -43,8 +43,9 @@ void addPoint(const SoftLabels& soft, const UsedPoint& used, CellShares& cell) {
 
 }  // namespace
 
-std::vector<MergedPoints> mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used,
-                                          double cell, const LabelledPoints& hits) {
+std::vector<MergedPoints> mergeSoftLabels(const ScanView& scan,
+                                          const std::vector<std::vector<UsedPoint>>& used, double cell,
+                                          const LabelledPoints& hits) {
   const GridGeometry grid(cell > 0.0 ? cell : 1.0);
   IndexNumbering cells;  // numbered in the same order as the down-sampler's
   std::vector<CellShares> shares(hits.points.size());
@@ -53,7 +54,7 @@ std::vector<MergedPoints> mergeSoftLabels(const Scan& scan, const std::vector<st
     for (const UsedPoint& point : chunk) {
       const VoxelIndex index = grid.voxelAt(scan.origin + scan.points[point.offset].cast<double>());
       const std::size_t hit = cell > 0.0 ? cells.insert(index) : next++;
-      if (hits.labels[hit] == point.id) addPoint(scan.soft, point, shares[hit]);
+      if (hits.labels[hit] == point.id) addPoint(*scan.soft, point, shares[hit]);
     }
   }
   std::vector<MergedPoints> groups;

@@ -21,7 +21,8 @@ struct UsedPoint {
 /// @param cell edge of the down-sampling cells [m]; 0: off. @param hits after down-sampling.
 /// @return each hit once for each of its classes, weighted by the share; empty if each hit has a single
 /// class.
-std::vector<MergedPoints> mergeSoftLabels(const Scan& scan, const std::vector<std::vector<UsedPoint>>& used,
-                                          double cell, const LabelledPoints& hits);
+std::vector<MergedPoints> mergeSoftLabels(const ScanView& scan,
+                                          const std::vector<std::vector<UsedPoint>>& used, double cell,
+                                          const LabelledPoints& hits);
 
 }  // namespace bki_mapping

@@ -42,13 +42,63 @@ struct Scan {
   std::uint64_t stamp = 0;
 };
 
+/// Values in a row that belong to somebody else, as std::span of C++20.
+template <typename T>
+class Span {
+ public:
+  Span() = default;
+  Span(const T* data, std::size_t size) : data_(data), size_(size) {}
+  Span(const std::vector<T>& values) : Span(values.data(), values.size()) {}
+
+  std::size_t size() const { return size_; }
+  const T& operator[](std::size_t i) const { return data_[i]; }
+  const T* begin() const { return data_; }
+  const T* end() const { return data_ + size_; }
+
+ private:
+  const T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// A scan whose points and labels belong to somebody else, as to a message or to a NumPy array. The members
+/// mean what those of Scan mean. Valid as long as what it was made of.
+struct ScanView {
+  ScanView() = default;
+  ScanView(const Scan& scan)
+      : origin(scan.origin),
+        points(scan.points),
+        labels(scan.labels),
+        labels_are_ids(scan.labels_are_ids),
+        soft(scan.soft.empty() ? nullptr : &scan.soft),
+        no_returns(scan.no_returns),
+        no_returns_at_max_range(scan.no_returns_at_max_range),
+        sensor_model(scan.sensor_model),
+        stamp(scan.stamp) {}
+
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Span<Eigen::Vector3f> points;
+  Span<std::uint32_t> labels;
+  bool labels_are_ids = false;
+  const SoftLabels* soft = nullptr;  ///< nullptr if there are only hard labels
+  Span<Eigen::Vector3f> no_returns;
+  bool no_returns_at_max_range = false;
+  std::optional<SensorModelConfig> sensor_model;
+  std::uint64_t stamp = 0;
+};
+
 /// How the labels of a scan are encoded where no mapper's settings apply.
 inline LabelValues labelValues(const Scan& scan) {
   return scan.labels_are_ids ? LabelValues::kId : LabelValues::kRaw;
 }
 
-/// Makes a scan from points in the sensor frame. The rotation is rounded to 2^-30 (0.1 um at 100 m), so that
-/// a pose gives the same map to the bit whether it comes from a file or, interpolated, from tf.
+/// The rotation of a pose, rounded to 2^-30 (0.1 um at 100 m), so that a pose gives the same map to the bit
+/// whether it comes from a file or, interpolated, from tf.
+inline Eigen::Matrix3f roundedRotation(const Eigen::Isometry3d& T_map_sensor) {
+  constexpr double kStep = 0x1.0p-30;
+  return ((T_map_sensor.linear() / kStep).array().round() * kStep).matrix().cast<float>();
+}
+
+/// Makes a scan from points in the sensor frame.
 /// @param T_map_sensor pose of the sensor in the map frame. @param points in the sensor frame [m].
 inline Scan scanFromSensorFrame(const Eigen::Isometry3d& T_map_sensor,
                                 const std::vector<Eigen::Vector3f>& points, std::vector<std::uint32_t> labels,
@@ -57,9 +107,7 @@ inline Scan scanFromSensorFrame(const Eigen::Isometry3d& T_map_sensor,
   scan.origin = T_map_sensor.translation();
   scan.labels = std::move(labels);
   scan.stamp = stamp;
-  constexpr double kStep = 0x1.0p-30;
-  const Eigen::Matrix3f rotation =
-      ((T_map_sensor.linear() / kStep).array().round() * kStep).matrix().cast<float>();
+  const Eigen::Matrix3f rotation = roundedRotation(T_map_sensor);
   scan.points.reserve(points.size());
   for (const Eigen::Vector3f& point : points) scan.points.push_back(rotation * point);
   return scan;

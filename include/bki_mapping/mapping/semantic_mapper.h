@@ -27,14 +27,14 @@ class SemanticMapper {
   /// Adds one scan to the map, either all of it or nothing. Bad points are skipped and counted.
   /// @throws std::invalid_argument if the numbers of labels and points differ, or the origin has no valid
   /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
-  ScanStats integrate(const Scan& scan);
+  ScanStats integrate(const ScanView& scan);
 
   /// Withdraws a scan that was integrated with the current settings. The map is then the same, to the bit, as
   /// if the scan had never been integrated, regardless of later scans; voxels whose evidence had saturated
   /// are an exception (ScanStats::saturated). Withdrawing a scan that is not in the map leaves negative
   /// evidence, which counts as 0 (ScanStats::negative). @throws as integrate(), and std::logic_error with
   /// free_space/extent `mapped` or occlusion marks, which depend on the order of scans.
-  ScanStats withdraw(const Scan& scan);
+  ScanStats withdraw(const ScanView& scan);
 
   /// Adds another map, for example from a file. The map is then the same, to the bit, as if the scans of both
   /// had been integrated here.
@@ -88,8 +88,8 @@ class SemanticMapper {
   struct Pipeline;
   Pipeline& pipeline();
 
-  ScanStats addOrWithdraw(const Scan& scan, bool withdraws);
-  ScanStats add(const Scan& scan, bool withdraws);
+  ScanStats addOrWithdraw(const ScanView& scan, bool withdraws);
+  ScanStats add(const ScanView& scan, bool withdraws);
   /// Cleans up after a failure: recounts the map's bytes, and frees the working memory, which may be large.
   void recover() noexcept;
   void countBlockBytes() noexcept;
