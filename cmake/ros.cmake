@@ -27,7 +27,7 @@ bki_mapping_room(ros SOURCES
     scan_reader.cpp
     score_reader.cpp
     server_config.cpp
-  LINK bki_mapping_io ${catkin_LIBRARIES})
+  LINK bki_mapping_io pcl_common ${catkin_LIBRARIES})
 bki_mapping_precompile(bki_mapping_ros
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)

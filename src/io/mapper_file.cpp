@@ -48,4 +48,11 @@ SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info) {
   }
 }
 
+StoredMap loadMapWithGains(const std::string& path) {
+  MapFile file(path, MapFile::Access::kRead);
+  StoredMap stored{file.info(), file.drives(), emptyMapWithGains(path, file.info())};
+  for (const TileEntry& tile : file.tiles()) file.addTileTo(stored.map, {tile.index});
+  return stored;
+}
+
 }  // namespace bki_mapping

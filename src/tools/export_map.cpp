@@ -1,13 +1,10 @@
 // Exports a map file for other programs.
-#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "core/atomic_file.h"
-#include "io/grid_export.h"
-#include "io/octomap_export.h"
+#include "io/export_file.h"
 #include "tools/options.h"
 
 namespace {
@@ -39,39 +36,20 @@ ColumnRules columnRules(const po::variables_map& given) {
   rules.min_z = given["min-z"].as<double>();
   rules.max_z = given["max-z"].as<double>();
   if (!(rules.min_z <= rules.max_z)) throw std::invalid_argument("--min-z must not be above --max-z");
-  const std::string reference = given["height"].as<std::string>();
-  if (reference != "map" && reference != "ground") {
-    throw std::invalid_argument("--height is '" + reference + "', but must be map or ground");
-  }
-  rules.reference = reference == "map" ? HeightReference::kMap : HeightReference::kGround;
+  rules.reference = parseHeightReference(given["height"].as<std::string>());
   return rules;
 }
 
-int exportFile(const po::variables_map& given) {
+int exportMapFile(const po::variables_map& given) {
   const std::string path = tools::onlyMapFile(given);
   if (!given.count("output")) throw std::invalid_argument("--output FILE is missing (see --help)");
   const std::string output = given["output"].as<std::string>();
-  const std::string ending = std::filesystem::path(output).extension().string();
-  if (ending != ".ply" && ending != ".pcd" && ending != ".ot" && ending != ".bt" && ending != ".yaml") {
-    throw std::invalid_argument("--output " + output + " must end in .ply, .pcd, .ot, .bt or .yaml");
-  }
-  const VoxelStates states = parseStates(given["include"].as<std::string>());
-  const ColumnRules rules = columnRules(given);
-  checkWritable(output);
-  if (ending == ".yaml") checkWritable(gridImagePath(output));
+  const ExportOptions options{parseStates(given["include"].as<std::string>()), columnRules(given)};
+  checkExport(output);
 
-  MapFile file(path, MapFile::Access::kRead);
-  const ClassTable& classes = *file.info().classes;
-  SemanticMap map = emptyMapWithGains(path, file.info());
-  for (const TileEntry& tile : file.tiles()) file.addTileTo(map, {tile.index});
-  if (ending == ".yaml") {
-    exportGrid(output, map, classes, rules);
-  } else if (ending == ".ot" || ending == ".bt") {
-    exportOctoMap(output, map, classes);
-  } else {
-    exportMap(output, map, classes, states);
-  }
-  std::cout << output << ": written, in frame " << file.info().frame << "\n";
+  const StoredMap stored = loadMapWithGains(path);
+  exportFile(output, stored.map, *stored.info.classes, options);
+  std::cout << output << ": written, in frame " << stored.info.frame << "\n";
   return 0;
 }
 
@@ -83,6 +61,6 @@ int main(int argc, char** argv) {
                                     "export_map FILE.bkm --output FILE\n"
                                     "Converts a map for other programs.",
                                     options(), "files");
-    return given ? exportFile(*given) : 0;
+    return given ? exportMapFile(*given) : 0;
   });
 }

@@ -25,4 +25,7 @@ StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, cons
 /// @param path of the file, for errors. @throws MapFileError if the parameters are not YAML.
 SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
 
+/// Reads a whole map as loadMap, into the map that emptyMapWithGains gives, to be asked. @throws as these.
+StoredMap loadMapWithGains(const std::string& path);
+
 }  // namespace bki_mapping

@@ -1,0 +1,56 @@
+#include "io/export_file.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "bki_mapping/io/map_export.h"
+#include "core/atomic_file.h"
+#include "io/grid_export.h"
+#include "io/octomap_export.h"
+
+namespace bki_mapping {
+namespace {
+
+using Export = void (*)(const std::string&, const SemanticMap&, const ClassTable&, const ExportOptions&);
+
+void exportPoints(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+                  const ExportOptions& options) {
+  exportMap(path, map, classes, options.states);
+}
+void exportTree(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+                const ExportOptions&) {
+  exportOctoMap(path, map, classes);
+}
+void exportColumns(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+                   const ExportOptions& options) {
+  exportGrid(path, map, classes, options.columns);
+}
+
+Export exportOf(const std::string& path) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  if (ending == ".ply" || ending == ".pcd") return exportPoints;
+  if (ending == ".ot" || ending == ".bt") return exportTree;
+  if (ending == ".yaml") return exportColumns;
+  throw std::invalid_argument("the exported file, " + path + ", must end in .ply, .pcd, .ot, .bt or .yaml");
+}
+
+}  // namespace
+
+void checkExport(const std::string& path) {
+  const Export chosen = exportOf(path);
+  checkWritable(path);
+  if (chosen == exportColumns) checkWritable(gridImagePath(path));
+}
+
+void exportFile(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+                const ExportOptions& options) {
+  exportOf(path)(path, map, classes, options);
+}
+
+HeightReference parseHeightReference(const std::string& word) {
+  if (word == "map") return HeightReference::kMap;
+  if (word == "ground") return HeightReference::kGround;
+  throw std::invalid_argument("the zero of heights is '" + word + "', but must be map or ground");
+}
+
+}  // namespace bki_mapping
