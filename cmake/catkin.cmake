@@ -17,4 +17,5 @@ catkin_package(
   CATKIN_DEPENDS diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_runtime nav_msgs nodelet roscpp
     rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros topic_tools visualization_msgs
   DEPENDS EIGEN3
+  CFG_EXTRAS bki_mapping-extras.cmake
 )

@@ -8,6 +8,7 @@ function(bki_mapping_room room)
   list(TRANSFORM arg_SOURCES PREPEND "src/${room}/")
   set(target bki_mapping_${room})
   add_library(${target} SHARED ${arg_SOURCES})
+  target_compile_features(${target} PUBLIC cxx_std_17)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
   target_link_libraries(${target} PUBLIC ${arg_LINK})

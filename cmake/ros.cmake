@@ -51,19 +51,13 @@ bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
 bki_mapping_tool(benchmark_publishing bki_mapping_ros)
 
-get_property(bki_mapping_rooms GLOBAL PROPERTY BKI_MAPPING_ROOMS)
-install(TARGETS ${bki_mapping_rooms} bki_mapping_nodelets
+install(TARGETS bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS benchmark_publishing benchmark_sequence benchmark_store clear_map evaluate_map export_map inspect_map map_sequence
-  mapping_node merge_maps migrate_map play_sequence print_parameters sequence_to_bag simulate_drive
+install(TARGETS benchmark_publishing mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-if(TARGET benchmark_parts)
-  install(TARGETS benchmark_parts RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-endif()
-install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
-install(DIRECTORY config launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
 catkin_install_python(PROGRAMS scripts/body_box.py scripts/class_table_path.py scripts/mapping_summary.py scripts/play_bag.py
