@@ -142,6 +142,13 @@ bki_mapping_script_test(simd nehalem_test)
 set_tests_properties(nehalem_test PROPERTIES SKIP_RETURN_CODE 77)
 bki_mapping_script_test(store read_map_test)
 bki_mapping_script_test(tools tools_test)
+if(TARGET bki_mapping_python)
+  get_filename_component(python_path ${BKI_MAPPING_PYTHON_BUILD} DIRECTORY)
+  foreach(name examples_test module_test stubs_test)
+    bki_mapping_script_test(python ${name})
+    set_property(TEST ${name} APPEND PROPERTY ENVIRONMENT "PYTHONPATH=${python_path}")
+  endforeach()
+endif()
 add_test(NAME vector_symbols_test
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
     $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>

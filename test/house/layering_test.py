@@ -5,7 +5,7 @@ import re
 import unittest
 
 ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
-CMAKE = ('core.cmake', 'io.cmake', 'ros.cmake')
+CMAKE = ('core.cmake', 'io.cmake', 'ros.cmake', 'python_module.cmake')
 
 
 def links():
@@ -19,6 +19,9 @@ def links():
         direct[room] = set(re.findall(r'bki_mapping_(\w+)', arguments.partition('LINK')[2]))
     # The programs of tools that speak ROS link its room, too.
     direct['tools'].add('ros')
+    # Nothing links the Python module, which is no room of the library.
+    bound = re.search(r'target_link_libraries\(bki_mapping_python PRIVATE ([^)]*)\)', text)[1]
+    direct['python'] = set(re.findall(r'bki_mapping_(\w+)', bound))
 
     def reach(room):
         return direct[room].union(*(reach(each) for each in direct[room]))
@@ -33,6 +36,7 @@ LIBRARIES = {
     'store': ('sqlite3.h', 'zlib.h'),
     'io': ('octomap/', 'pcl/', 'png.h', 'yaml-cpp/'),
     'evaluation': ('nlohmann/',),
+    'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
     'tools': ('boost/program_options', 'nlohmann/', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
@@ -47,6 +51,9 @@ def sources():
             for name in files:
                 path = os.path.join(folder, name)
                 yield os.path.relpath(path, os.path.join(ROOT, top)), path
+    for name in os.listdir(os.path.join(ROOT, 'python')):
+        if name.endswith(('.h', '.cpp')):
+            yield os.path.join('python', name), os.path.join(ROOT, 'python', name)
 
 
 class Layering(unittest.TestCase):

@@ -40,6 +40,11 @@ LEFT_OUT = {
     'scripts/fuzz --target tile_codec --seconds 14400': 'the same',
     'roslaunch bki_mapping mapping.launch body_box:="-0.6 -0.4 -0.5 0.6 0.4 0.3" body_frame:=base_link':
         'needs the frames of a robot, which body_box_rostest has',
+    **dict.fromkeys(('cmake -S . -B build-install -DCMAKE_BUILD_TYPE=Release -DBKI_MAPPING_ROS=OFF -DBUILD_TESTING=OFF '
+                     '-DCMAKE_INSTALL_PREFIX=$HOME/bki', 'cmake --build build-install -j2 --target install',
+                     'cmake -S examples -B build-examples -DCMAKE_PREFIX_PATH=$HOME/bki', 'cmake --build build-examples -j2',
+                     'build-examples/map_drive street.bkm', 'build-examples/ask_map street.bkm 4 6.1 2', 'build-examples/change_map'),
+                    'builds for minutes; scripts/test builds the examples against an installation'),
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.

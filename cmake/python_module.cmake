@@ -1,0 +1,46 @@
+# The Python package bki_mapping: python/bki_mapping and, with pybind11, the module _core beside it. With catkin the package
+# also holds the generated messages.
+find_package(Python3 QUIET COMPONENTS Interpreter Development)
+if(BKI_MAPPING_ROS)
+  set(BKI_MAPPING_PYTHON_DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
+  set(BKI_MAPPING_PYTHON_BUILD ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
+else()
+  # Where Debian's Python looks for modules in /usr; in /usr/local, it looks in a folder of its version.
+  set(packages lib/python3/dist-packages)
+  if(CMAKE_INSTALL_PREFIX STREQUAL "/usr/local" AND Python3_FOUND)
+    set(packages lib/python${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}/dist-packages)
+  endif()
+  set(BKI_MAPPING_PYTHON_PACKAGES ${packages} CACHE STRING "Where Python packages go, below the prefix")
+  set(BKI_MAPPING_PYTHON_DESTINATION ${BKI_MAPPING_PYTHON_PACKAGES}/${PROJECT_NAME})
+  set(BKI_MAPPING_PYTHON_BUILD ${CMAKE_BINARY_DIR}/python/${PROJECT_NAME})
+endif()
+
+set(files python/${PROJECT_NAME}/__init__.py python/${PROJECT_NAME}/__init__.pyi python/${PROJECT_NAME}/py.typed)
+foreach(file ${files})
+  get_filename_component(name ${file} NAME)
+  configure_file(${file} ${BKI_MAPPING_PYTHON_BUILD}/${name} COPYONLY)
+endforeach()
+install(FILES ${files} DESTINATION ${BKI_MAPPING_PYTHON_DESTINATION})
+
+if(CMAKE_CROSSCOMPILING)
+  message(STATUS "The Python module is left out of builds for another processor")
+  return()
+endif()
+find_package(pybind11 2.4 QUIET)
+if(NOT pybind11_FOUND OR NOT Python3_FOUND)
+  message(STATUS "The Python module is left out; install pybind11-dev and python3-dev for it")
+  return()
+endif()
+pybind11_add_module(bki_mapping_python MODULE NO_EXTRAS
+  python/arrays.cpp python/map_bindings.cpp python/mapper_bindings.cpp python/module.cpp)
+#catkin_lint: ignore_once undefined_target
+target_link_libraries(bki_mapping_python PRIVATE bki_mapping_io)
+target_compile_options(bki_mapping_python PRIVATE -O1)  # the work is done in the libraries
+bki_mapping_warnings(bki_mapping_python)
+bki_mapping_precompile(bki_mapping_python
+  <Eigen/Geometry> <map> <memory> <pybind11/numpy.h> <pybind11/pybind11.h> <pybind11/stl.h> <string> <vector>)
+file(RELATIVE_PATH to_libraries /prefix/${BKI_MAPPING_PYTHON_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})
+set_target_properties(bki_mapping_python PROPERTIES OUTPUT_NAME _core CXX_VISIBILITY_PRESET hidden
+  LIBRARY_OUTPUT_DIRECTORY ${BKI_MAPPING_PYTHON_BUILD} INSTALL_RPATH "$ORIGIN/${to_libraries}")
+#catkin_lint: ignore_once undefined_target
+install(TARGETS bki_mapping_python LIBRARY DESTINATION ${BKI_MAPPING_PYTHON_DESTINATION})

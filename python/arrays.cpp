@@ -1,0 +1,197 @@
+#include "arrays.h"
+
+#include <limits>
+#include <stdexcept>
+
+namespace bki_mapping::python {
+namespace {
+
+std::string typeName(py::handle object) {
+  return py::str(py::handle(reinterpret_cast<PyObject*>(Py_TYPE(object.ptr()))).attr("__name__"));
+}
+
+/// The object as an array, of whatever numbers it holds.
+py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted) {
+  py::array array = py::array::ensure(object);
+  if (array) return array;
+  PyErr_Clear();
+  throw py::type_error(name + " must be " + wanted + ", not " + typeName(object));
+}
+
+std::string shapeText(const py::array& array) {
+  return py::str(array.attr("shape"));
+}
+
+std::string dtypeText(const py::array& array) {
+  return py::str(array.dtype());
+}
+
+template <typename T>
+constexpr int kAligned = py::array::c_style | py::array::forcecast | py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+
+/// A contiguous, aligned array of T in the processor's byte order; the same array if it is one.
+template <typename T>
+py::array_t<T, kAligned<T>> contiguous(const py::array& array) {
+  return py::array_t<T, kAligned<T>>(array);
+}
+
+bool isNumber(char kind) {
+  return kind == 'f' || kind == 'i' || kind == 'u';
+}
+
+/// Whether the object counts as an integer, as those of NumPy do.
+bool isInteger(py::handle object) {
+  return PyIndex_Check(object.ptr()) != 0;
+}
+
+/// The value of a setting as YAML writes it.
+std::string settingText(py::handle value, const std::string& name) {
+  const std::string type = typeName(value);
+  if (py::isinstance<py::str>(value)) return py::cast<std::string>(value);
+  if (type == "bool" || type == "bool_")
+    return py::cast<bool>(py::bool_(py::reinterpret_borrow<py::object>(value))) ? "true" : "false";
+  if (isInteger(value)) return py::str(py::int_(py::reinterpret_borrow<py::object>(value)));
+  if (PyFloat_Check(value.ptr()) != 0 || py::hasattr(value, "__float__")) {
+    return py::repr(py::float_(py::reinterpret_borrow<py::object>(value)));
+  }
+  throw std::invalid_argument("parameter '" + name + "' must be a number, a bool or a str, not " + type);
+}
+
+void flatten(const py::dict& settings, const std::string& group, std::map<std::string, std::string>& values) {
+  for (const auto& [key, value] : settings) {
+    const std::string name = group + py::cast<std::string>(py::str(key));
+    if (py::isinstance<py::dict>(value)) {
+      flatten(py::reinterpret_borrow<py::dict>(value), name + "/", values);
+    } else if (!values.emplace(name, settingText(value, name)).second) {
+      throw std::invalid_argument("parameter '" + name + "' is given twice; keep one");
+    }
+  }
+}
+
+}  // namespace
+
+Points::Points(py::handle object, const std::string& name) {
+  const std::string wanted = "an array of numbers of shape (N, 3)";
+  const py::array array = arrayOf(object, name, wanted);
+  if (!isNumber(array.dtype().kind())) {
+    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
+  }
+  if (array.ndim() != 2 || array.shape(1) != 3) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
+  }
+  size_ = static_cast<std::size_t>(array.shape(0));
+  is_float_ = array.dtype().kind() == 'f' && array.itemsize() <= 4;
+  if (is_float_) {
+    array_ = contiguous<float>(array);
+  } else {
+    array_ = contiguous<double>(array);
+  }
+  data_ = array_.data();
+}
+
+Labels::Labels(py::handle object, const std::string& name) {
+  const std::string wanted = "an array of integers of shape (N,)";
+  const py::array array = arrayOf(object, name, wanted);
+  const char kind = array.dtype().kind();
+  const bool empty_list = array.size() == 0 && kind == 'f';  // NumPy's dtype of []
+  if (kind != 'i' && kind != 'u' && !empty_list) {
+    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
+  }
+  if (array.ndim() != 1) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
+  }
+  if (array.size() > 0 && !(kind == 'u' && array.itemsize() <= 4)) {
+    const py::object least = array.attr("min")(), most = array.attr("max")(), zero = py::int_(0);
+    constexpr auto kLimit = std::numeric_limits<std::uint32_t>::max();
+    if (least < zero || most > py::int_(kLimit)) {
+      const std::string wrong = py::str(py::handle(least < zero ? least : most));
+      throw std::invalid_argument(name + " must be from 0 to " + std::to_string(kLimit) + ", but " + wrong +
+                                  " is among them");
+    }
+  }
+  array_ = contiguous<std::uint32_t>(array);
+}
+
+Eigen::Vector3d vectorOf(py::handle object, const std::string& name) {
+  const std::string wanted = "three numbers";
+  const py::array array = arrayOf(object, name, wanted);
+  if (!isNumber(array.dtype().kind()) || array.ndim() != 1 || array.size() != 3) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of dtype " + dtypeText(array) +
+                                " and shape " + shapeText(array));
+  }
+  const auto values = contiguous<double>(array);
+  const Eigen::Vector3d vector(values.at(0), values.at(1), values.at(2));
+  if (vector.array().isNaN().any()) throw std::invalid_argument(name + " has a coordinate that is NaN");
+  return vector;
+}
+
+GridIndex indexOf(py::handle object, const std::string& name) {
+  const py::array array = arrayOf(object, name, "three integers");
+  const char kind = array.dtype().kind();
+  const auto outside = [](std::int64_t i) {
+    return i < std::numeric_limits<std::int32_t>::min() || i > std::numeric_limits<std::int32_t>::max();
+  };
+  if ((kind == 'i' || kind == 'u') && array.ndim() == 1 && array.size() == 3) {
+    const auto values = contiguous<std::int64_t>(array);
+    if (!outside(values.at(0)) && !outside(values.at(1)) && !outside(values.at(2))) {
+      return {static_cast<std::int32_t>(values.at(0)), static_cast<std::int32_t>(values.at(1)),
+              static_cast<std::int32_t>(values.at(2))};
+    }
+  }
+  throw std::invalid_argument(name + " must be three integers of 32 bits");
+}
+
+std::string pathOf(py::handle object, const std::string& name) {
+  const auto path = py::reinterpret_steal<py::object>(PyOS_FSPath(object.ptr()));
+  if (!path) {
+    PyErr_Clear();
+    throw py::type_error(name + " must be a str or a path, not " + typeName(object));
+  }
+  if (py::isinstance<py::bytes>(path)) return py::cast<std::string>(path);
+  const auto bytes = py::reinterpret_steal<py::bytes>(PyUnicode_EncodeFSDefault(path.ptr()));
+  if (!bytes) throw py::error_already_set();
+  return bytes;
+}
+
+std::string wordsOf(py::handle object, const std::string& name) {
+  if (py::isinstance<py::str>(object)) return py::cast<std::string>(object);
+  std::string text;
+  if (py::isinstance<py::iterable>(object)) {
+    for (const py::handle word : py::reinterpret_borrow<py::iterable>(object)) {
+      if (!py::isinstance<py::str>(word)) break;
+      text += (text.empty() ? "" : ",") + py::cast<std::string>(word);
+    }
+  }
+  if (text.empty()) throw py::type_error(name + " must be a str, or a list of them");
+  return text;
+}
+
+std::map<std::string, std::string> settingsOf(const py::dict& settings) {
+  std::map<std::string, std::string> values;
+  flatten(settings, "", values);
+  return values;
+}
+
+py::array_t<std::int32_t> indexArray(const std::vector<GridIndex>& indices) {
+  static_assert(sizeof(GridIndex) == 3 * sizeof(std::int32_t));
+  py::array_t<std::int32_t> array({static_cast<py::ssize_t>(indices.size()), py::ssize_t{3}});
+  auto* to = array.mutable_data();
+  for (const GridIndex& index : indices) {
+    *to++ = index.x;
+    *to++ = index.y;
+    *to++ = index.z;
+  }
+  return array;
+}
+
+py::dtype structType(const std::vector<Field>& fields, std::size_t bytes) {
+  py::list names, formats, offsets;
+  for (const Field& field : fields) {
+    names.append(field.name);
+    formats.append(field.format);
+    offsets.append(field.offset);
+  }
+  return py::dtype(names, formats, offsets, static_cast<py::ssize_t>(bytes));
+}
+
+}  // namespace bki_mapping::python

@@ -1,0 +1,383 @@
+#include "mapper_bindings.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "arrays.h"
+#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "io/share_path.h"
+#include "map_bindings.h"
+
+namespace bki_mapping::python {
+namespace {
+
+using SharedClasses = std::shared_ptr<const ClassTable>;
+
+/// A mapper, and which drives are in its map. Its calls release the GIL; those of several threads wait for
+/// each other.
+struct Mapper {
+  Mapper(const MapperConfig& config, SharedClasses classes, std::string map_frame, const std::string& id)
+      : mapper(config, std::move(classes)), frame(std::move(map_frame)) {
+    drive.id = id;
+  }
+
+  std::mutex mutex;
+  SemanticMapper mapper;
+  std::string frame;
+  DriveRecord drive;                ///< of the scans that were integrated here
+  std::vector<DriveRecord> drives;  ///< those added from files and other maps
+};
+
+/// Calls a function without the GIL, alone in the mapper.
+template <typename Function>
+auto alone(Mapper& self, Function&& function) {
+  const py::gil_scoped_release release;
+  const std::lock_guard<std::mutex> lock(self.mutex);
+  return function();
+}
+
+/// A parameter file: a path, or the name of one of the presets that come with the package.
+std::string presetFile(const std::string& name_or_file) {
+  namespace fs = std::filesystem;
+  if (fs::is_regular_file(name_or_file)) return name_or_file;
+  const fs::path folder = fs::path(sharePath()) / "config" / "presets";
+  const fs::path preset = folder / (name_or_file + ".yaml");
+  if (name_or_file.find('/') == std::string::npos && fs::is_regular_file(preset)) return preset.string();
+  std::vector<std::string> known;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored))
+    known.push_back(entry.path().stem().string());
+  std::sort(known.begin(), known.end());
+  throw std::invalid_argument("parameter file '" + name_or_file + "' is neither a file nor " +
+                              wordsText(known) + nearestWord(name_or_file, known));
+}
+
+MapperConfig configOf(py::handle config, py::handle resolution, py::dict parameters) {
+  MapperConfig result;
+  if (!config.is_none()) setParameters(result, loadParameterFile(presetFile(pathOf(config, "config"))));
+  if (!resolution.is_none()) parameters["resolution"] = resolution;
+  setParameters(result, settingsOf(parameters));
+  return result;
+}
+
+void warnOf(const MapperConfig& config) {
+  for (const std::string& warning : settingWarnings(config)) {
+    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+  }
+}
+
+SharedClasses classesOf(py::handle classes) {
+  if (py::isinstance<ClassTable>(classes)) return py::cast<std::shared_ptr<ClassTable>>(classes);
+  return std::make_shared<const ClassTable>(loadClassTable(pathOf(classes, "classes")));
+}
+
+/// An id that no other drive has, whatever robot records it.
+std::string newId() {
+  return py::str(py::module::import("uuid").attr("uuid4")());
+}
+
+std::unique_ptr<Mapper> makeMapper(py::handle classes, py::handle resolution, py::handle config,
+                                   const std::string& frame, py::handle drive, const py::kwargs& parameters) {
+  const MapperConfig settings = configOf(config, resolution, parameters);
+  const std::string id = drive.is_none() ? newId() : py::cast<std::string>(py::str(drive));
+  if (id.empty()) throw std::invalid_argument("drive is empty; give an id that no other drive has, or none");
+  auto mapper = std::make_unique<Mapper>(settings, classesOf(classes), frame, id);
+  warnOf(settings);
+  return mapper;
+}
+
+/// Where the sensor was.
+struct Pose {
+  Eigen::Vector3d origin;
+  Eigen::Matrix3f rotation;
+  bool turned;
+};
+
+/// @param object an origin, (3,), or T_map_sensor, (4, 4).
+Pose poseOf(py::handle object) {
+  const py::array array = py::array::ensure(object);
+  if (!array) PyErr_Clear();
+  if (!array || array.ndim() != 2) return {vectorOf(object, "origin"), Eigen::Matrix3f::Identity(), false};
+  const auto values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
+  if (!values) PyErr_Clear();
+  if (!values || array.shape(0) != 4 || array.shape(1) != 4) {
+    throw std::invalid_argument(
+        "origin must be three numbers, or a pose: an array of numbers of shape (4, 4)");
+  }
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
+  constexpr double kTolerance = 1e-3;
+  const bool rotates =
+      ((linear.transpose() * linear - Eigen::Matrix3d::Identity()).array().abs() < kTolerance).all() &&
+      linear.determinant() > 0.0;
+  if (!rotates || matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
+    throw std::invalid_argument(
+        "the pose must be a rotation and a translation, from the sensor's to the map frame, with 0, 0, 0, 1 "
+        "in the last row");
+  }
+  Eigen::Isometry3d T_map_sensor;
+  T_map_sensor.matrix() = matrix;
+  return {T_map_sensor.translation(), roundedRotation(T_map_sensor), true};
+}
+
+/// Points in single precision, relative to the sensor, in the axes of the map frame.
+std::vector<Eigen::Vector3f> relativePoints(const Points& points, const Pose& pose, bool in_map) {
+  std::vector<Eigen::Vector3f> relative(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (in_map) {
+      relative[i] = (points.at(i) - pose.origin).cast<float>();
+    } else {
+      const Eigen::Vector3f point = points.isFloat() ? points.floats()[i] : points.at(i).cast<float>();
+      relative[i] = pose.turned ? pose.rotation * point : point;
+    }
+  }
+  return relative;
+}
+
+bool areInMap(const std::string& points_in) {
+  if (points_in == "map") return true;
+  if (points_in == "sensor") return false;
+  throw std::invalid_argument("points_in is '" + points_in + "', but must be sensor or map");
+}
+
+ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels,
+                        std::uint64_t stamp, const std::string& points_in, bool labels_are_ids,
+                        bool withdraws) {
+  const bool in_map = areInMap(points_in);
+  const Pose pose = poseOf(origin);
+  const Points given(points, "points");
+  const Labels classes(labels, "labels");
+  ScanView scan;
+  scan.origin = pose.origin;
+  scan.labels = {classes.data(), classes.size()};
+  scan.labels_are_ids = labels_are_ids;
+  scan.stamp = stamp;
+  return alone(self, [&] {
+    std::vector<Eigen::Vector3f> relative;
+    if (in_map || pose.turned || !given.isFloat()) {
+      relative = relativePoints(given, pose, in_map);
+      scan.points = {relative.data(), relative.size()};
+    } else {
+      scan.points = {given.floats(), given.size()};
+    }
+    if (withdraws) {
+      const ScanStats stats = self.mapper.withdraw(scan);
+      if (self.drive.scans > 0) --self.drive.scans;
+      return stats;
+    }
+    const ScanStats stats = self.mapper.integrate(scan);
+    self.drive.addScan(stamp, self.mapper.map().geometry(), self.mapper.touchedBlocks());
+    return stats;
+  });
+}
+
+ScanStats integrate(Mapper& self, py::handle origin, py::handle points, py::handle labels,
+                    std::uint64_t stamp, const std::string& points_in, bool labels_are_ids) {
+  return addOrWithdraw(self, origin, points, labels, stamp, points_in, labels_are_ids, false);
+}
+ScanStats withdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels, std::uint64_t stamp,
+                   const std::string& points_in, bool labels_are_ids) {
+  return addOrWithdraw(self, origin, points, labels, stamp, points_in, labels_are_ids, true);
+}
+
+SharedMap snapshot(Mapper& self) {
+  return alone(self, [&] {
+    std::vector<DriveRecord> drives = self.drives;
+    if (self.drive.scans > 0) drives.push_back(self.drive);
+    return std::make_shared<StoredMap>(
+        StoredMap{mapInfoOf(self.mapper, self.frame), std::move(drives), self.mapper.snapshot()});
+  });
+}
+
+/// Adds a map, unless one of its drives is there already.
+void addStored(Mapper& self, const StoredMap& added) {
+  for (const DriveRecord& drive : added.drives) {
+    const auto same = [&](const DriveRecord& known) { return known.id == drive.id; };
+    if (std::any_of(self.drives.begin(), self.drives.end(), same) ||
+        (self.drive.scans > 0 && same(self.drive))) {
+      throw std::invalid_argument("drive '" + drive.id + "' is in the map already");
+    }
+  }
+  self.mapper.addMap(added.map);
+  self.drives.insert(self.drives.end(), added.drives.begin(), added.drives.end());
+}
+
+void add(Mapper& self, const StoredMap& map) {
+  alone(self, [&] {
+    checkSameGrid("the mapper", mapInfoOf(self.mapper, self.frame), "the added map", map.info);
+    if (map.info.frame != self.frame) {
+      throw std::invalid_argument("the added map is in frame '" + map.info.frame +
+                                  "', and the mapper's in '" + self.frame +
+                                  "'; move it there with bki_mapping.merge");
+    }
+    addStored(self, map);
+  });
+}
+
+void load(Mapper& self, py::handle path) {
+  const std::string file = pathOf(path, "path");
+  alone(self, [&] { addStored(self, loadMapFor(self.mapper, file, self.frame)); });
+}
+
+void reset(Mapper& self) {
+  const std::string id = newId();
+  alone(self, [&] {
+    self.mapper.reset();
+    self.drives.clear();
+    self.drive = {};
+    self.drive.id = id;
+  });
+}
+
+void reconfigure(Mapper& self, const py::kwargs& parameters) {
+  const std::map<std::string, std::string> values = settingsOf(parameters);
+  const MapperConfig config = alone(self, [&] {
+    MapperConfig changed = self.mapper.config();
+    setParameters(changed, values);
+    self.mapper.reconfigure(changed);
+    return changed;
+  });
+  warnOf(config);
+}
+
+py::array_t<std::int32_t> clearBox(Mapper& self, py::handle low, py::handle high) {
+  const Eigen::AlignedBox3d box(vectorOf(low, "low"), vectorOf(high, "high"));
+  if (box.isEmpty()) throw std::invalid_argument("low must not be above high, on any axis");
+  return indexArray(alone(self, [&] { return self.mapper.clearBox(box); }));
+}
+
+py::dict parameters(Mapper& self) {
+  const MapperConfig config = alone(self, [&] { return self.mapper.config(); });
+  py::dict values;
+  for (const Parameter& parameter : mapperParameters()) {
+    const std::string text = parameter.get(config);
+    py::object value = py::str(text);
+    if (parameter.type == ParameterType::kReal) value = py::float_(parseNumber(text));
+    if (parameter.type == ParameterType::kInteger) value = py::int_(py::str(text));
+    if (parameter.type == ParameterType::kTruth) value = py::bool_(text == "true");
+    values[py::str(parameter.name)] = value;
+  }
+  return values;
+}
+
+void addStats(py::module& m) {
+  using C = PointCounts;
+  using S = ScanStats;
+  py::class_<ScanStats> stats(m, "ScanStats", "What one scan added, and how long it took.");
+  const auto count = [&](const char* name, std::size_t C::*field, const char* text) {
+    stats.def_property_readonly(
+        name, [field](const S& s) { return s.counts.*field; }, text);
+  };
+  count("points", &C::points, "Points of the scan; the sum of `used` to `no_returns`.");
+  count("used", &C::used, "Points that became hits.");
+  count("not_finite", &C::not_finite, "Points with a coordinate that is not finite.");
+  count("at_sensor", &C::at_sensor, "Points within 1 mm of the sensor.");
+  count("too_near", &C::too_near, "Points closer than sensor_model/min_range.");
+  count("beyond_max", &C::beyond_max, "Points beyond sensor_model/max_range.");
+  count("outside_map", &C::outside_map, "Points too far from the map's origin.");
+  count("unknown_label", &C::unknown_label,
+        "Points dropped because the class table does not list their label.");
+  count("unlabelled", &C::unlabelled, "Points of the unlabelled class that were dropped.");
+  count("no_returns", &C::no_returns, "Beams without a return.");
+  stats.def_readonly("hits", &S::hits, "Hits after down-sampling.")
+      .def_readonly("free_count", &S::free_count, "Free samples after down-sampling, or beams.")
+      .def_readonly("blocks", &S::blocks, "Blocks that the scan touched.")
+      .def_readonly("saturated", &S::saturated,
+                    "Voxels and classes whose evidence stopped at the end of its range.")
+      .def_readonly("negative", &S::negative,
+                    "Voxels and classes from which withdraw() took more than they had.")
+      .def_property_readonly("total_ms", &S::totalMs, "Time of the scan [ms].")
+      .def("__repr__", [](const S& s) {
+        return "<bki_mapping.ScanStats: " + std::to_string(s.counts.used) + " of " +
+               std::to_string(s.counts.points) + " points used, " + std::to_string(s.blocks) + " blocks, " +
+               numberText(s.totalMs()) + " ms>";
+      });
+}
+
+constexpr char kMapperHelp[] =
+    "Builds a map from labelled lidar scans.\n\n"
+    "classes: a class table that comes with the package, by its name, a YAML file, or a ClassTable.\n"
+    "resolution: edge of a voxel [m]; 0.3 unless the configuration says otherwise.\n"
+    "config: a preset that comes with the package, by its name, such as 'robot', or a YAML file of "
+    "parameters.\n"
+    "frame: name of the map frame, which map files keep.\n"
+    "drive: what map files call the scans; an id that no other drive has. None: a random one.\n"
+    "parameters: those of docs/parameters.md, overriding the configuration: **{'free_space/mode': 'line'}, "
+    "or nested, free_space={'mode': 'line'}.\n\n"
+    "Calls release the GIL, and those of several threads wait for each other. Raises ValueError for an "
+    "unknown class table, an unknown parameter, or a value that is not allowed.";
+constexpr char kIntegrateHelp[] =
+    "Add one scan, either all of it or nothing.\n\n"
+    "origin: position of the sensor in the map frame [m], (3,), if its axes are those of the map frame; "
+    "otherwise its pose T_map_sensor, (4, 4).\n"
+    "points: hits in the sensor's frame [m], (N, 3); with points_in='map' in the map frame, for which "
+    "float64 is better. Points that are not finite are skipped, and counted. Contiguous float32 is not "
+    "copied if `origin` is a position. Do not change the arrays meanwhile.\n"
+    "labels: integers, (N,): labels of the data set, which the class table translates; with "
+    "labels_are_ids=True, ids of the table. Contiguous uint32 is not copied.\n"
+    "stamp: time of the scan [ns]; random free samples depend on it.\n\n"
+    "Raises ValueError if shapes or lengths are wrong, ScanRefused if the scan exceeds a limit; the map is "
+    "then unchanged.";
+
+}  // namespace
+
+void addMapper(py::module& m) {
+  addStats(m);
+  const py::arg_v stamp = py::arg("stamp") = 0, in = py::arg("points_in") = "sensor",
+                  ids = py::arg("labels_are_ids") = false;
+  py::class_<Mapper>(m, "SemanticMapper", kMapperHelp)
+      .def(py::init(&makeMapper), py::arg("classes") = "semantic_kitti", py::arg("resolution") = py::none(),
+           py::arg("config") = py::none(), py::arg("frame") = "map", py::arg("drive") = py::none(),
+           "The arguments are explained with the class.")
+      .def("integrate", &integrate, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
+           kIntegrateHelp)
+      .def("withdraw", &withdraw, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
+           "Take back a scan that was integrated with these arguments: the map is then the same to the bit "
+           "as if the scan had never been there.\n\nRaises RuntimeError with free_space/extent 'mapped' or "
+           "occlusion marks, which depend on the order of scans; otherwise as integrate.")
+      .def("snapshot", &snapshot,
+           "The map as it is, to be read while mapping goes on. Takes far less than a scan.")
+      .def_property_readonly("map", &snapshot, "The same as snapshot().")
+      .def("add", &add, py::arg("map"),
+           "Add another map: the map is then the same to the bit as if the scans of both had been integrated "
+           "here.\n\nRaises ValueError if grids, classes or frames differ, or a drive is in both.")
+      .def("load", &load, py::arg("path"),
+           "Add the map of a map file (.bkm), to go on with it.\n\nRaises MapFileError if the file cannot be "
+           "read, or has another grid, class table or frame; ValueError if a drive is in both.")
+      .def(
+          "save", [](Mapper& self, const py::object& path) { py::cast(snapshot(self)).attr("save")(path); },
+          py::arg("path"),
+          "Write a map file (.bkm), which holds all evidence without loss. Other threads may map "
+          "meanwhile.\n\nRaises ValueError for another ending, MapFileError if the file cannot be written.")
+      .def("reset", &reset, "Clear the map, and start a new drive.")
+      .def("reconfigure", &reconfigure,
+           "Change parameters that may change while mapping; the map stays. Raises ValueError for others.")
+      .def("clear_box", &clearBox, py::arg("low"), py::arg("high"),
+           "Erase all evidence of the voxels whose centres lie in a box, from corner `low` to `high`, map "
+           "frame [m], which may be infinite. Returns the indices of the blocks that changed, (N, 3).")
+      .def_property_readonly(
+          "touched_blocks",
+          [](Mapper& self) { return indexArray(alone(self, [&] { return self.mapper.touchedBlocks(); })); },
+          "The indices of the blocks that the last scan may have changed: (N, 3), int32.")
+      .def_property_readonly(
+          "classes",
+          [](Mapper& self) { return std::const_pointer_cast<ClassTable>(self.mapper.sharedClasses()); },
+          "The class table.")
+      .def_readonly("frame", &Mapper::frame, "Name of the map frame.")
+      .def_property_readonly(
+          "drive", [](Mapper& self) { return alone(self, [&] { return self.drive.id; }); },
+          "What map files call the scans that are integrated here.")
+      .def_property_readonly("parameters", &parameters, "All parameters, by their flat names.");
+}
+
+}  // namespace bki_mapping::python
