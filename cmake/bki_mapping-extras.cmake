@@ -3,4 +3,4 @@
 include(CMakeFindDependencyMacro)
 find_dependency(Eigen3)
 find_dependency(Threads)
-include(${CMAKE_CURRENT_LIST_DIR}/bki_mapping-targets.cmake)
+include(${bki_mapping_DIR}/bki_mapping-targets.cmake)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draws a section through a map file: classes and free space, and the probability that something is there.
+"""Draws a horizontal section of a map file: classes and free space, and the probability that something is there.
 
-    python3 examples/draw_section.py street.bkm --y 0 --output section.png
+    python3 examples/draw_section.py street.bkm --z -0.8 --output section.png
 """
 import argparse
 
@@ -14,24 +14,23 @@ matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
 
 
-def section(map_, y):
-    """Points at the centres of the voxels at one y [m], (height, length, 3), as far as the map's blocks reach."""
+def section(map_, z):
+    """The centres of the voxels at one height [m], (rows, columns, 3), as far as the map's blocks reach."""
     edge, blocks = map_.resolution, map_.blocks
     low, high = 8 * edge * blocks.min(axis=0), 8 * edge * (blocks.max(axis=0) + 1)
-    x, z = (np.arange(low[axis] + edge / 2, high[axis], edge) for axis in (0, 2))
-    grid_x, grid_z = np.meshgrid(x, z)
-    return np.stack([grid_x, np.full_like(grid_x, y), grid_z], axis=-1)
+    x, y = np.meshgrid(*(np.arange(low[axis] + edge / 2, high[axis], edge) for axis in (0, 1)))
+    return np.stack([x, y, np.full_like(x, z)], axis=-1)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('map', help='map file (.bkm)')
-    parser.add_argument('--y', type=float, default=0.0, help='where the section lies, map frame [m]')
+    parser.add_argument('--z', type=float, default=0.0, help='height of the section, map frame [m]')
     parser.add_argument('--output', default='section.png')
     given = parser.parse_args()
 
     map_ = bki_mapping.load(given.map)
-    points = section(map_, given.y)
+    points = section(map_, given.z)
     said = map_.query(points.reshape(-1, 3)).reshape(points.shape[:2])
 
     classes = np.full((*said.shape, 3), 200, np.uint8)  # unknown
@@ -40,13 +39,13 @@ def main():
     classes[occupied] = map_.classes.colors[said['label'][occupied]]
     occupancy = np.where(said['state'] == bki_mapping.UNKNOWN, np.nan, said['occupancy'])
 
-    extent = [points[0, 0, 0], points[0, -1, 0], points[0, 0, 2], points[-1, 0, 2]]
-    figure, axes = plt.subplots(2, 1, figsize=(10, 5), sharex=True, constrained_layout=True)
+    extent = [points[0, 0, 0], points[0, -1, 0], points[0, 0, 1], points[-1, 0, 1]]
+    figure, axes = plt.subplots(1, 2, figsize=(13, 5), sharex=True, sharey=True, constrained_layout=True)
     axes[0].imshow(classes, origin='lower', extent=extent, interpolation='nearest')
-    axes[0].set(ylabel='z [m]', title=f'Classes at y = {given.y:g} m; white is free, grey unknown')
+    axes[0].set(xlabel='x [m]', ylabel='y [m]', title=f'Classes at z = {given.z:g} m; white is free, grey unknown')
     shown = axes[1].imshow(occupancy, origin='lower', extent=extent, interpolation='nearest', vmin=0, vmax=1)
-    axes[1].set(xlabel='x [m]', ylabel='z [m]', title='Probability that something is there')
-    figure.colorbar(shown, ax=axes[1])
+    axes[1].set(xlabel='x [m]', title='Probability that something is there')
+    figure.colorbar(shown, ax=axes[1], shrink=0.8)
     figure.savefig(given.output, dpi=120)
     print(f'{given.output}: {np.count_nonzero(occupied)} occupied voxels, {np.count_nonzero(said["state"] == bki_mapping.FREE)} free')
 

@@ -30,13 +30,12 @@ class Examples(unittest.TestCase):
             map_ = bki_mapping.load(os.path.join(folder, 'street.bkm'))
             self.assertIn('4 scans, median', said)
             self.assertIn(f'{len(map_.voxels())} occupied voxels', said)
-            run(sys.executable, os.path.join(EXAMPLES, 'draw_section.py'), 'street.bkm', '--y', '1.5', '--output', 'section.png')
-            for name in ('street.png', 'section.png'):
+            run(sys.executable, os.path.join(EXAMPLES, 'draw_section.py'), 'street.bkm', '--z', '-0.8', '--output', 'section.png')
+            for name, class_name in (('street.png', 'road'), ('section.png', 'building')):
                 picture = image.imread(os.path.join(folder, name))[..., :3]
                 self.assertGreater(min(picture.shape[:2]), 200)
                 drawn = {tuple(color) for color in np.rint(255 * picture.reshape(-1, 3)).astype(int)}
-                road = map_.classes['road'].color
-                self.assertIn(road, drawn, name)
+                self.assertIn(map_.classes[class_name].color, drawn, name)
             wrong = subprocess.run([sys.executable, os.path.join(EXAMPLES, 'map_sequence.py'), '/no/such'], capture_output=True, text=True,
                                    timeout=60, check=False)
             self.assertNotEqual(wrong.returncode, 0)
