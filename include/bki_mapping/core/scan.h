@@ -42,7 +42,7 @@ struct Scan {
   std::uint64_t stamp = 0;
 };
 
-/// Values in a row that belong to somebody else, as std::span of C++20.
+/// A view of contiguous values that it does not own, like C++20's std::span.
 template <typename T>
 class Span {
  public:
@@ -60,8 +60,8 @@ class Span {
   std::size_t size_ = 0;
 };
 
-/// A scan whose points and labels belong to somebody else, as to a message or to a NumPy array. The members
-/// mean what those of Scan mean. Valid as long as what it was made of.
+/// A scan that does not own its points and labels; a message or a NumPy array may hold them. The members have
+/// the meanings of those of Scan. Valid as long as the data that it refers to.
 struct ScanView {
   ScanView() = default;
   ScanView(const Scan& scan)
