@@ -143,23 +143,36 @@ SemanticMap SemanticMap::emptyLikeThis() const {
   return empty;
 }
 
+SemanticMap::SharedRegion SemanticMap::detach(const GridIndex& index) noexcept {
+  const std::uint32_t position = region_position_.find(index);
+  SharedRegion detached = std::move(regions_[position]);
+  region_position_.erase(index);
+  removeRegion(position);
+  size_ -= detached.region->size();
+  region_bytes_ -= detached.region->bytes();
+  return detached;
+}
+
+void SemanticMap::reserveRegions(std::size_t regions, std::size_t blocks) {
+  growCapacity(regions_.size() + regions, regions_);
+  growCapacity(regions_.size() + spare_regions_.size() + regions, spare_regions_);
+  growCapacity(size_ + spare_blocks_.size() + blocks, spare_blocks_);
+  region_position_.reserve(regions_.size() + regions);
+}
+
+void SemanticMap::attach(SharedRegion region) noexcept {
+  size_ += region.region->size();
+  region_bytes_ += region.region->bytes();
+  region_position_.insert(region.region->index(), static_cast<std::uint32_t>(regions_.size()));
+  regions_.push_back(std::move(region));
+}
+
 SemanticMap SemanticMap::takeRegion(const GridIndex& index) {
   SemanticMap taken = emptyLikeThis();
   const std::uint32_t position = region_position_.find(index);
   if (position == kNoPosition) return taken;
-  // Allocate first, so that nothing after it can fail. What the taken map erases, it may keep to reuse.
-  const std::size_t blocks = regions_[position].region->size(), bytes = regions_[position].region->bytes();
-  taken.regions_.reserve(1);
-  taken.spare_regions_.reserve(1);
-  taken.spare_blocks_.reserve(blocks);
-  taken.region_position_.insert(index, 0);
-  taken.regions_.push_back(std::move(regions_[position]));
-  taken.size_ = blocks;
-  taken.region_bytes_ = bytes;
-  region_position_.erase(index);
-  removeRegion(position);
-  size_ -= blocks;
-  region_bytes_ -= bytes;
+  taken.reserveRegions(1, regions_[position].region->size());
+  taken.attach(detach(index));
   return taken;
 }
 
@@ -202,6 +215,28 @@ void SemanticMap::add(const SemanticMap& other) {
     block.setOcclusion(block.occlusion() | entry.block->occlusion());
     if (block.empty()) erase(entry.index);  // negative evidence may have undone all of it
   }
+}
+
+void SemanticMap::add(SemanticMap&& other) {
+  checkAddable(other);
+  std::vector<GridIndex> missing;
+  std::size_t blocks = 0;
+  for (const SharedRegion& shared : other.regions_) {
+    if (hasRegion(shared.region->index())) continue;
+    missing.push_back(shared.region->index());
+    blocks += shared.region->size();
+  }
+  reserveRegions(missing.size(), blocks);
+  std::vector<SharedRegion> moved;
+  moved.reserve(missing.size());
+  for (const GridIndex& index : missing) moved.push_back(other.detach(index));
+  try {
+    add(std::as_const(other));
+  } catch (...) {
+    for (SharedRegion& region : moved) other.attach(std::move(region));  // its memory is still there
+    throw;
+  }
+  for (SharedRegion& region : moved) attach(std::move(region));
 }
 
 std::size_t SemanticMap::indexBytes() const {

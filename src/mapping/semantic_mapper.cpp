@@ -176,22 +176,33 @@ void SemanticMapper::countBlockBytes() noexcept {
   for (const auto& [index, block] : map_.entries()) block_bytes_ += block->bytes();
 }
 
-void SemanticMapper::addMap(const SemanticMap& other) {
+template <typename Map>
+void SemanticMapper::addCounting(Map&& other) {
+  std::vector<BlockIndex> blocks;
+  for (const auto& [index, ignored] : other.entries()) blocks.push_back(index);
   const auto bytesThere = [&] {
     std::size_t bytes = 0;
-    for (const auto& [index, ignored] : other.entries()) {
+    for (const BlockIndex& index : blocks) {
       if (const Block* const block = map_.find(index)) bytes += block->bytes();
     }
     return bytes;
   };
   const std::size_t before = bytesThere();
   try {
-    map_.add(other);
+    map_.add(std::forward<Map>(other));
   } catch (...) {
     countBlockBytes();  // planes may have been reserved
     throw;
   }
   block_bytes_ += bytesThere() - before;
+}
+
+void SemanticMapper::addMap(const SemanticMap& other) {
+  addCounting(other);
+}
+
+void SemanticMapper::addMap(SemanticMap&& other) {
+  addCounting(std::move(other));
 }
 
 SemanticMap SemanticMapper::takeRegion(const GridIndex& region) {

@@ -58,8 +58,8 @@ KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::
       drive_(newDrive()) {
   checkSettings(config);
   if (read_only_) {
-    const StoredMap stored = loadMapFor(mapper_, config.map_file, frame_);
-    mapper_.addMap(stored.map);
+    StoredMap stored = loadMapFor(mapper_, config.map_file, frame_);
+    mapper_.addMap(std::move(stored.map));
     drives_ = stored.drives;
   } else if (!config.map_file.empty()) {
     keeper_ = std::make_unique<MapKeeper>(mapper_, config.map_file, info(), drive_);
@@ -147,7 +147,7 @@ void KeptMap::addMap(StoredMap map, bool replace) {
       }
     }
   }
-  mapper_.addMap(map.map);
+  mapper_.addMap(std::move(map.map));
   drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
 }
 

@@ -129,15 +129,20 @@ struct MapKeeper::State {
     entry.load = store->load(tile);
   }
 
-  void take(const TileStore::Arrival& arrival) {
+  /// Adds blocks to the map, and notes them for the next moveTo().
+  void addToMap(SemanticMap&& blocks) {
+    noteMoved(blocks);
+    mapper.addMap(std::move(blocks));
+  }
+
+  void take(TileStore::Arrival& arrival) {
     using Kind = TileStore::Arrival::Kind;
     if (arrival.call <= reset_call) return;
     const auto known = here.find(arrival.tile);
     const bool awaited =
         known != here.end() && known->second.here == Here::kLoading && known->second.load == arrival.call;
     if (arrival.kind != Kind::kReturned && !awaited) return;
-    mapper.addMap(arrival.map);
-    noteMoved(arrival.map);
+    addToMap(std::move(arrival.map));
     if (arrival.kind == Kind::kLoaded) {
       known->second.here = Here::kWhole;
     } else {
@@ -340,8 +345,7 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
   for (const GridIndex& tile : other.regions()) {
     SemanticMap part = other.takeRegion(tile);
     if (s.here.count(tile) > 0) {
-      s.mapper.addMap(part);
-      s.noteMoved(part);
+      s.addToMap(std::move(part));
       s.noteChange(tile);
     } else {
       s.stored.insert(tile);

@@ -75,7 +75,7 @@ std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path,
     throw std::invalid_argument("the map in " + path + " already holds drive '" + id +
                                 "'; give other scans, or another id with --drive");
   }
-  mapper.addMap(stored.map);
+  mapper.addMap(std::move(stored.map));
   return stored.drives;
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "bki_mapping/map/semantic_map.h"
+#include "reference/content.h"
 
 namespace bki_mapping {
 namespace {
@@ -57,6 +58,45 @@ TEST(SemanticMap, ASumOfNothingHasNoBlocks) {
   map.add(minus);
   ASSERT_EQ(map.size(), 1u);
   EXPECT_NE(map.find({{0, 0, 0}}), nullptr);
+}
+
+TEST(SemanticMap, AMapThatIsAddedMayGiveAwayItsRegions) {
+  using reference::contentOf;
+  // Regions of either map alone and of both; in some of these the evidence cancels out.
+  const auto mapOf = [](int from, int to, EvidenceUnits units) {
+    SemanticMap map(GridGeometry(0.3), 0.001, 3);
+    std::mt19937 random(7);
+    for (int n = 0; n < 3000; ++n) {
+      const BlockIndex index = randomBlock(random);
+      EvidenceUnits plane[kBlockVoxels] = {};
+      plane[n % kBlockVoxels] = units;
+      if (index.x >= from && index.x < to) map.getOrAllocate(index).add(1, plane);
+    }
+    return map;
+  };
+  SemanticMap copied = mapOf(-40, 5, 3), moved = mapOf(-40, 5, 3), other = mapOf(-5, 40, -3);
+  const auto before = contentOf(moved), of_other = contentOf(other);
+  const SemanticMap snapshot = moved.snapshot(), snapshot_of_other = other.snapshot();
+  copied.add(other);
+  moved.add(std::move(other));
+  EXPECT_TRUE(contentOf(moved) == contentOf(copied));
+  EXPECT_EQ(moved.size(), copied.size());
+  EXPECT_LT(moved.size(), before.size() + of_other.size() - 100) << "nothing has cancelled out";
+  for (const auto& [index, block] : snapshot_of_other.entries()) {
+    if (index.x >= 8) {
+      ASSERT_EQ(moved.find(index), block) << "it was copied";
+    }
+  }
+  // What is shared with snapshots is still copied when it is written to, and all of it can be erased.
+  std::vector<BlockIndex> all;
+  for (const auto& [index, block] : moved.entries()) all.push_back(index);
+  const EvidenceUnits plane[kBlockVoxels] = {1};
+  for (const BlockIndex& index : all) moved.getOrAllocate(index).add(2, plane);
+  EXPECT_TRUE(contentOf(snapshot) == before);
+  EXPECT_TRUE(contentOf(snapshot_of_other) == of_other);
+  for (const BlockIndex& index : all) moved.erase(index);
+  EXPECT_EQ(moved.size(), 0u);
+  EXPECT_TRUE(moved.regions().empty());
 }
 
 TEST(SemanticMap, AWindowThatMovesOnTakesNoMoreMemory) {

@@ -231,6 +231,41 @@ TEST(Allocation, AFailureLeavesTheMapAndItsSnapshotAsTheyWere) {
   }
 }
 
+TEST(Allocation, AFailureWhileAMapIsAddedLeavesBothAsTheyWere) {
+  MapperConfig config;
+  config.free_space.extent = FreeSpaceExtent::kObserved;
+  config.threads = 1;
+  Scan far = fewPoints(1);
+  far.origin.x() += 100.0;  // regions that only one of the maps has
+  for (const bool on : {false, true}) {
+    SemanticMapper mapper(config, reference::smallTable()), other(config, reference::smallTable());
+    mapper.integrate(fewPoints(0));
+    for (const Scan& scan : {fewPoints(1), far}) other.integrate(scan);
+    SemanticMap map = other.snapshot();
+    const auto before = contentOf(mapper.map()), of_other = contentOf(map);
+    std::ptrdiff_t failures = 0;
+    for (bool succeeded = false; !succeeded; ++failures) {
+      fails_on = on;
+      until_failure = failures;
+      try {
+        mapper.addMap(std::move(map));
+        succeeded = true;
+      } catch (const std::bad_alloc&) {
+      }
+      until_failure = -1;
+      if (succeeded) break;
+      ASSERT_EQ(contentOf(mapper.map()), before) << "after " << failures << " allocations";
+      ASSERT_EQ(contentOf(map), of_other) << "after " << failures << " allocations";
+      ASSERT_EQ(mapper.mapBytes(), mapper.map().bytes()) << "after " << failures << " allocations";
+    }
+    SemanticMapper whole(config, reference::smallTable());
+    for (const Scan& scan : {fewPoints(0), fewPoints(1), far}) whole.integrate(scan);
+    EXPECT_EQ(contentOf(mapper.map()), contentOf(whole.map()));
+    EXPECT_EQ(mapper.mapBytes(), mapper.map().bytes());
+    EXPECT_GT(failures, 10) << "too few allocations for the test to mean much";
+  }
+}
+
 TEST(Allocation, NoneInTheSteadyStateAfterASnapshotIsGone) {
   const Scan scan = everywhere();
   MapperConfig config;

@@ -46,6 +46,10 @@ class GridTable {
     --size_;
   }
 
+  /// Allocates memory for a number of indices in all, so that inserting them allocates nothing.
+  void reserve(std::size_t size) {
+    while (2 * size > slots_.size()) grow();
+  }
   void clear() {
     slots_.assign(slots_.size(), Slot{});
     size_ = 0;

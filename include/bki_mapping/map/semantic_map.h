@@ -125,6 +125,9 @@ class SemanticMap {
   /// @throws std::invalid_argument if the resolution, the prior or the number of classes differs,
   /// std::bad_alloc; the map is then unchanged.
   void add(const SemanticMap& other);
+  /// The same, but takes the regions of the other map that this one lacks instead of copying their blocks.
+  /// What the other map holds afterwards is not specified; if this throws, both maps are unchanged.
+  void add(SemanticMap&& other);
   /// @throws std::invalid_argument if add() would.
   void checkAddable(const SemanticMap& other) const;
 
@@ -146,6 +149,12 @@ class SemanticMap {
   void dropIfEmpty(const BlockIndex& block) noexcept;
   /// Removes a region from the index.
   void removeRegion(std::uint32_t position) noexcept;
+  /// Takes a region out of the map.
+  SharedRegion detach(const GridIndex& region) noexcept;
+  /// Allocates what the map needs to attach() regions. @param blocks in all of them.
+  void reserveRegions(std::size_t regions, std::size_t blocks);
+  /// Adds a region that the map lacks.
+  void attach(SharedRegion region) noexcept;
   /// A map with the same settings, and no blocks.
   SemanticMap emptyLikeThis() const;
 

@@ -40,6 +40,9 @@ class SemanticMapper {
   /// had been integrated here.
   /// @throws std::invalid_argument as SemanticMap::add, std::bad_alloc; the map is then unchanged.
   void addMap(const SemanticMap& other);
+  /// The same, but takes from the other map what it can instead of copying it. What the other map holds
+  /// afterwards is not specified; if this throws, both maps are unchanged.
+  void addMap(SemanticMap&& other);
 
   /// Moves a region of the map to a map of its own (SemanticMap::takeRegion).
   SemanticMap takeRegion(const GridIndex& region);
@@ -93,6 +96,9 @@ class SemanticMapper {
   /// Cleans up after a failure: recounts the map's bytes, and frees the working memory, which may be large.
   void recover() noexcept;
   void countBlockBytes() noexcept;
+  /// Adds a map, and counts the memory that it takes.
+  template <typename Map>
+  void addCounting(Map&& other);
   void setGains();
 
   MapperConfig config_;
