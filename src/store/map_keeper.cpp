@@ -139,8 +139,7 @@ struct MapKeeper::State {
     using Kind = TileStore::Arrival::Kind;
     if (arrival.call <= reset_call) return;
     const auto known = here.find(arrival.tile);
-    const bool awaited =
-        known != here.end() && known->second.here == Here::kLoading && known->second.load == arrival.call;
+    const bool awaited = known != here.end() && known->second.load == arrival.call;
     if (arrival.kind != Kind::kReturned && !awaited) return;
     addToMap(std::move(arrival.map));
     if (arrival.kind == Kind::kLoaded) {
@@ -294,7 +293,6 @@ std::vector<GridIndex> MapKeeper::waitForTiles() {
 
 std::future<void> MapKeeper::save() {
   State& s = *state_;
-  s.takeArrivals(true);
   std::vector<GridIndex> copies;
   for (auto entry = s.here.begin(); entry != s.here.end();) {
     auto& [index, tile] = *entry;
