@@ -1,6 +1,5 @@
 #include "bki_mapping/store/map_file.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <utility>
@@ -397,19 +396,6 @@ void removeLeftovers(const std::string& path) {
   if (removed) syncFolder(target);
 }
 
-/// @param limit for the memory of a map of these tiles [bytes]; 0: no limit.
-void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, std::size_t limit) {
-  std::size_t bytes = 0;
-  for (const TileEntry& tile : tiles) {
-    bytes += static_cast<std::size_t>(tile.planes) * kBlockVoxels * sizeof(EvidenceUnits) +
-             static_cast<std::size_t>(tile.blocks) * (sizeof(Block) + kReferenceCountBytes);
-  }
-  if (limit == 0 || bytes <= limit) return;
-  throw MapFileError("the map in " + path + " takes " + std::to_string(bytes / 1'000'000) +
-                     " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
-                     " MB; raise the limit, or use a smaller map");
-}
-
 }  // namespace
 
 struct NewMapFile::State {
@@ -466,68 +452,6 @@ void NewMapFile::commit() {
   } catch (const std::runtime_error& error) {
     throw MapFileError(error.what());
   }
-}
-
-void saveMap(const std::string& path, const MapInfo& info, const std::vector<DriveRecord>& drives,
-             const SemanticMap& map) {
-  MapInfo of_map = info;
-  of_map.resolution = map.geometry().resolution();
-  of_map.prior = map.prior();
-  NewMapFile file(path, of_map);
-  for (DriveRecord drive : drives) {
-    drive.part = 0;
-    file.content().putDrive(drive);
-  }
-  for (const GridIndex& tile : tilesOf(map)) file.content().writeTile(map, {tile});
-  file.commit();
-}
-
-void copyMap(MapFile& file, const std::string& path) {
-  NewMapFile copy(path, file.info());
-  for (const DriveRecord& drive : file.drives()) copy.content().putDrive(drive);
-  for (const int part : file.parts()) {
-    for (const TileEntry& tile : file.tiles(part)) {
-      SemanticMap map = file.info().emptyMap();
-      file.addTileTo(map, {tile.index, part});
-      copy.content().writeTile(map, {tile.index, part});
-    }
-  }
-  copy.commit();
-}
-
-StoredMap loadMap(const std::string& path, std::size_t memory_limit) {
-  MapFile file(path, MapFile::Access::kRead);
-  return readMap(file, memory_limit);
-}
-
-StoredMap readMap(MapFile& file, std::size_t memory_limit) {
-  StoredMap stored{file.info(), file.drives(), file.info().emptyMap()};
-  for (DriveRecord& drive : stored.drives) drive.part = 0;
-  const std::vector<TileEntry> tiles = file.tiles();
-  checkMemory(file.path(), tiles, memory_limit);
-  for (const TileEntry& tile : tiles) {
-    if (!file.addTileTo(stored.map, {tile.index}))
-      throw damaged(file.path(), nameOf({tile.index}) + " is missing");
-  }
-  return stored;
-}
-
-void checkFits(const MapFile& file, const MapInfo& own) {
-  if (!own.frame.empty() && file.info().frame != own.frame) {
-    throw MapFileError("the map in " + file.path() + " is in frame '" + file.info().frame +
-                       "', and the mapper maps in '" + own.frame + "'; set frame_id to the frame of the map");
-  }
-  try {
-    checkSameGrid(file.path(), file.info(), "the mapper", own);
-  } catch (const std::invalid_argument& difference) {
-    throw MapFileError(difference.what());
-  }
-}
-
-std::vector<GridIndex> tilesOf(const SemanticMap& map) {
-  std::vector<GridIndex> tiles = map.regions();
-  std::sort(tiles.begin(), tiles.end());
-  return tiles;
 }
 
 }  // namespace bki_mapping
