@@ -25,6 +25,7 @@ bki_mapping_room(ros SOURCES
     publishers/voxel_cloud.cpp
     scan_ledger.cpp
     scan_reader.cpp
+    sensor_trajectory.cpp
     score_reader.cpp
     server_config.cpp
   LINK bki_mapping_io pcl_common ${catkin_LIBRARIES})

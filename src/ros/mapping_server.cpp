@@ -195,10 +195,12 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   warnOfFarPoints(waiting.input, stats.counts.beyond_max);
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
-  appendPose(header.stamp, placed.T_map_sensor);
+  trajectory_.append({header.stamp, toPose(placed.T_map_sensor)}, mapper_->config().resolution);
+  if (config_.window > 0.0) {
+    trajectory_.keepWithin(sensor_, config_.window + mapper_->map().geometry().blockSize());
+  }
   publishing_->changed(mapper_->touchedBlocks());
   publishing_->changed(kept_->addScan(placed.scan.stamp, sensor_, config_));
-  shortenTrajectory();
   status_publisher_.publish(status());
 }
 
@@ -211,16 +213,6 @@ void MappingServer::warnOfFarPoints(std::size_t input, std::size_t count) {
       count, cloud_subscribers_[input].getTopic().c_str(), SensorModelConfig::kFarthest);
 }
 
-void MappingServer::appendPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor) {
-  // Keeps one pose, not thousands, while the robot stands still.
-  if (trajectory_.size() > 1) {
-    const auto& last = trajectory_[trajectory_.size() - 2].pose.position;
-    const Eigen::Vector3d moved = T_map_sensor.translation() - Eigen::Vector3d(last.x, last.y, last.z);
-    if (moved.norm() < mapper_->config().resolution) trajectory_.pop_back();
-  }
-  trajectory_.push_back({stamp, toPose(T_map_sensor)});
-}
-
 ScanStats MappingServer::addToMap(const Scan& scan) {
   try {
     return mapper_->integrate(scan);
@@ -228,16 +220,6 @@ ScanStats MappingServer::addToMap(const Scan& scan) {
     if (refused.reason() != ScanRefused::Reason::kMemory || !kept_->makeRoom()) throw;
   }
   return mapper_->integrate(scan);
-}
-
-void MappingServer::shortenTrajectory() {
-  if (config_.window <= 0.0) return;
-  const double reach = 0.5 * (config_.window + mapper_->map().geometry().blockSize());
-  const auto left = [&](const SensorPose& pose) {
-    const auto& p = pose.pose.position;
-    return (Eigen::Vector3d(p.x, p.y, p.z) - sensor_).cwiseAbs().maxCoeff() > reach;
-  };
-  trajectory_.erase(std::remove_if(trajectory_.begin(), trajectory_.end(), left), trajectory_.end());
 }
 
 void MappingServer::reportFault() {
@@ -312,7 +294,7 @@ MappingStatus MappingServer::status() {
 }
 
 MapSnapshot MappingServer::snapshot() {
-  MapSnapshot snapshot{{},      mapper_->snapshot(),      mapper_->classes(), trajectory_, config_,
+  MapSnapshot snapshot{{},      mapper_->snapshot(),      mapper_->classes(), trajectory_.poses(), config_,
                        sensor_, mapper_->config().threads};
   snapshot.header.frame_id = config_.frame_id;
   snapshot.header.stamp = map_stamp_;

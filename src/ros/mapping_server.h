@@ -25,6 +25,7 @@
 #include "ros/scan_ledger.h"
 #include "ros/scan_queue.h"
 #include "ros/scan_reader.h"
+#include "ros/sensor_trajectory.h"
 #include "ros/sentence_throttle.h"
 #include "ros/time_watch.h"
 
@@ -69,13 +70,10 @@ class MappingServer {
   void onTimeJump(const ros::Time& new_time, const std::string& what);
   /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
-  void appendPose(const ros::Time& stamp, const Eigen::Isometry3d& T_map_sensor);
   /// Logs what is wrong with the map file, when that changes.
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
   ScanStats addToMap(const Scan& scan);
-  /// Removes poses outside of the window around the sensor.
-  void shortenTrajectory();
   /// Counts a cloud as dropped and logs the reason, each sentence at most once in 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
   /// Assesses the points of each input since the last call, and logs warnings.
@@ -103,7 +101,7 @@ class MappingServer {
 
   ros::Time map_stamp_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
-  std::vector<SensorPose> trajectory_;
+  SensorTrajectory trajectory_;
   SentenceThrottle throttle_;
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
 

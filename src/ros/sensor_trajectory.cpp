@@ -1,0 +1,29 @@
+#include "ros/sensor_trajectory.h"
+
+#include <algorithm>
+
+namespace bki_mapping::ros_interface {
+namespace {
+
+Eigen::Vector3d placeOf(const SensorPose& pose) {
+  return {pose.pose.position.x, pose.pose.position.y, pose.pose.position.z};
+}
+
+}  // namespace
+
+void SensorTrajectory::append(const SensorPose& pose, double step) {
+  if (poses_.size() > 1 && (placeOf(pose) - placeOf(poses_[poses_.size() - 2])).norm() < step) {
+    poses_.pop_back();
+  }
+  if (poses_.size() == kMostPoses) poses_.erase(poses_.begin(), poses_.begin() + kMostPoses / 10);
+  poses_.push_back(pose);
+}
+
+void SensorTrajectory::keepWithin(const Eigen::Vector3d& centre, double edge) {
+  const auto left = [&](const SensorPose& pose) {
+    return (placeOf(pose) - centre).cwiseAbs().maxCoeff() > 0.5 * edge;
+  };
+  poses_.erase(std::remove_if(poses_.begin(), poses_.end(), left), poses_.end());
+}
+
+}  // namespace bki_mapping::ros_interface
