@@ -435,6 +435,20 @@ class Tools(unittest.TestCase):
         more = self.succeeds('map_sequence', '--sequence', self.drive, '--drive', 'more', '--resume', kept, '--output', merged)
         self.assertIn('stores drives separately, and the continued map will not', more.stderr)
 
+    def test_resuming_equals_one_run(self):
+        # Here even what depends on the map that is there: `mapped` lines and occlusion marks.
+        for mode in ((), ('--set', 'free_space/mode=line', '--set', 'free_space/extent=mapped', '--set', 'occlusion=mapped')):
+            whole, front, resumed = (self.path(name) for name in ('one_run.bkm', 'begun.bkm', 'resumed.bkm'))
+            begin = ('map_sequence', '--sequence', self.drive, *mode)
+            self.succeeds(*begin, '--scans', '4', '--output', whole)
+            self.succeeds(*begin, '--scans', '2', '--output', front)
+            self.succeeds(*begin, '--first', '2', '--scans', '2', '--resume', front, '--output', resumed)
+            self.assertEqual(self.tiles_of(resumed), self.tiles_of(whole), mode)
+        self.fails('the resolution of', *begin, '--resume', front, '--set', 'resolution=0.2')
+        self.fails('the prior of', *begin, '--resume', front, '--set', 'prior=0.5')
+        self.fails('class', *begin, '--resume', front, '--classes', 'toy')
+        self.fails("holds drive 'drive/000000-000001' already", *begin, '--scans', '2', '--resume', front)
+
     def test_moving_maps(self):
         a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
         self.assertEqual(self.succeeds('merge_maps', a, '--transform', f'{a}=0.3,-1.2,3,90', '--output', there).stderr, '')
