@@ -104,10 +104,7 @@ struct MapKeeper::State {
 
   void noteChange(const GridIndex& tile) {
     const auto [known, added] = here.try_emplace(tile);
-    if (added && stored.count(tile) > 0) {
-      known->second.here = Here::kPart;
-      must_sweep = true;
-    }
+    if (added && stored.count(tile) > 0) known->second.here = Here::kPart;
     known->second.changed = true;
   }
 

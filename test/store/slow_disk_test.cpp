@@ -2,6 +2,7 @@
 // is known.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 
@@ -153,6 +154,50 @@ TEST_F(LateArrival, IsSavedWithTheRest) {
   std::vector<Scan> all = scans_;
   all.push_back(scanAt(kFar, 0.0, 100));
   EXPECT_TRUE(same(contentIn(path_), contentOfAll(all)));
+}
+
+TEST_F(LateArrival, MakesATileWholeThatBeamsHaveReachedBefore) {
+  constexpr double kSmall = 10.0;  // [m]; beams reach tiles that are not yet loaded
+  kept_.emplace(path_, "now");
+  for (std::uint64_t stamp = 200; stamp < 203; ++stamp) {
+    scans_.push_back(scanAt(54.0, 1.0, stamp));
+    kept_->integrate(scans_.back(), kSmall);
+  }
+  kept_->keeper.waitForTiles();
+  const GridIndex tile{0, 0, 0};
+  ASSERT_TRUE(kept_->mapper.map().hasRegion(tile)) << "beams have not reached it";
+  kept_->keeper.moveTo({{20.0, 1.0, 0.0}, kSmall});
+  kept_->keeper.waitForTiles();
+  const auto expected = contentOfAll(scans_), found = contentHere();
+  std::size_t blocks = 0;
+  for (const auto& [index, content] : expected) {
+    if (!(SemanticMap::regionOf({index}) == tile)) continue;
+    ++blocks;
+    ASSERT_EQ(found.count(index), 1u);
+    EXPECT_TRUE(found.at(index) == content);
+  }
+  EXPECT_GT(blocks, 30u);
+}
+
+TEST(SlowDisk, IsNotUsedWhileTheSensorStands) {
+  const TemporaryFolder folder(memoryFolder());
+  std::atomic<int> changes{0};
+  const WatchedDisk watched(folder.path(), [&](const DiskCall& call) {
+    changes += call.kind == DiskCall::Kind::kSync;
+    return 0;
+  });
+  Kept kept(folder / "map.bkm", "a");
+  std::vector<Scan> scans;
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    scans.push_back(scanAt(9.0, 16.0, n + 1));
+    kept.integrate(scans.back(), 10.0);  // beams go beyond the window, and beyond its margin
+    kept.keeper.waitForTiles();
+    if (n == 0) changes = 0;
+  }
+  EXPECT_EQ(changes, 0);
+  EXPECT_EQ(kept.keeper.close(), "");
+  EXPECT_GT(changes, 0);
+  EXPECT_TRUE(same(contentIn(kept.keeper.path()), contentOfAll(scans)));
 }
 
 }  // namespace
