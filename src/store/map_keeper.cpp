@@ -317,7 +317,6 @@ std::future<void> MapKeeper::saveTo(const std::string& path) {
 void MapKeeper::reset(const DriveRecord& drive) {
   State& s = *state_;
   s.reset_call = s.store->clear();
-  s.arrivals.clear();
   s.here.clear();
   s.stored.clear();
   s.damaged.clear();

@@ -139,6 +139,20 @@ TEST_F(LateArrival, FromBeforeAResetIsForgotten) {
   EXPECT_TRUE(contentIn(path_).empty());
 }
 
+TEST_F(LateArrival, OfADamagedTileIsForgottenAtAReset) {
+  ASSERT_EQ(damageATile(path_).size(), 1u);
+  kept_.emplace(path_, "now");
+  moveHere();
+  kept_->keeper.waitForTiles();
+  EXPECT_NE(kept_->keeper.fault().find("damaged"), std::string::npos);
+  kept_->keeper.reset(newDrive("then"));
+  EXPECT_EQ(kept_->keeper.fault(), "");
+  scans_.clear();
+  integrateHere(300);
+  EXPECT_EQ(kept_->keeper.close(), "");
+  EXPECT_TRUE(same(contentIn(path_), contentOfAll(scans_)));
+}
+
 TEST_F(LateArrival, IsSavedWithTheRest) {
   begin();
   moveHere();
