@@ -93,11 +93,17 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
                        "resolution finer");
   }
   for (const auto& [name, limit] :
-       {std::pair("hits", config.scan_limit.hits), std::pair("free", config.scan_limit.free)}) {
+       {std::pair("hits", config.scan_limit.hits), std::pair("free", config.scan_limit.free),
+        std::pair("void", config.scan_limit.void_space)}) {
     if (limit == 0.0 || unitsOf(std::min(limit, 1.0)) > 0) continue;
     warnings.push_back(
         "scan_limit/" + std::string(name) + " " + numberText(limit) +
         " is below the smallest evidence, 1.5e-5: the scans add none; raise it, or set 0 for no limit");
+  }
+  if (config.scan_limit.void_space > 0.0 && config.scan_limit.free == 0.0) {
+    warnings.push_back(
+        "scan_limit/void adds nothing without scan_limit/free, which says what counts as seen empty; set "
+        "scan_limit/free, such as 0.1");
   }
   return warnings;
 }

@@ -52,12 +52,14 @@ std::string megabytes(double bytes) {
   return numberText(std::round(bytes / 1e6)) + " MB";
 }
 
-UpdateRules rulesOf(const MapperConfig& config) {
+UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   UpdateRules rules;
   rules.hits_before_misses = config.free_space.hits_before_misses;
   rules.evidence_before_misses = config.free_space.evidence_before_misses;
   if (config.scan_limit.hits > 0.0) rules.most_hits = static_cast<float>(config.scan_limit.hits);
   if (config.scan_limit.free > 0.0) rules.most_free = static_cast<float>(config.scan_limit.free);
+  rules.void_evidence = static_cast<float>(config.scan_limit.void_space);
+  for (const SemanticClass& c : classes.classes()) rules.fixed[c.id] = !c.dynamic && !c.unlabelled;
   return rules;
 }
 
@@ -297,7 +299,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, rulesOf(config_),
+  const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, rulesOf(config_, *classes_),
                                                  limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
   stats.not_finite = update.sums.not_finite;

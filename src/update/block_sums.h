@@ -40,6 +40,8 @@ class BlockSums {
 
   Plane* begin() { return planes_.data(); }
   Plane* end() { return planes_.data() + size_; }
+  const Plane* begin() const { return planes_.data(); }
+  const Plane* end() const { return planes_.data() + size_; }
 
   VoxelMask occupied;  ///< voxels that contain a hit, if the evidence reports them
 

@@ -119,7 +119,10 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     worker.blocks.reserve(kGroupBlocks);
     worker.slots.reserve(kGroupBlocks);
     worker.targets.reserve(kGroupBlocks);
+    worker.seen.reserve(kGroupBlocks);
+    worker.voids = {};
   }
+  if (rules.seeksVoids()) voids_.start(jobs_.size());
 }
 
 void MapUpdater::useCopies(SemanticMap& map) noexcept {
@@ -137,11 +140,12 @@ void MapUpdater::rollBack(SemanticMap& map) noexcept {
   touched_.clear();
 }
 
-BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker& to) const {
+BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker& to) {
   BlockGroup selected = {group.blocks.index, 0};
   to.blocks.clear();
   to.slots.clear();
   to.targets.clear();
+  to.seen.clear();
   for (const std::uint32_t* job = group_jobs_.begin(group.position); job != group_jobs_.end(group.position);
        ++job) {
     const std::uint32_t touched = task.positionOf(*job);
@@ -151,11 +155,12 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
     to.blocks.push_back({jobs_[*job].index, touched});
     to.slots.push_back(slot);
     to.targets.push_back(jobs_[*job].block);
+    if (seeks_voids_) to.seen.push_back(&voids_.at(*job));
   }
   return selected;
 }
 
-void MapUpdater::addGroup(const Group& group, bool withdraws, std::size_t worker) {
+void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   Worker& own = workers_[worker];
   own.sink.startGroup();
   for (std::size_t t = 0; t < task_count_; ++t) {
@@ -163,13 +168,39 @@ void MapUpdater::addGroup(const Group& group, bool withdraws, std::size_t worker
     const BlockGroup selected = selectBlocks(task, group, own);
     if (own.blocks.empty()) continue;
     if (task.evidence) {
-      own.sink.startEvidence(task.kind, own.slots, own.targets);
+      own.sink.startEvidence(task.kind, own.slots, own.targets, own.seen);
       task.evidence->accumulate(selected, own.blocks, worker, own.sink);
     } else {
       for (std::size_t b = 0; b < own.blocks.size(); ++b)
         task.pass->apply(own.blocks[b], worker, *own.targets[b]);
     }
   }
+}
+
+void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker) {
+  SumCounts& counts = workers_[worker].voids;
+  const std::int64_t change = withdraws ? -units : units;
+  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
+       ++j) {
+    const VoxelMask& voids = voids_.voidsOf(*j);
+    if (voids.none()) continue;
+    jobs_[*j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
+      EvidenceUnits any = 0;
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        if (voids[v]) {
+          const std::int64_t sum = plane[v] + change, most = kMostUnits;
+          counts.saturated += sum > most && plane[v] < most;
+          counts.negative += withdraws && plane[v] >= 0 && sum < 0;
+          plane[v] = static_cast<EvidenceUnits>(std::clamp(sum, -most, most));
+        }
+        any |= plane[v];
+      }
+      return any != 0;
+    });
+  }
+}
+
+void MapUpdater::finishGroup(const Group& group, bool withdraws) {
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
        ++j) {
     BlockJob& job = jobs_[*j];
@@ -188,6 +219,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   jobs_.clear();
   const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
   const std::ptrdiff_t index_before = indexBytes();
+  seeks_voids_ = rules.seeksVoids();
   try {
     setTasks(scan);
     collectJobs(map, limits, pool);
@@ -202,17 +234,27 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
 
   // From here on nothing allocates memory, so that nothing can fail.
   useCopies(map);
-  const auto add = [&](std::size_t g, std::size_t worker) { addGroup(groups_[g], scan.withdraws, worker); };
+  const auto add = [&](std::size_t g, std::size_t worker) {
+    addGroup(groups_[g], worker);
+    if (!seeks_voids_) finishGroup(groups_[g], scan.withdraws);
+  };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add);
   } else {
     pool.forEach(groups_.size(), add);
   }
+  if (seeks_voids_) {
+    voids_.find(touched_, pool);
+    pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
+      addVoids(groups_[g], unitsOf(static_cast<double>(rules.void_evidence)), scan.withdraws, worker);
+      finishGroup(groups_[g], scan.withdraws);
+    });
+  }
   for (const BlockJob& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
-  for (const Worker& worker : workers_) stats.sums += worker.sink.counts();
+  for (Worker& worker : workers_) stats.sums += worker.voids += worker.sink.counts();
   stats.update_ms = watch.lap();
   return stats;
 }

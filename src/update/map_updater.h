@@ -9,6 +9,7 @@
 #include "parallel/runs_by_index.h"
 #include "update/evidence.h"
 #include "update/sum_kernels.h"
+#include "update/void_search.h"
 
 namespace bki_mapping {
 
@@ -88,6 +89,8 @@ class MapUpdater {
     std::vector<GroupBlock> blocks;
     std::vector<int> slots;
     std::vector<Block*> targets;
+    std::vector<SeenVoxels*> seen;
+    SumCounts voids;  ///< of addVoids
   };
 
   void setTasks(const ScanEvidence& scan);
@@ -106,10 +109,13 @@ class MapUpdater {
   void useCopies(SemanticMap& map) noexcept;
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
-  /// @param withdraws whether memory of planes that are gone is returned.
-  void addGroup(const Group& group, bool withdraws, std::size_t worker);
+  void addGroup(const Group& group, std::size_t worker);
+  /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
+  void addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker);
+  /// Counts the memory of a group. @param withdraws whether that of planes that are gone is returned.
+  void finishGroup(const Group& group, bool withdraws);
   /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
-  BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to) const;
+  BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to);
 
   IndexNumbering touched_;  ///< blocks, in the order of jobs_
   std::vector<BlockJob> jobs_;
@@ -118,6 +124,8 @@ class MapUpdater {
   std::vector<Task> tasks_;                ///< in the order of execution
   std::size_t task_count_ = 0;             ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
+  bool seeks_voids_ = false;  ///< in this scan
+  VoidSearch voids_;
 };
 
 }  // namespace bki_mapping

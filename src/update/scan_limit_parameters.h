@@ -21,6 +21,12 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
           "free", &C::free, evidence, "", Changes::kWhileMapping,
           "Largest evidence for free that one scan adds to a voxel. Set it so that scans count alike "
           "however many beams cross the voxel; 0 sets no limit."),
+      realParameter(
+          "void", &C::void_space, evidence, "", Changes::kWhileMapping,
+          "Further evidence for free that a scan adds to a voxel which it sees empty together with all "
+          "26 neighbours: each of them without a hit and with as much evidence for free as "
+          "scan_limit/free, or hit only by classes that cannot move. Set it several times as high as "
+          "scan_limit/hits to clear what waited for seconds and left; 0 adds none."),
       integerParameter(
           "blocks", &C::blocks, NumberRange::atLeast(0).upTo(1e9), Changes::kWhileMapping,
           "Largest number of blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "

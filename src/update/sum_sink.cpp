@@ -10,22 +10,26 @@ void SumSink::reserve(const UpdateRules& rules, std::size_t classes, bool withdr
 }
 
 void SumSink::startGroup() {
-  if (!rules_.protectsVoxels()) return;
-  for (VoxelMask& mask : protected_) mask.reset();
+  if (rules_.protectsVoxels()) protected_.fill({});
+  if (rules_.seeksVoids()) hit_.fill({});
 }
 
-void SumSink::startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets) {
+void SumSink::startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
+                            const std::vector<SeenVoxels*>& seen) {
   kind_ = kind;
   slots_ = &slots;
   targets_ = &targets;
+  seen_ = &seen;
 }
 
 void SumSink::close() {
-  VoxelMask& is_protected = protected_[static_cast<std::size_t>((*slots_)[current_])];
+  const auto slot = static_cast<std::size_t>((*slots_)[current_]);
   if (kind_ == Kind::kHits) {
-    applyToHits(rules_, sums_, is_protected);
+    applyToHits(rules_, sums_, protected_[slot]);
+    if (rules_.seeksVoids()) noteHits(rules_, sums_, *(*seen_)[current_], hit_[slot]);
   } else {
-    applyToFree(rules_, is_protected, sums_);
+    applyToFree(rules_, protected_[slot], sums_);
+    if (rules_.seeksVoids()) noteFree(rules_, sums_, hit_[slot], *(*seen_)[current_]);
   }
   const auto add = withdraws_ ? kernels_->withdraw : kernels_->add;
   for (const BlockSums::Plane& sums : sums_) {

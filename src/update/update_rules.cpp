@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 namespace bki_mapping {
 namespace {
@@ -15,6 +17,25 @@ void limitHits(float most, BlockSums& hits) {
   for (BlockSums::Plane& plane : hits) {
     for (int v = 0; v < kBlockVoxels; ++v) plane.values[v] *= kept[v];
   }
+}
+
+/// The voxels with sums of at least `least`.
+VoxelMask atLeast(float least, const BlockSums::Plane& plane) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  VoxelMask mask;
+  for (int layer = 0; layer < kBlockEdge; ++layer) {
+    const float* const values = plane.values + layer * kLayer;
+    int count = 0;  // most layers have none or all, which vectors find out
+    for (int v = 0; v < kLayer; ++v) count += values[v] >= least;
+    if (count == 0) continue;
+    std::uint64_t bits = ~std::uint64_t{0};
+    if (count < kLayer) {
+      bits = 0;
+      for (int v = 0; v < kLayer; ++v) bits |= std::uint64_t{values[v] >= least} << v;
+    }
+    mask |= VoxelMask(bits) << static_cast<std::size_t>(layer * kLayer);
+  }
+  return mask;
 }
 
 }  // namespace
@@ -41,6 +62,19 @@ void applyToFree(const UpdateRules& rules, const VoxelMask& is_protected, BlockS
       for (float& value : plane.values) value = std::min(value, rules.most_free);
     }
   }
+}
+
+void noteHits(const UpdateRules& rules, const BlockSums& hits, SeenVoxels& seen, VoxelMask& hit) {
+  VoxelMask may_move;
+  for (const BlockSums::Plane& plane : hits) {
+    (rules.fixed[plane.label] ? seen.fixed : may_move) |= atLeast(std::numeric_limits<float>::min(), plane);
+  }
+  hit = seen.fixed | may_move;
+  seen.fixed &= ~may_move;
+}
+
+void noteFree(const UpdateRules& rules, const BlockSums& free, const VoxelMask& hit, SeenVoxels& seen) {
+  for (const BlockSums::Plane& plane : free) seen.crossed = atLeast(rules.most_free, plane) & ~hit;
 }
 
 }  // namespace bki_mapping

@@ -2,9 +2,11 @@
 /// memory: UpdateLimits in map_updater.h.)
 #pragma once
 
+#include <bitset>
 #include <limits>
 
 #include "update/block_sums.h"
+#include "update/void_search.h"
 
 namespace bki_mapping {
 
@@ -14,8 +16,11 @@ struct UpdateRules {
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
   float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
   float most_free = std::numeric_limits<float>::infinity();
+  float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
+  std::bitset<256> fixed;      ///< the classes that cannot move, for VoidSearch
 
   bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
+  bool seeksVoids() const { return void_evidence > 0.0f; }
 };
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
@@ -24,5 +29,11 @@ void applyToHits(const UpdateRules& rules, BlockSums& hits, VoxelMask& is_protec
 
 /// Applies the rules to the free space of one block.
 void applyToFree(const UpdateRules& rules, const VoxelMask& is_protected, BlockSums& free);
+
+/// Notes what the hits of one block say of its voxels. To be called before noteFree.
+void noteHits(const UpdateRules& rules, const BlockSums& hits, SeenVoxels& seen, VoxelMask& hit);
+/// Notes the voxels that beams cross. @param free after applyToFree. @param hit voxels to which hits add
+/// evidence.
+void noteFree(const UpdateRules& rules, const BlockSums& free, const VoxelMask& hit, SeenVoxels& seen);
 
 }  // namespace bki_mapping

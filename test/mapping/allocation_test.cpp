@@ -189,6 +189,7 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.free_space.evidence_before_misses = true;
       config.scan_limit.hits = 0.2;
       config.scan_limit.free = 0.1;
+      config.scan_limit.void_space = 2.0;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
     }
   }

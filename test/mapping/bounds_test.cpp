@@ -293,6 +293,15 @@ TEST(ScanLimit, BelowTheUnitOfEvidenceIsToldOf) {
   EXPECT_TRUE(has(settingWarnings(config)[0], "scan_limit/free 1e-6 is below")) << settingWarnings(config)[0];
 }
 
+TEST(ScanLimit, VoidsWithoutALimitOfFreeSpaceAreToldOf) {
+  MapperConfig config;
+  config.scan_limit.void_space = 1.0;
+  ASSERT_EQ(settingWarnings(config).size(), 1u);
+  EXPECT_TRUE(has(settingWarnings(config)[0], "scan_limit/void adds nothing without scan_limit/free"));
+  config.scan_limit.free = 0.1;
+  EXPECT_TRUE(settingWarnings(config).empty());
+}
+
 TEST(Kernel, LimitsOfItsLengthDoNotHoldForCounting) {
   MapperConfig config;
   config.kernel.length = 100.0;
@@ -332,8 +341,8 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
 
 TEST(Bounds, NoSettingMakesEvidenceInfinite) {
   const char* const names[] = {
-      "prior",           "kernel/scale",    "free_gain/dynamic",    "free_gain/living", "free_gain/static",
-      "scan_limit/hits", "scan_limit/free", "free_gain/persistence"};
+      "prior",           "kernel/scale",    "free_gain/dynamic", "free_gain/living",     "free_gain/static",
+      "scan_limit/hits", "scan_limit/free", "scan_limit/void",   "free_gain/persistence"};
   for (const char* name : names) {
     MapperConfig config;
     EXPECT_THROW(setParameters(config, {{name, "1e39"}}), std::invalid_argument) << name;

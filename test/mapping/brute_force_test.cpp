@@ -221,6 +221,34 @@ TEST_P(EveryScene, LimitsOfAScanEqualBruteForce) {
   }
 }
 
+/// The number of voxels that a scan alone sees empty with all their neighbours.
+std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
+  SemanticMapper mapper(config, reference::smallTable());
+  mapper.integrate(scan);
+  std::size_t count = 0;
+  for (const auto& entry : mapper.map().entries()) {
+    const EvidenceUnits* const free = entry.block->evidence(kFreeClass);
+    for (int v = 0; free && v < kBlockVoxels; ++v)
+      count += evidenceOf(free[v]) >= config.scan_limit.void_space;
+  }
+  return count;
+}
+
+TEST_P(EveryScene, VoidsEqualBruteForce) {
+  for (const std::string mode : {"even", "line"}) {
+    MapperConfig config = withMode(mode);
+    config.scan_limit.free = mode == "line" ? 1e-3 : 1e-4;
+    config.scan_limit.void_space = 0.5;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, " + mode);
+    config.free_space.evidence_before_misses = true;
+    config.free_space.extent = FreeSpaceExtent::kMapped;
+    if (scene_.name != "near the sensor") {
+      expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
+                             scene_.name + ", soft labels, voids, " + mode);
+    }
+  }
+}
+
 TEST_P(EveryScene, NoReturnsEqualBruteForce) {
   Scan scan = scene_.scan;
   for (int i = 0; i < 40; ++i) {
@@ -239,6 +267,26 @@ TEST_P(EveryScene, NoReturnsEqualBruteForce) {
   scan.no_returns.clear();
   scan.no_returns_at_max_range = true;
   expectEqualsBruteForce(scan, withMode("line"), scene_.name + ", points at the maximum, line");
+}
+
+TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
+  Scan scan;
+  scan.origin = {0.1, 0.2, 0.3};
+  for (int row = -12; row <= 12; ++row) {
+    for (int column = 0; column < 90; ++column) {
+      const auto elevation = 0.06f * static_cast<float>(row), azimuth = 0.07f * static_cast<float>(column);
+      scan.points.emplace_back(2.0f * std::cos(elevation) * std::cos(azimuth),
+                               2.0f * std::cos(elevation) * std::sin(azimuth), 2.0f * std::sin(elevation));
+      scan.labels.push_back(static_cast<std::uint32_t>(10 * (column % 4)));
+    }
+  }
+  MapperConfig config = withMode("line");
+  config.scan_limit.free = 1e-3;
+  config.scan_limit.void_space = 0.5;
+  expectEqualsBruteForce(scan, config, "voids among dense beams");
+  EXPECT_GT(countVoids(scan, config), 50u);
+  config.scan_limit.free = 0.0;  // nothing says what counts as seen empty
+  EXPECT_EQ(countVoids(scan, config), 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Nasty, EveryScene, testing::Range<std::size_t>(0, reference::nastyScenes(1).size()));

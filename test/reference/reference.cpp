@@ -58,7 +58,7 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
 }
 
 ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config)
-    : config_(config), geometry_(config.resolution), origin_(scan.origin) {
+    : config_(config), geometry_(config.resolution), origin_(scan.origin), classes_(classes.classes()) {
   const SensorModelConfig sensor = scan.sensor_model.value_or(config.sensor_model);
   const double max_range = sensor.max_range;
   std::vector<Point> raw, cut;
@@ -236,11 +236,59 @@ Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
   return value;
 }
 
+ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
+  const auto key = std::make_tuple(voxel.x, voxel.y, voxel.z);
+  const auto known = seen_.find(key);
+  if (known != seen_.end()) return known->second;
+  const double scale = config_.kernel.type == KernelType::kSparse ? config_.kernel.scale : 1.0;
+  bool fixed = false, may_move = false, close = false;
+  for (const SemanticClass& c : classes_) {
+    const Value hits = pointEvidence(hits_, voxel, c.id);
+    // At the edge of the kernel, single precision may round to 0.
+    close |= hits.slack > 0.0 || (hits.sum > 0.0 && hits.sum < 1e-6 * scale);
+    (c.dynamic || c.unlabelled ? may_move : fixed) |= hits.sum > 0.0;
+  }
+  const Value free = unlimited(voxel, kFreeClass);
+  const double above = free.sum - config_.scan_limit.free, tolerance = free.tolerance(scale);
+  Seen result = {Answer::kNo, Answer::kNo};
+  const bool is_free = above > tolerance;
+  if (close || (!fixed && !may_move && std::abs(above) <= tolerance)) {
+    result = {Answer::kUndecided, Answer::kUndecided};
+  } else if (!fixed && !may_move) {
+    if (is_free) result.crossed = Answer::kYes;
+  } else if (!may_move) {
+    result.fixed = Answer::kYes;
+  }
+  return seen_[key] = result;
+}
+
+ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
+  Answer answer = seen(voxel).crossed;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1 && answer != Answer::kNo; ++x) {
+        const VoxelIndex neighbour{{voxel.x + x, voxel.y + y, voxel.z + z}};
+        if (config_.free_space.extent == FreeSpaceExtent::kMapped && config_.free_space.mode == "line" &&
+            !blockIsHit(GridGeometry::blockOf(neighbour))) {
+          return Answer::kNo;
+        }
+        const Seen beside = seen(neighbour);
+        answer = std::min(answer, std::max(beside.crossed, beside.fixed));
+      }
+    }
+  }
+  return answer;
+}
+
 Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   Value value = unlimited(voxel, label);
   const ScanLimitConfig& limit = config_.scan_limit;
   if (label == kFreeClass) {
     if (limit.free > 0.0) value.sum = std::min(value.sum, limit.free);
+    if (limit.void_space == 0.0 || limit.free == 0.0) return value;
+    const Answer is_void = isVoid(voxel);
+    if (is_void == Answer::kYes) value.sum += limit.void_space;
+    if (is_void == Answer::kUndecided) value.slack += limit.void_space;
     return value;
   }
   if (limit.hits == 0.0) return value;

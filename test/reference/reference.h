@@ -63,6 +63,14 @@ class ScanReference {
 
  private:
   Value unlimited(const VoxelIndex& voxel, ClassId label) const;
+  enum class Answer { kNo, kUndecided, kYes };
+  struct Seen {
+    Answer crossed, fixed;
+  };
+  /// What the scan says of one voxel, for isVoid.
+  Seen seen(const VoxelIndex& voxel) const;
+  /// Whether the scan sees the voxel and its neighbours empty.
+  Answer isVoid(const VoxelIndex& voxel) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
   /// The evidence of all hits, whatever their class.
@@ -79,7 +87,9 @@ class ScanReference {
   std::vector<Point> hits_, samples_;
   std::vector<Point> any_hits_;  ///< the hits, all of class 0
   std::vector<Eigen::Vector3d> beams_;
+  std::vector<SemanticClass> classes_;
   mutable std::map<std::tuple<int, int, int>, bool> hit_blocks_;
+  mutable std::map<std::tuple<int, int, int>, Seen> seen_;
 };
 
 }  // namespace bki_mapping::reference

@@ -9,6 +9,9 @@ namespace bki_mapping {
 struct ScanLimitConfig {
   double hits = 0.0;  ///< for all classes together; larger sums are scaled down
   double free = 0.0;  ///< for `free`; larger sums are cut off
+  /// Further evidence for `free` where a voxel and its 26 neighbours are all seen, and all empty but for
+  /// classes that cannot move; needs `free`. 0: none.
+  double void_space = 0.0;
   /// Largest number of blocks that the hits of a scan, or its free space, may touch; 0: the number within the
   /// sensor's reach, at most kMostBlocks. A larger scan is refused.
   std::int64_t blocks = 0;
