@@ -106,6 +106,7 @@ foreach(name damaged_file hostile_file tile_codec)
   target_link_libraries(${name}_test PRIVATE SQLite::SQLite3 ZLIB::ZLIB)
 endforeach()
 bki_mapping_unit_tests(store map_clear map_merge migration)
+bki_mapping_unit_tests(query points)
 bki_mapping_unit_tests(points downsample point_bins tile_grid)
 bki_mapping_unit_tests(update sum_kernels void_search)
 bki_mapping_unit_tests(beams beam_index instruction_sets line_setup occlusion)
@@ -153,7 +154,7 @@ add_test(NAME vector_symbols_test
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
     $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
     $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_kernel> $<TARGET_OBJECTS:bki_mapping_update>
-    $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams>
+    $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams> $<TARGET_OBJECTS:bki_mapping_query>
     $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping> $<TARGET_OBJECTS:bki_mapping_store>)
 
 if(CATKIN_ENABLE_TESTING)

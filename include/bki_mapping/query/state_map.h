@@ -1,0 +1,145 @@
+/// @file The states of a map's voxels, decided when they are first read: what all queries work on.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "bki_mapping/core/grid_table.h"
+#include "bki_mapping/map/map_query.h"
+
+namespace bki_mapping {
+
+class ThreadPool;
+
+/// States and labels of the 512 voxels of a block.
+struct alignas(64) BlockStates {
+  /// One bit for each voxel of a layer along z: bit x + 8 y, with x and y counted within the block.
+  struct Layer {
+    std::uint64_t occupied = 0, free = 0;
+  };
+
+  std::array<Layer, kBlockEdge> layers;
+  std::array<std::uint64_t, kBlockEdge> occluded{};  ///< no evidence, and an occlusion mark
+  std::array<ClassId, kBlockVoxels> labels;          ///< kFreeClass where not occupied
+  const Block* block = nullptr;                      ///< the evidence
+  bool any_occupied = false, any_free = false, all_free = false;
+
+  /// @param offset of the voxel in the block, 0 to 511.
+  VoxelState state(int offset) const {
+    const auto z = static_cast<std::size_t>(offset) / 64, bit = static_cast<std::size_t>(offset) % 64;
+    if (layers[z].occupied >> bit & 1) return VoxelState::kOccupied;
+    if (layers[z].free >> bit & 1) return VoxelState::kFree;
+    return occluded[z] >> bit & 1 ? VoxelState::kOccluded : VoxelState::kUnknown;
+  }
+};
+
+/// Indices from `min` to `max`, both inside.
+struct GridBounds {
+  GridIndex min, max;
+};
+
+/// A map prepared for queries: states and labels of each block are decided when a query first reads it, and
+/// kept. Takes 0.8 kB for each block that was read, and 4 kB for each region of 8 x 8 x 8 blocks.
+///
+/// All functions, and all queries on it, may be called from several threads at once.
+class StateMap {
+ public:
+  /// Takes microseconds. @param map which must outlive this and not change meanwhile: a snapshot.
+  /// @param threads that batches of queries use, the caller's among them; 0: all cores.
+  /// @throws std::invalid_argument if `threads` is negative or above 1024.
+  explicit StateMap(const SemanticMap& map, int threads = 0);
+  ~StateMap();
+  StateMap(const StateMap&) = delete;
+  StateMap& operator=(const StateMap&) = delete;
+
+  const SemanticMap& map() const { return map_; }
+  const GridGeometry& geometry() const { return map_.geometry(); }
+
+  /// The blocks of one region, by Region::numberOf.
+  class RegionStates;
+
+  /// @return nullptr if the map has no block in the region.
+  const RegionStates* region(const GridIndex& region) const;
+  /// @return nullptr if the map has no such block: all its voxels are unknown.
+  const BlockStates* find(const BlockIndex& index) const;
+  VoxelState state(const VoxelIndex& voxel) const;
+  /// The class of an occupied voxel; kFreeClass of any other.
+  ClassId label(const VoxelIndex& voxel) const;
+
+  /// A box of whole regions that contains all blocks [blocks]; inside out if there is none.
+  const GridBounds& blockBounds() const { return bounds_; }
+
+  /// Calls job(j) for each j in [0, jobs), on the threads given to the constructor. Several callers take
+  /// turns. @throws what the first failing job threw.
+  void parallelFor(std::size_t jobs, const std::function<void(std::size_t)>& job) const;
+
+ private:
+  const SemanticMap& map_;
+  int threads_;
+  GridTable region_position_;  ///< of each region in regions_
+  GridBounds bounds_{{1, 1, 1}, {0, 0, 0}};
+  mutable std::vector<std::atomic<RegionStates*>> regions_;  ///< nullptr: not read yet
+  mutable std::mutex pool_mutex_;
+  mutable std::unique_ptr<ThreadPool> pool_;  ///< made when first needed
+};
+
+class StateMap::RegionStates {
+ public:
+  RegionStates() = default;
+  ~RegionStates();
+  RegionStates(const RegionStates&) = delete;
+  RegionStates& operator=(const RegionStates&) = delete;
+
+  /// As StateMap::find. @param index in this region.
+  const BlockStates* find(const SemanticMap& map, const BlockIndex& index) const {
+    const BlockStates* const known = slot(index).load(std::memory_order_acquire);
+    if (known == &kAbsent) return nullptr;
+    return known ? known : read(map, index);
+  }
+  void prefetch(const BlockIndex& index) const { __builtin_prefetch(&slot(index)); }
+
+ private:
+  static const BlockStates kAbsent;  ///< stands for blocks that the map does not have
+
+  std::atomic<const BlockStates*>& slot(const BlockIndex& index) const {
+    return blocks_[static_cast<std::size_t>(Region::numberOf(index))];
+  }
+  /// Decides a block. Threads that do so at once get the same result; one of them keeps it.
+  const BlockStates* read(const SemanticMap& map, const BlockIndex& index) const;
+
+  mutable std::array<std::atomic<const BlockStates*>, Region::kBlocks> blocks_{};
+};
+
+/// Reads blocks one after the other; faster than StateMap::find where they lie in the same region.
+class BlockReader {
+ public:
+  explicit BlockReader(const StateMap& states) : states_(states) {}
+
+  /// The region of a block, or nullptr.
+  const StateMap::RegionStates* region(const BlockIndex& index) {
+    const GridIndex wanted = SemanticMap::regionOf(index);
+    if (!is_set_ || wanted != last_) {
+      region_ = states_.region(wanted);
+      last_ = wanted;
+      is_set_ = true;
+    }
+    return region_;
+  }
+  const BlockStates* find(const BlockIndex& index) {
+    const StateMap::RegionStates* const in = region(index);
+    return in ? in->find(states_.map(), index) : nullptr;
+  }
+
+ private:
+  const StateMap& states_;
+  GridIndex last_;
+  bool is_set_ = false;
+  const StateMap::RegionStates* region_ = nullptr;
+};
+
+}  // namespace bki_mapping

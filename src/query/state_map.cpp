@@ -1,0 +1,135 @@
+#include "bki_mapping/query/state_map.h"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "parallel/thread_pool.h"
+
+namespace bki_mapping {
+namespace {
+
+static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2 &&
+                  static_cast<int>(VoxelState::kOccluded) == 3,
+              "two bits tell the states");
+
+/// Gathers the lowest bits of eight bytes.
+std::uint64_t lowestBits(std::uint64_t bytes) {
+  // Each bit is multiplied to the place in the top byte that is its byte's number.
+  return ((bytes & 0x0101010101010101u) * 0x0102040810204080u) >> 56;
+}
+
+void decide(const SemanticMap& map, const Block& block, BlockStates& states) {
+  BlockView view;
+  readBlock(map, block, BlockFields::kStates, view);
+  states.labels = view.label;
+  states.block = &block;
+  std::uint64_t any_occupied = 0, any_free = 0, all_free = ~std::uint64_t{0};
+  for (std::size_t z = 0; z < kBlockEdge; ++z) {
+    BlockStates::Layer& layer = states.layers[z];
+    for (std::size_t y = 0; y < kBlockEdge; ++y) {
+      std::uint64_t row;  // eight states
+      std::memcpy(&row, view.state.data() + kBlockEdge * (kBlockEdge * z + y), sizeof(row));
+      const std::uint64_t low = lowestBits(row), high = lowestBits(row >> 1), shift = kBlockEdge * y;
+      layer.occupied |= (high & ~low) << shift;
+      layer.free |= (low & ~high) << shift;
+      states.occluded[z] |= (low & high) << shift;
+    }
+    any_occupied |= layer.occupied;
+    any_free |= layer.free;
+    all_free &= layer.free;
+  }
+  states.any_occupied = any_occupied != 0;
+  states.any_free = any_free != 0;
+  states.all_free = all_free == ~std::uint64_t{0};
+}
+
+}  // namespace
+
+const BlockStates StateMap::RegionStates::kAbsent{};
+
+StateMap::RegionStates::~RegionStates() {
+  for (const auto& slot : blocks_) {
+    const BlockStates* const states = slot.load(std::memory_order_relaxed);
+    if (states != &kAbsent) delete states;
+  }
+}
+
+const BlockStates* StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
+  const Block* const block = map.find(index);
+  const BlockStates* known = nullptr;
+  if (!block) {
+    slot(index).store(&kAbsent, std::memory_order_release);
+    return nullptr;
+  }
+  auto states = std::make_unique<BlockStates>();
+  decide(map, *block, *states);
+  if (!slot(index).compare_exchange_strong(known, states.get(), std::memory_order_acq_rel)) return known;
+  return states.release();
+}
+
+StateMap::StateMap(const SemanticMap& map, int threads) : map_(map), threads_(threads) {
+  constexpr int kMostThreads = 1024;
+  if (threads < 0 || threads > kMostThreads) {
+    throw std::invalid_argument("the number of threads of a StateMap is " + std::to_string(threads) +
+                                "; give 0 (all cores) to " + std::to_string(kMostThreads));
+  }
+  const std::vector<GridIndex> regions = map.regions();
+  regions_ = std::vector<std::atomic<RegionStates*>>(regions.size());
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    region_position_.insert(regions[r], static_cast<std::uint32_t>(r));
+  }
+  if (regions.empty()) return;
+  GridIndex low = regions.front(), high = low;
+  for (const GridIndex& region : regions) {
+    low = {std::min(low.x, region.x), std::min(low.y, region.y), std::min(low.z, region.z)};
+    high = {std::max(high.x, region.x), std::max(high.y, region.y), std::max(high.z, region.z)};
+  }
+  constexpr std::int32_t kEdge = Region::kEdge;
+  bounds_.min = {low.x * kEdge, low.y * kEdge, low.z * kEdge};
+  bounds_.max = {high.x * kEdge + kEdge - 1, high.y * kEdge + kEdge - 1, high.z * kEdge + kEdge - 1};
+}
+
+StateMap::~StateMap() {
+  for (const auto& region : regions_) delete region.load(std::memory_order_relaxed);
+}
+
+const StateMap::RegionStates* StateMap::region(const GridIndex& region) const {
+  const std::uint32_t position = region_position_.find(region);
+  if (position == kNoPosition) return nullptr;
+  RegionStates* known = regions_[position].load(std::memory_order_acquire);
+  if (known) return known;
+  auto states = std::make_unique<RegionStates>();
+  if (!regions_[position].compare_exchange_strong(known, states.get(), std::memory_order_acq_rel)) {
+    return known;
+  }
+  return states.release();
+}
+
+const BlockStates* StateMap::find(const BlockIndex& index) const {
+  const RegionStates* const in = region(SemanticMap::regionOf(index));
+  return in ? in->find(map_, index) : nullptr;
+}
+
+VoxelState StateMap::state(const VoxelIndex& voxel) const {
+  const BlockStates* const states = find(GridGeometry::blockOf(voxel));
+  return states ? states->state(GridGeometry::offsetInBlock(voxel)) : VoxelState::kUnknown;
+}
+
+ClassId StateMap::label(const VoxelIndex& voxel) const {
+  const BlockStates* const states = find(GridGeometry::blockOf(voxel));
+  return states ? states->labels[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] : kFreeClass;
+}
+
+void StateMap::parallelFor(std::size_t jobs, const std::function<void(std::size_t)>& job) const {
+  if (jobs <= 1 || threads_ == 1) {
+    for (std::size_t j = 0; j < jobs; ++j) job(j);
+    return;
+  }
+  const std::lock_guard<std::mutex> lock(pool_mutex_);
+  if (!pool_) pool_ = std::make_unique<ThreadPool>(threads_);
+  pool_->forEach(jobs, [&](std::size_t j, std::size_t) { job(j); });
+}
+
+}  // namespace bki_mapping
