@@ -53,8 +53,10 @@ class RayWalk {
     return changed >> shift == 0;
   }
 
-  /// Moves on to the first voxel outside of the present cube of 2^n voxels, n = `shift`.
-  void leave(int shift) {
+  /// Moves on to the first voxel outside of the present cube of 2^n voxels, n = `shift`. @return the last
+  /// voxel in the cube, or, where the ray leaves through an edge, one beyond which it crosses none in the
+  /// cube.
+  VoxelIndex leave(int shift) {
     std::array<std::int32_t, 3> face;
     std::array<double, 3> at;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -62,10 +64,13 @@ class RayWalk {
       at[a] = faceAt(a, face[a]);
     }
     entered_ = std::min({at[0], at[1], at[2]});
+    std::array<std::int32_t, 3> last;
     for (std::size_t a = 0; a < 3; ++a) {
       index_[a] = at[a] <= entered_ ? face[a] : indexAfter(a, entered_);
+      last[a] = std::min(index_[a], face[a] - 1) ^ mirror_[a];
     }
     setNext();
+    return {{last[0], last[1], last[2]}};
   }
 
   /// Moves on to the voxel that the ray crosses just after `length`, if that is ahead [directions].

@@ -62,7 +62,7 @@ Range within(const GridBounds& blocks, const Eigen::Vector3d& origin, const Eige
 class RayCaster {
  public:
   RayCaster(const StateMap& states, const RayStops& stops)
-      : states_(states), stops_(stops), reader_(states) {}
+      : states_(states), stops_(stops), stops_at_occupied_(!stops.classes.empty()), reader_(states) {}
 
   /// @param ray checked.
   RayHit cast(const Ray& ray) {
@@ -98,11 +98,38 @@ class RayCaster {
       if (hit_.end == RayEnd::kNothing) walk.leave(region ? kBlockShift : kRegionShift);
       return;
     }
-    if (!block->any_occupied && (!seeks_unknown_ || block->all_free)) return walk.leave(kBlockShift);
+    RayWalk beyond = walk;
+    const VoxelIndex last = beyond.leave(kBlockShift);
+    if (!mayStop(*block, walk.voxel(), last)) {
+      walk = beyond;
+      return;
+    }
     do {
       meetVoxel(walk, *block);
       if (hit_.end != RayEnd::kNothing) return;
     } while (walk.step(kBlockShift) && walk.entered() < end_);
+  }
+
+  /// Whether anything can happen to the ray in the box between two voxels of a block.
+  bool mayStop(const BlockStates& block, const VoxelIndex& one, const VoxelIndex& other) const {
+    const bool may_hit = block.any_occupied && stops_at_occupied_;
+    if (!may_hit && (!seeks_unknown_ || block.all_free)) return false;
+    const auto ofBoth = [](std::int32_t a, std::int32_t b) {
+      const auto m = static_cast<unsigned>(a) % kBlockEdge, n = static_cast<unsigned>(b) % kBlockEdge;
+      return std::make_pair(std::min(m, n), std::max(m, n));
+    };
+    const auto [low_x, high_x] = ofBoth(one.x, other.x);
+    const auto [low_y, high_y] = ofBoth(one.y, other.y);
+    const auto [low_z, high_z] = ofBoth(one.z, other.z);
+    constexpr std::uint64_t kAll = ~std::uint64_t{0}, kColumn = kAll / 0xff;
+    const std::uint64_t row = (2u << high_x) - (1u << low_x);
+    const std::uint64_t box = row * kColumn & kAll << kBlockEdge * low_y & kAll >> kBlockEdge * (7 - high_y);
+    std::uint64_t found = 0;
+    for (unsigned z = low_z; z <= high_z; ++z) {
+      const BlockStates::Layer& layer = block.layers[z];
+      found |= seeks_unknown_ ? ~layer.free : layer.occupied;
+    }
+    return (found & box) != 0;
   }
 
   void meetVoxel(const RayWalk& walk, const BlockStates& block) {
@@ -133,6 +160,7 @@ class RayCaster {
 
   const StateMap& states_;
   const RayStops& stops_;
+  bool stops_at_occupied_;
   BlockReader reader_;
   // Of the present ray, lengths in units of its direction:
   double end_ = 0.0;
