@@ -47,7 +47,8 @@ bki_mapping_core_room(update SOURCES
     sum_kernels.cpp sum_kernels_avx2.cpp sum_kernels_avx512.cpp sum_kernels_generic.cpp
     sum_sink.cpp update_rules.cpp void_search.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
-bki_mapping_core_room(query SOURCES class_set.cpp points.cpp rays.cpp state_map.cpp
+bki_mapping_core_room(query SOURCES
+    class_set.cpp frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp

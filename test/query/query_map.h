@@ -60,7 +60,7 @@ inline SemanticMap queryMap(unsigned seed, const QueryMapKind& kind = {}) {
 
 /// The voxels along each axis on which a map of this kind may have something, and some beyond.
 inline int extentOf(const QueryMapKind& kind) {
-  return kind.blocks * kBlockEdge + 6;
+  return kind.blocks * kBlockEdge + 10;
 }
 
 }  // namespace bki_mapping

@@ -30,6 +30,8 @@ class ClassSet {
   void insert(ClassId id);
   /// @param id also kFreeClass, which is never in a set.
   bool contains(ClassId id) const { return ids_[id]; }
+  /// Whether the sets have a class in common.
+  bool intersects(const ClassSet& other) const { return (ids_ & other.ids_).any(); }
   std::size_t size() const { return ids_.count(); }
   bool empty() const { return ids_.none(); }
   /// The ids, rising.
