@@ -48,7 +48,9 @@ bki_mapping_core_room(update SOURCES
     sum_sink.cpp update_rules.cpp void_search.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(query SOURCES
-    class_set.cpp frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp section.cpp shapes.cpp state_map.cpp
+    class_set.cpp distance_field.cpp
+    distance_kernels.cpp distance_kernels_avx2.cpp distance_kernels_avx512.cpp distance_kernels_generic.cpp
+    frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp

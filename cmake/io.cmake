@@ -45,5 +45,5 @@ bki_mapping_tool(benchmark_store)
 find_package(benchmark QUIET)  # Google Benchmark: for developers
 if(benchmark_FOUND)
   add_executable(benchmark_parts benchmark/benchmark_parts.cpp)
-  bki_mapping_tool(benchmark_parts benchmark::benchmark)
+  bki_mapping_tool(benchmark_parts bki_mapping_query benchmark::benchmark)
 endif()
