@@ -92,28 +92,29 @@ class RayCaster {
   void walkThroughBlock(RayWalk& walk) {
     const BlockIndex index = GridGeometry::blockOf(walk.voxel());
     const StateMap::RegionStates* const region = reader_.region(index);
-    const BlockStates* const block = region ? region->find(states_.map(), index) : nullptr;
-    if (!block) {
+    const StateMap::RegionStates::Glance glance =
+        region ? region->glance(states_.map(), index) : StateMap::RegionStates::Glance();
+    if (!glance.block) {
       meetUnknown(walk);
       if (hit_.end == RayEnd::kNothing) walk.leave(region ? kBlockShift : kRegionShift);
       return;
     }
     RayWalk beyond = walk;
     const VoxelIndex last = beyond.leave(kBlockShift);
-    if (!mayStop(*block, walk.voxel(), last)) {
+    const bool may_hit = glance.any_occupied && stops_at_occupied_,
+               may_be_unknown = seeks_unknown_ && !glance.all_free;
+    if (!(may_hit || may_be_unknown) || !mayStop(*glance.block, walk.voxel(), last)) {
       walk = beyond;
       return;
     }
     do {
-      meetVoxel(walk, *block);
+      meetVoxel(walk, *glance.block);
       if (hit_.end != RayEnd::kNothing) return;
     } while (walk.step(kBlockShift) && walk.entered() < end_);
   }
 
   /// Whether anything can happen to the ray in the box between two voxels of a block.
   bool mayStop(const BlockStates& block, const VoxelIndex& one, const VoxelIndex& other) const {
-    const bool may_hit = block.any_occupied && stops_at_occupied_;
-    if (!may_hit && (!seeks_unknown_ || block.all_free)) return false;
     const auto ofBoth = [](std::int32_t a, std::int32_t b) {
       const auto m = static_cast<unsigned>(a) % kBlockEdge, n = static_cast<unsigned>(b) % kBlockEdge;
       return std::make_pair(std::min(m, n), std::max(m, n));

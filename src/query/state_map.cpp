@@ -47,26 +47,25 @@ void decide(const SemanticMap& map, const Block& block, BlockStates& states) {
 
 }  // namespace
 
-const BlockStates StateMap::RegionStates::kAbsent{};
-
 StateMap::RegionStates::~RegionStates() {
-  for (const auto& slot : blocks_) {
-    const BlockStates* const states = slot.load(std::memory_order_relaxed);
-    if (states != &kAbsent) delete states;
-  }
+  for (const auto& slot : blocks_) delete glanceOf(slot.load(std::memory_order_relaxed)).block;
 }
 
-const BlockStates* StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
+std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
   const Block* const block = map.find(index);
-  const BlockStates* known = nullptr;
   if (!block) {
-    slot(index).store(&kAbsent, std::memory_order_release);
-    return nullptr;
+    slot(index).store(kAbsent, std::memory_order_release);
+    return kAbsent;
   }
   auto states = std::make_unique<BlockStates>();
   decide(map, *block, *states);
-  if (!slot(index).compare_exchange_strong(known, states.get(), std::memory_order_acq_rel)) return known;
-  return states.release();
+  const std::uintptr_t decided = reinterpret_cast<std::uintptr_t>(states.get()) |
+                                 (states->any_occupied ? kAnyOccupied : 0) |
+                                 (states->all_free ? kAllFree : 0);
+  std::uintptr_t known = kNotRead;
+  if (!slot(index).compare_exchange_strong(known, decided, std::memory_order_acq_rel)) return known;
+  states.release();
+  return decided;
 }
 
 StateMap::StateMap(const SemanticMap& map, int threads) : map_(map), threads_(threads) {

@@ -95,24 +95,39 @@ class StateMap::RegionStates {
   RegionStates(const RegionStates&) = delete;
   RegionStates& operator=(const RegionStates&) = delete;
 
+  /// A block, and what can be said of it without reading from its memory.
+  struct Glance {
+    const BlockStates* block = nullptr;  ///< nullptr if the map has no such block
+    bool any_occupied = false, all_free = false;
+  };
+
+  /// @param index in this region.
+  Glance glance(const SemanticMap& map, const BlockIndex& index) const {
+    const std::uintptr_t known = slot(index).load(std::memory_order_acquire);
+    return glanceOf(known != kNotRead ? known : read(map, index));
+  }
   /// As StateMap::find. @param index in this region.
   const BlockStates* find(const SemanticMap& map, const BlockIndex& index) const {
-    const BlockStates* const known = slot(index).load(std::memory_order_acquire);
-    if (known == &kAbsent) return nullptr;
-    return known ? known : read(map, index);
+    return glance(map, index).block;
   }
   void prefetch(const BlockIndex& index) const { __builtin_prefetch(&slot(index)); }
 
  private:
-  static const BlockStates kAbsent;  ///< stands for blocks that the map does not have
+  // A slot is a pointer to BlockStates with flags in the lowest bits, which the alignment leaves 0.
+  static constexpr std::uintptr_t kNotRead = 0, kAnyOccupied = 1, kAllFree = 2, kAbsent = 4, kFlags = 7;
+  static_assert(alignof(BlockStates) > kFlags);
 
-  std::atomic<const BlockStates*>& slot(const BlockIndex& index) const {
+  static Glance glanceOf(std::uintptr_t slot) {
+    return {reinterpret_cast<const BlockStates*>(slot & ~kFlags), (slot & kAnyOccupied) != 0,
+            (slot & kAllFree) != 0};
+  }
+  std::atomic<std::uintptr_t>& slot(const BlockIndex& index) const {
     return blocks_[static_cast<std::size_t>(Region::numberOf(index))];
   }
-  /// Decides a block. Threads that do so at once get the same result; one of them keeps it.
-  const BlockStates* read(const SemanticMap& map, const BlockIndex& index) const;
+  /// Decides a block. Threads that do so at once get the same result; one of them keeps it. @return the slot.
+  std::uintptr_t read(const SemanticMap& map, const BlockIndex& index) const;
 
-  mutable std::array<std::atomic<const BlockStates*>, Region::kBlocks> blocks_{};
+  mutable std::array<std::atomic<std::uintptr_t>, Region::kBlocks> blocks_{};
 };
 
 /// Reads blocks one after the other; faster than StateMap::find where they lie in the same region.
