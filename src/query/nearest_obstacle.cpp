@@ -68,21 +68,38 @@ class Search {
   void lookAtBlock(const BlockIndex& index) {
     if (squaredDistance(point_, index, kBlockEdge) > nearest_) return;
     const BlockStates* const block = reader_.find(index);
-    if (!block || !block->any_occupied) return;
-    for (std::size_t z = 0; z < kBlockEdge; ++z) {
-      for (std::uint64_t bits = block->layers[z].occupied; bits != 0; bits &= bits - 1) {
-        const std::size_t offset = 64 * z + static_cast<std::size_t>(__builtin_ctzll(bits));
-        const VoxelIndex voxel = GridGeometry::voxelOf(index, static_cast<int>(offset));
-        const double distance =
-            (Eigen::Vector3d(voxel.x + 0.5, voxel.y + 0.5, voxel.z + 0.5) - point_).squaredNorm();
-        if (distance > nearest_ || (found_ && distance == nearest_ && !(voxel < voxel_))) continue;
-        if (!classes_.contains(block->labels[offset])) continue;
-        found_ = true;
-        nearest_ = distance;
-        voxel_ = voxel;
-        label_ = block->labels[offset];
+    if (!block || !block->any_occupied || !mayHold(*block->block)) return;
+    const VoxelIndex first = GridGeometry::voxelOf(index, 0);
+    const auto squared = [](double x) { return x * x; };
+    for (std::int32_t z = 0; z < kBlockEdge; ++z) {
+      const double along_z = squared(first.z + z + 0.5 - point_.z());
+      const std::uint64_t occupied = block->layers[static_cast<std::size_t>(z)].occupied;
+      if (occupied == 0 || along_z > nearest_) continue;
+      for (std::int32_t y = 0; y < kBlockEdge; ++y) {
+        const double across_x = along_z + squared(first.y + y + 0.5 - point_.y());
+        if (across_x > nearest_) continue;
+        for (std::uint64_t row = occupied >> kBlockEdge * y & 0xff; row != 0; row &= row - 1) {
+          const std::int32_t x = first.x + __builtin_ctzll(row);
+          consider({{x, first.y + y, first.z + z}}, across_x + squared(x + 0.5 - point_.x()), *block);
+        }
       }
     }
+  }
+
+  /// Whether a voxel of the block may be of one of the classes: of others it has no evidence.
+  bool mayHold(const Block& block) const {
+    return std::any_of(block.classes().begin(), block.classes().end(),
+                       [&](ClassId id) { return classes_.contains(id); });
+  }
+
+  void consider(const VoxelIndex& voxel, double distance, const BlockStates& block) {
+    if (distance > nearest_ || (found_ && distance == nearest_ && !(voxel < voxel_))) return;
+    const ClassId label = block.labels[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))];
+    if (!classes_.contains(label)) return;
+    found_ = true;
+    nearest_ = distance;
+    voxel_ = voxel;
+    label_ = label;
   }
 
   const StateMap& states_;
