@@ -1,9 +1,12 @@
 #include "bki_mapping/query/distance_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "query/distance_kernels.h"
 #include "query/voxel_rows.h"
@@ -40,6 +43,14 @@ std::uint64_t obstaclesIn(const BlockStates* block, std::size_t z, const Obstacl
   return rules.unknown ? obstacles | ~(block->layers[z].occupied | block->layers[z].free) : obstacles;
 }
 
+/// The part of a region along an axis that a block covers.
+VoxelRange within(std::int64_t block, std::int64_t min, std::int64_t size) {
+  const auto clamp = [size](std::int64_t at) {
+    return static_cast<std::int32_t>(std::clamp<std::int64_t>(at, 0, size));
+  };
+  return {clamp(block * kBlockEdge - min), clamp((block + 1) * kBlockEdge - min)};
+}
+
 }  // namespace
 
 /// Memory for the work on one row of all layers.
@@ -48,59 +59,73 @@ struct DistanceField::RowWork {
       : row(rowScratch(field.width_)),
         squares(field.stride_),
         columns(columnScratch(field.layers_)),
-        distances(kChunk * field.layers_),
-        changed(field.stride_ / kChunk) {}
+        distances(kChunk * field.layers_) {}
 
-  Squares row, squares, columns;
+  std::vector<std::int32_t> row, squares, columns;
   std::vector<float> distances;
-  std::vector<char> changed;  ///< whether searchRow() has changed a chunk
 };
 
 DistanceField::DistanceField(const StateMap& states, const Eigen::AlignedBox3d& box,
                              const ObstacleRules& rules)
     : resolution_(states.geometry().resolution()), rules_(rules) {
+  compute(states, box);
+}
+
+void DistanceField::compute(const StateMap& states, const Eigen::AlignedBox3d& box) {
+  checkResolution(states);
   check(states.geometry(), box);
   const Eigen::Vector3d low = box.min() / resolution_, high = box.max() / resolution_;
   const VoxelRange x = overlapped(low.x(), high.x()), y = overlapped(low.y(), high.y()),
                    z = overlapped(low.z(), high.z());
-  min_ = {{x.begin, y.begin, z.begin}};
-  size_ = {x.end - x.begin, y.end - y.begin, z.end - z.begin};
-  if (size_.cast<double>().prod() > kMostVoxels || size_.maxCoeff() > kMostAlongAxis) {
-    throw std::invalid_argument("the region has " + std::to_string(size_.x()) + " x " +
-                                std::to_string(size_.y()) + " x " + std::to_string(size_.z()) +
+  const Eigen::Vector3i size(x.end - x.begin, y.end - y.begin, z.end - z.begin);
+  if (size.cast<double>().prod() > kMostVoxels || size.maxCoeff() > kMostAlongAxis) {
+    throw std::invalid_argument("the region has " + std::to_string(size.x()) + " x " +
+                                std::to_string(size.y()) + " x " + std::to_string(size.z()) +
                                 " voxels; make it smaller, 100 million and 16384 along an axis are the most");
   }
-  width_ = static_cast<std::size_t>(size_.x());
-  height_ = static_cast<std::size_t>(size_.y());
-  layers_ = static_cast<std::size_t>(size_.z());
+  const auto count = [](std::int32_t n) { return static_cast<std::size_t>(n); };
+  const std::size_t elements = wholeChunks(count(size.x())) * count(size.y()) * count(size.z());
+  if (elements > capacity_) {
+    std::unique_ptr<std::int32_t[]> along_y(new std::int32_t[elements]), in_plane(new std::int32_t[elements]);
+    distances_.reset(new float[elements]);
+    along_y_ = std::move(along_y);
+    in_plane_ = std::move(in_plane);
+    capacity_ = elements;
+  }
+  min_ = {{x.begin, y.begin, z.begin}};
+  size_ = size;
+  width_ = count(size.x());
+  height_ = count(size.y());
+  layers_ = count(size.z());
   stride_ = wholeChunks(width_);
-  along_y_.assign(stride_ * height_ * layers_, 1);
-  in_plane_.resize(along_y_.size());
-  distances_.resize(width_ * height_ * layers_);
   markObstacles(states);
   states.parallelFor(layers_, [&](std::size_t layer) {
     for (std::size_t chunk = 0; chunk < stride_; chunk += kChunk) {
-      fastest().sweepColumns(along_y_.data() + rowAt(0, layer) + chunk, stride_, height_);
+      fastest().sweepColumns(&along_y_[rowAt(0, layer) + chunk], stride_, height_);
     }
   });
   // Row by row of a plane, so that what is found along x is still in the cache when it is needed along z.
   states.parallelFor(height_, [&](std::size_t row) {
     RowWork work(*this);
-    for (std::size_t layer = 0; layer < layers_; ++layer) searchRow(row, layer, work);
+    for (std::size_t layer = 0; layer < layers_; ++layer) {
+      const std::size_t at = rowAt(row, layer);
+      fastest().searchRow(&along_y_[at], width_, work.row.data(), &in_plane_[at]);
+    }
     for (std::size_t chunk = 0; chunk < stride_; chunk += kChunk) searchColumns(chunk, row, work);
   });
 }
 
+void DistanceField::checkResolution(const StateMap& states) const {
+  if (states.geometry().resolution() != resolution_) {
+    throw std::invalid_argument(
+        "the map has voxels of another size than the distance field; make a new field");
+  }
+}
+
 template <typename Visit>
 void DistanceField::forEachVoxel(const BlockStates* block, const BlockIndex& index, Visit&& visit) {
-  const auto clipped = [](std::int64_t block_at, std::int64_t min, std::int64_t size) {
-    const auto within = [size](std::int64_t at) {
-      return static_cast<std::int32_t>(std::clamp<std::int64_t>(at, 0, size));
-    };
-    return VoxelRange{within(block_at * kBlockEdge - min), within((block_at + 1) * kBlockEdge - min)};
-  };
-  const VoxelRange x = clipped(index.x, min_.x, size_.x()), y = clipped(index.y, min_.y, size_.y()),
-                   z = clipped(index.z, min_.z, size_.z());
+  const VoxelRange x = within(index.x, min_.x, size_.x()), y = within(index.y, min_.y, size_.y()),
+                   z = within(index.z, min_.z, size_.z());
   const bool all_classes = rules_.classes == ClassSet::all();
   constexpr std::int32_t kMask = kBlockEdge - 1;
   for (std::int32_t k = z.begin; k < z.end; ++k) {
@@ -126,39 +151,32 @@ void DistanceField::markObstacles(const StateMap& states) {
     BlockReader reader(states);
     BlockIndex index = {{first.x, first.y + static_cast<std::int32_t>(job % rows),
                          first.z + static_cast<std::int32_t>(job / rows)}};
+    const VoxelRange y = within(index.y, min_.y, size_.y()), z = within(index.z, min_.z, size_.z());
+    for (std::int32_t layer = z.begin; layer < z.end; ++layer) {
+      const std::size_t at = rowAt(static_cast<std::size_t>(y.begin), static_cast<std::size_t>(layer));
+      std::fill_n(&along_y_[at], stride_ * static_cast<std::size_t>(y.end - y.begin), 1);
+    }
     for (; index.x <= last.x; ++index.x) {
       const BlockStates* const block = reader.find(index);
       if (!rules_.unknown && (!block || !block->any_occupied)) continue;
-      forEachVoxel(block, index, [&](std::size_t at, bool obstacle) { along_y_[at] = obstacle ? -1 : 1; });
+      forEachVoxel(block, index, [&](std::size_t at, bool obstacle) {
+        if (obstacle) along_y_[at] = -1;
+      });
     }
   });
 }
 
-void DistanceField::searchRow(std::size_t y, std::size_t z, RowWork& work) {
-  fastest().searchRow(along_y_.data() + rowAt(y, z), width_, work.row.data(), work.squares.data());
-  std::int32_t* const known = in_plane_.data() + rowAt(y, z);
-  for (std::size_t chunk = 0; chunk < stride_; chunk += kChunk) {
-    const std::int32_t* const squares = work.squares.data() + chunk;
-    if (!std::equal(squares, squares + kChunk, known + chunk)) work.changed[chunk / kChunk] = 1;
-  }
-  std::copy(work.squares.begin(), work.squares.end(), known);
-}
-
 void DistanceField::searchColumns(std::size_t chunk, std::size_t y, RowWork& work) {
-  fastest().searchColumns(in_plane_.data() + rowAt(y, 0) + chunk, stride_ * height_, layers_,
+  fastest().searchColumns(&in_plane_[rowAt(y, 0) + chunk], stride_ * height_, layers_,
                           static_cast<float>(resolution_), work.columns.data(), work.distances.data());
   const std::size_t count = std::min(kChunk, width_ - chunk);
   for (std::size_t z = 0; z < layers_; ++z) {
-    std::copy_n(work.distances.data() + kChunk * z, count,
-                distances_.data() + chunk + width_ * (y + height_ * z));
+    std::copy_n(&work.distances[kChunk * z], count, &distances_[chunk + width_ * (y + height_ * z)]);
   }
 }
 
 void DistanceField::update(const StateMap& states, Span<const GridIndex> changed) {
-  if (states.geometry().resolution() != resolution_) {
-    throw std::invalid_argument(
-        "the map has voxels of another size than the distance field; make a new field");
-  }
+  checkResolution(states);
   // What is to be recomputed: chunks of columns along y in each layer, and rows along x.
   const std::size_t chunks = stride_ / kChunk;
   std::vector<char> columns(chunks * layers_), rows(height_ * layers_);
@@ -172,11 +190,13 @@ void DistanceField::update(const StateMap& states, Span<const GridIndex> changed
     });
   }
   states.parallelFor(layers_, [&](std::size_t z) {
-    Squares before(kChunk * height_);
+    std::vector<std::int32_t> before(kChunk * height_);
     for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
       if (!columns[chunk + chunks * z]) continue;
-      std::int32_t* const first = along_y_.data() + rowAt(0, z) + kChunk * chunk;
-      for (std::size_t y = 0; y < height_; ++y) std::copy_n(first + stride_ * y, kChunk, &before[kChunk * y]);
+      std::int32_t* const first = &along_y_[rowAt(0, z) + kChunk * chunk];
+      for (std::size_t y = 0; y < height_; ++y) {
+        std::copy_n(first + stride_ * y, kChunk, &before[kChunk * y]);
+      }
       fastest().sweepColumns(first, stride_, height_);
       for (std::size_t y = 0; y < height_; ++y) {
         const std::int32_t* const now = first + stride_ * y;
@@ -186,22 +206,30 @@ void DistanceField::update(const StateMap& states, Span<const GridIndex> changed
   });
   states.parallelFor(height_, [&](std::size_t y) {
     RowWork work(*this);
+    std::vector<char> different(chunks);
     for (std::size_t z = 0; z < layers_; ++z) {
-      if (rows[y + height_ * z]) searchRow(y, z, work);
+      if (!rows[y + height_ * z]) continue;
+      fastest().searchRow(&along_y_[rowAt(y, z)], width_, work.row.data(), work.squares.data());
+      for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+        const std::int32_t* const squares = &work.squares[kChunk * chunk];
+        std::int32_t* const known = &in_plane_[rowAt(y, z) + kChunk * chunk];
+        if (std::equal(squares, squares + kChunk, known)) continue;
+        std::copy_n(squares, kChunk, known);
+        different[chunk] = 1;
+      }
     }
     for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-      if (work.changed[chunk]) searchColumns(kChunk * chunk, y, work);
+      if (different[chunk]) searchColumns(kChunk * chunk, y, work);
     }
   });
 }
 
 bool DistanceField::contains(const VoxelIndex& voxel) const {
-  const auto within = [](std::int32_t at, std::int32_t min, int size) {
-    const std::int64_t position = std::int64_t{at} - min;
-    return position >= 0 && position < size;
+  const auto inside = [](std::int64_t at, std::int64_t min, int size) {
+    return at >= min && at - min < size;
   };
-  return within(voxel.x, min_.x, size_.x()) && within(voxel.y, min_.y, size_.y()) &&
-         within(voxel.z, min_.z, size_.z());
+  return inside(voxel.x, min_.x, size_.x()) && inside(voxel.y, min_.y, size_.y()) &&
+         inside(voxel.z, min_.z, size_.z());
 }
 
 std::optional<DistanceField::Value> DistanceField::interpolate(const Eigen::Vector3d& point) const {
@@ -219,11 +247,11 @@ std::optional<DistanceField::Value> DistanceField::interpolate(const Eigen::Vect
   }
   double sum = 0.0;
   Eigen::Array3d slope = Eigen::Array3d::Zero();
-  for (std::size_t corner_of = 0; corner_of < 8; ++corner_of) {
-    const std::size_t x = corner_of & 1, y = corner_of >> 1 & 1, z = corner_of >> 2;
-    const double distance =
-        static_cast<double>(distances_[voxels[0][x] + width_ * (voxels[1][y] + height_ * voxels[2][z])]);
-    if (std::isinf(distance)) return Value{static_cast<float>(distance), Eigen::Vector3f::Zero()};
+  for (std::size_t n = 0; n < 8; ++n) {
+    const std::size_t x = n & 1, y = n >> 1 & 1, z = n >> 2;
+    const float nearest = distances_[voxels[0][x] + width_ * (voxels[1][y] + height_ * voxels[2][z])];
+    if (std::isinf(nearest)) return Value{nearest, Eigen::Vector3f::Zero()};
+    const auto distance = static_cast<double>(nearest);
     const Eigen::Array3d weight(x ? share.x() : 1.0 - share.x(), y ? share.y() : 1.0 - share.y(),
                                 z ? share.z() : 1.0 - share.z());
     sum += weight.prod() * distance;

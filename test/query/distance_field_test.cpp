@@ -68,6 +68,10 @@ Eigen::AlignedBox3d boxOf(double x, double y, double z, double size_x, double si
   return {Eigen::Vector3d(x, y, z), Eigen::Vector3d(x + size_x, y + size_y, z + size_z)};
 }
 
+std::vector<float> copyOf(const DistanceField& field) {
+  return {field.distances().begin(), field.distances().end()};
+}
+
 TEST(DistanceField, EqualsBruteForce) {
   for (const double occupied : {0.1, 0.002}) {
     QueryMapKind kind;
@@ -83,6 +87,20 @@ TEST(DistanceField, EqualsBruteForce) {
       expectBruteForce(map, DistanceField(states, box, {{7}, true}));
     }
   }
+}
+
+TEST(DistanceField, OfAnotherBoxEqualsANewOne) {
+  const SemanticMap map = queryMap(49);
+  const StateMap states(map, 2);
+  DistanceField field(states, boxOf(-2, -3, -2, 3, 4, 3));
+  for (const Eigen::AlignedBox3d& box :
+       {boxOf(-1, -3, 0, 2, 2, 2), boxOf(-4, -3, -2, 7, 6, 5), boxOf(0, 0, 0, 0.1, 5, 2)}) {
+    field.compute(states, box);
+    ASSERT_EQ(copyOf(field), copyOf(DistanceField(states, box)));
+  }
+  const std::vector<float> before = copyOf(field);
+  EXPECT_THROW(field.compute(states, boxOf(0, 0, 0, 300, 300, 300)), std::invalid_argument);
+  EXPECT_EQ(copyOf(field), before);
 }
 
 TEST(DistanceField, IsInfiniteWithoutObstaclesAndWithNothingElse) {
@@ -186,7 +204,7 @@ TEST(DistanceField, UpdatedEqualsNew) {
       const SemanticMap snapshot = map.snapshot();
       const StateMap states(snapshot, 2);
       field.update(states, changed);
-      ASSERT_EQ(field.distances(), DistanceField(states, box, rules).distances()) << round;
+      ASSERT_EQ(copyOf(field), copyOf(DistanceField(states, box, rules))) << round;
     }
     field.update(before, {});
     const SemanticMap other(GridGeometry(0.3), 0.001, 3);

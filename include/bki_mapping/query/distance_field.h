@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
-#include <vector>
 
 #include "bki_mapping/query/class_set.h"
 #include "bki_mapping/query/span.h"
@@ -35,6 +35,12 @@ class DistanceField {
   /// grid.
   DistanceField(const StateMap& states, const Eigen::AlignedBox3d& box, const ObstacleRules& rules = {});
 
+  /// Makes the field one of another box, for instance one that has moved with the robot. Reuses its memory,
+  /// so that nothing is allocated unless the box holds more voxels than before: much of a new field's time
+  /// goes into memory that the system has to provide.
+  /// @throws std::invalid_argument as the constructor; the field is then unchanged.
+  void compute(const StateMap& states, const Eigen::AlignedBox3d& box);
+
   /// Makes the field that of another map of the same grid, equal to the bit to a new one, from a snapshot
   /// that was taken later, for instance. Recomputes the lines of voxels that contain a change: of the
   /// obstacles along y, of the results of that along x, and of those along z.
@@ -52,8 +58,8 @@ class DistanceField {
   /// [m]; infinite without an obstacle in the region, minus infinite without anything else.
   /// @param voxel in the region.
   float distance(const VoxelIndex& voxel) const { return distances_[positionOf(voxel)]; }
-  /// All distances: x fastest, then y, then z.
-  const std::vector<float>& distances() const { return distances_; }
+  /// All distances: x fastest, then y, then z. Valid until compute() or the destructor.
+  Span<const float> distances() const { return {distances_.get(), width_ * height_ * layers_}; }
 
   struct Value {
     float distance;            ///< [m]
@@ -65,8 +71,6 @@ class DistanceField {
   std::optional<Value> interpolate(const Eigen::Vector3d& point) const;
 
  private:
-  using Squares = std::vector<std::int32_t>;
-
   std::size_t positionOf(const VoxelIndex& voxel) const {
     const auto x = static_cast<std::size_t>(voxel.x - min_.x), y = static_cast<std::size_t>(voxel.y - min_.y),
                z = static_cast<std::size_t>(voxel.z - min_.z);
@@ -81,8 +85,8 @@ class DistanceField {
   /// @param block nullptr if the map does not have it.
   template <typename Visit>
   void forEachVoxel(const BlockStates* block, const BlockIndex& index, Visit&& visit);
+  void checkResolution(const StateMap& states) const;
   void markObstacles(const StateMap& states);
-  void searchRow(std::size_t y, std::size_t z, RowWork& work);
   void searchColumns(std::size_t chunk, std::size_t y, RowWork& work);
 
   double resolution_;
@@ -91,10 +95,12 @@ class DistanceField {
   Eigen::Vector3i size_;
   std::size_t width_, height_, layers_;  ///< size_
   std::size_t stride_;                   ///< elements from row to row in along_y_ and in_plane_
+  std::size_t capacity_ = 0;             ///< elements of each array
+  // Arrays, which are left uninitialised, so that the threads that fill them are the first to touch them.
   // Squared distances [voxels^2], positive in free voxels, negative in obstacles:
-  Squares along_y_;   ///< within the line along y
-  Squares in_plane_;  ///< within the plane of x and y
-  std::vector<float> distances_;
+  std::unique_ptr<std::int32_t[]> along_y_;   ///< within the line along y
+  std::unique_ptr<std::int32_t[]> in_plane_;  ///< within the plane of x and y
+  std::unique_ptr<float[]> distances_;
 };
 
 }  // namespace bki_mapping
