@@ -48,7 +48,7 @@ bki_mapping_core_room(update SOURCES
     sum_sink.cpp update_rules.cpp void_search.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(query SOURCES
-    class_set.cpp distance_field.cpp
+    class_filter.cpp distance_field.cpp
     distance_kernels.cpp distance_kernels_avx2.cpp distance_kernels_avx512.cpp distance_kernels_generic.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)

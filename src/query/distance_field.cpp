@@ -126,7 +126,7 @@ template <typename Visit>
 void DistanceField::forEachVoxel(const BlockStates* block, const BlockIndex& index, Visit&& visit) {
   const VoxelRange x = within(index.x, min_.x, size_.x()), y = within(index.y, min_.y, size_.y()),
                    z = within(index.z, min_.z, size_.z());
-  const bool all_classes = rules_.classes == ClassSet::all();
+  const bool all_classes = rules_.classes == ClassFilter::all();
   constexpr std::int32_t kMask = kBlockEdge - 1;
   for (std::int32_t k = z.begin; k < z.end; ++k) {
     const std::uint64_t obstacles =
@@ -175,7 +175,7 @@ void DistanceField::searchColumns(std::size_t chunk, std::size_t y, RowWork& wor
   }
 }
 
-void DistanceField::update(const StateMap& states, Span<const GridIndex> changed) {
+void DistanceField::update(const StateMap& states, ArrayView<const GridIndex> changed) {
   checkResolution(states);
   // What is to be recomputed: chunks of columns along y in each layer, and rows along x.
   const std::size_t chunks = stride_ / kChunk;

@@ -19,7 +19,7 @@ double squaredDistance(const Eigen::Vector3d& point, const GridIndex& cube, doub
 class Search {
  public:
   /// @param point, most [voxels].
-  Search(const StateMap& states, const Eigen::Vector3d& point, const ClassSet& classes, double most)
+  Search(const StateMap& states, const Eigen::Vector3d& point, const ClassFilter& classes, double most)
       : states_(states), reader_(states), point_(point), classes_(classes), nearest_(most * most) {}
 
   /// Looks at the blocks around the point, in rings of blocks, nearest first; then at what may be nearer
@@ -105,7 +105,7 @@ class Search {
   const StateMap& states_;
   BlockReader reader_;
   Eigen::Vector3d point_;
-  ClassSet classes_;
+  ClassFilter classes_;
   double nearest_;  ///< squared distance of the nearest so far [voxels^2]
   bool found_ = false;
   VoxelIndex voxel_;
@@ -115,7 +115,7 @@ class Search {
 }  // namespace
 
 std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
-                                               const ClassSet& classes, double max_distance) {
+                                               const ClassFilter& classes, double max_distance) {
   if (!states.geometry().contains(point)) {
     throw std::invalid_argument(
         "the point is not finite or lies beyond the map's grid; give one within the map");

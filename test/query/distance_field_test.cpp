@@ -83,7 +83,7 @@ TEST(DistanceField, EqualsBruteForce) {
           boxOf(0, 0, 0, 4, 0.1, 0.1), boxOf(1, 2, -3, 0.1, 3, 0.1), boxOf(-5, -5, -5, 0.1, 0.1, 6),
           boxOf(5, 5, 5, 4.4, 4.3, 4.2)}) {
       expectBruteForce(map, DistanceField(states, box));
-      expectBruteForce(map, DistanceField(states, box, {ClassSet::allBut({3, 7}), false}));
+      expectBruteForce(map, DistanceField(states, box, {ClassFilter::allBut({3, 7}), false}));
       expectBruteForce(map, DistanceField(states, box, {{7}, true}));
     }
   }

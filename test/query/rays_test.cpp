@@ -239,9 +239,9 @@ TEST(CastRay, EqualsLookingAtEveryVoxel) {
   known.occupied = 0.01;
   expectSlowlyCast(dense, {}, 11, 400);
   expectSlowlyCast(sparse, {}, 12, 600);
-  expectSlowlyCast(known, {ClassSet::all(), true}, 13, 400);
-  expectSlowlyCast(sparse, {ClassSet::all(), true}, 14, 300);
-  expectSlowlyCast(sparse, {ClassSet::allBut({3, 7}), false}, 15, 400);
+  expectSlowlyCast(known, {ClassFilter::all(), true}, 13, 400);
+  expectSlowlyCast(sparse, {ClassFilter::all(), true}, 14, 300);
+  expectSlowlyCast(sparse, {ClassFilter::allBut({3, 7}), false}, 15, 400);
   expectSlowlyCast(sparse, {{}, true}, 16, 300);
 }
 
@@ -319,20 +319,20 @@ TEST(CastRay, RefusesWhatIsNoRay) {
   EXPECT_THROW(castRays(StateMap(map), std::vector<Ray>(2), {}, hits), std::invalid_argument);
 }
 
-TEST(ClassSet, KnowsNamesAndIds) {
+TEST(ClassFilter, KnowsNamesAndIds) {
   SemanticClass road, car;
   road.id = 4;
   road.name = "road";
   car.id = 9;
   car.name = "car";
   const ClassTable table("toy", {road, car});
-  EXPECT_EQ(ClassSet::of(table, {"car"}), ClassSet({9}));
-  EXPECT_EQ(ClassSet::allBut({9}).size(), kMaxClasses - 1);
-  EXPECT_FALSE(ClassSet::all().contains(kFreeClass));
-  EXPECT_EQ((ClassSet{9, 4}).ids(), (std::vector<ClassId>{4, 9}));
-  EXPECT_THROW(ClassSet{254}, std::invalid_argument);
+  EXPECT_EQ(ClassFilter::of(table, {"car"}), ClassFilter({9}));
+  EXPECT_EQ(ClassFilter::allBut({9}).size(), kMaxClasses - 1);
+  EXPECT_FALSE(ClassFilter::all().contains(kFreeClass));
+  EXPECT_EQ((ClassFilter{9, 4}).ids(), (std::vector<ClassId>{4, 9}));
+  EXPECT_THROW(ClassFilter{254}, std::invalid_argument);
   try {
-    ClassSet::of(table, {"rode", "car", "cat"});
+    ClassFilter::of(table, {"rode", "car", "cat"});
     FAIL();
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(), "class table 'toy' has no class 'rode', 'cat'; it has: road, car");

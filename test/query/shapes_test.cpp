@@ -233,7 +233,7 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
     for (int n = 0; n < 100; ++n) {
       Eigen::Vector3d point(coordinate(random), coordinate(random), coordinate(random));
       if (n % 3 == 0) point = (point * 4).array().round() / 4;  // many are equally near
-      const ClassSet classes = n % 2 == 0 ? ClassSet::all() : ClassSet{3, 9};
+      const ClassFilter classes = n % 2 == 0 ? ClassFilter::all() : ClassFilter{3, 9};
       const double most = n % 5 == 0 ? 1.5 : kInfinity;
       std::optional<NearestObstacle> expected;
       for (const auto& [voxel, label] : obstacles) {
@@ -256,8 +256,8 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
     EXPECT_GT(missing, 0);
     EXPECT_LT(missing, 50);
     EXPECT_THROW(nearestObstacle(states, {kNan, 0, 0}), std::invalid_argument);
-    EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassSet::all(), -1.0), std::invalid_argument);
-    EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassSet::all(), kNan), std::invalid_argument);
+    EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassFilter::all(), -1.0), std::invalid_argument);
+    EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassFilter::all(), kNan), std::invalid_argument);
   }
 }
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include "bki_mapping/query/class_set.h"
+#include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
 namespace bki_mapping {
@@ -24,7 +24,7 @@ struct NearestObstacle {
 /// @throws std::invalid_argument if a coordinate is not finite or beyond the grid, or max_distance is
 /// negative or NaN.
 std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
-                                               const ClassSet& classes = ClassSet::all(),
+                                               const ClassFilter& classes = ClassFilter::all(),
                                                double max_distance = std::numeric_limits<double>::infinity());
 
 }  // namespace bki_mapping

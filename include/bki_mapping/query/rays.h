@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <limits>
 
-#include "bki_mapping/query/class_set.h"
-#include "bki_mapping/query/span.h"
+#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
 namespace bki_mapping {
@@ -24,8 +24,9 @@ struct Ray {
 
 /// Where rays stop.
 struct RayStops {
-  ClassSet classes = ClassSet::all();  ///< at occupied voxels of these classes; others are passed through
-  bool unknown = false;                ///< also at unknown and occluded voxels
+  ClassFilter classes =
+      ClassFilter::all();  ///< at occupied voxels of these classes; others are passed through
+  bool unknown = false;    ///< also at unknown and occluded voxels
 };
 
 /// Why a ray stopped.
@@ -57,6 +58,7 @@ RayHit castRay(const StateMap& states, const Ray& ray, const RayStops& stops = {
 /// The same for many rays, on all threads. @param hits as long as `rays`.
 /// @throws std::invalid_argument as castRay, naming the ray, or if the lengths differ; `hits` is then
 /// unchanged.
-void castRays(const StateMap& states, Span<const Ray> rays, const RayStops& stops, Span<RayHit> hits);
+void castRays(const StateMap& states, ArrayView<const Ray> rays, const RayStops& stops,
+              ArrayView<RayHit> hits);
 
 }  // namespace bki_mapping

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "bki_mapping/query/class_set.h"
-#include "bki_mapping/query/span.h"
+#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
 namespace bki_mapping {
@@ -26,12 +26,12 @@ struct OrientedBox {
 struct SpaceContent {
   std::size_t free = 0, occupied = 0;
   std::size_t unknown = 0;  ///< without evidence; occluded ones are among them
-  ClassSet classes;         ///< of the occupied voxels
+  ClassFilter classes;      ///< of the occupied voxels
 
   bool isFree() const { return occupied == 0 && unknown == 0; }
   bool isKnown() const { return unknown == 0; }
   /// The first of the classes in `order`, the worst first, that is present.
-  std::optional<ClassId> worst(Span<const ClassId> order) const;
+  std::optional<ClassId> worst(ArrayView<const ClassId> order) const;
 };
 
 /// Shapes that overlap more voxels are refused; so are boxes about such shapes.
@@ -50,6 +50,6 @@ SpaceContent contentOf(const StateMap& states, const OrientedBox& box);
 /// @param contents as long as the poses. @throws std::invalid_argument as contentOf, naming the pose, or if
 /// the lengths differ.
 void contentsAlong(const StateMap& states, const OrientedBox& box,
-                   Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents);
+                   ArrayView<const Eigen::Isometry3d> T_map_vehicle, ArrayView<SpaceContent> contents);
 
 }  // namespace bki_mapping

@@ -1,15 +1,15 @@
-#include "bki_mapping/query/class_set.h"
+#include "bki_mapping/query/class_filter.h"
 
 #include <stdexcept>
 
 namespace bki_mapping {
 
-ClassSet ClassSet::all() {
+ClassFilter ClassFilter::all() {
   return allBut({});
 }
 
-ClassSet ClassSet::of(const ClassTable& table, const std::vector<std::string>& names) {
-  ClassSet set;
+ClassFilter ClassFilter::of(const ClassTable& table, const std::vector<std::string>& names) {
+  ClassFilter set;
   std::string missing;
   for (const std::string& name : names) {
     bool found = false;
@@ -29,13 +29,13 @@ ClassSet ClassSet::of(const ClassTable& table, const std::vector<std::string>& n
                               "; it has: " + known_names);
 }
 
-ClassSet ClassSet::allBut(const ClassSet& others) {
-  ClassSet set;
+ClassFilter ClassFilter::allBut(const ClassFilter& others) {
+  ClassFilter set;
   for (std::size_t id = 0; id < kMaxClasses; ++id) set.ids_[id] = !others.ids_[id];
   return set;
 }
 
-void ClassSet::insert(ClassId id) {
+void ClassFilter::insert(ClassId id) {
   if (id >= kMaxClasses) {
     throw std::invalid_argument("class " + std::to_string(id) +
                                 " cannot be in a set of classes; ids are 0 to 253");
@@ -43,7 +43,7 @@ void ClassSet::insert(ClassId id) {
   ids_.set(id);
 }
 
-std::vector<ClassId> ClassSet::ids() const {
+std::vector<ClassId> ClassFilter::ids() const {
   std::vector<ClassId> ids;
   for (std::size_t id = 0; id < kMaxClasses; ++id) {
     if (ids_[id]) ids.push_back(static_cast<ClassId>(id));

@@ -1,4 +1,4 @@
-/// @file A view of an array, as std::span of C++20.
+/// @file A view of an array, like std::span of C++20.
 #pragma once
 
 #include <cstddef>
@@ -8,12 +8,12 @@ namespace bki_mapping {
 
 /// The elements of an array that belongs to the caller, for instance of a std::vector or of NumPy.
 template <typename T>
-class Span {
+class ArrayView {
  public:
-  Span() = default;
-  Span(T* data, std::size_t size) : data_(data), size_(size) {}
+  ArrayView() = default;
+  ArrayView(T* data, std::size_t size) : data_(data), size_(size) {}
   template <typename Vector, typename = decltype(static_cast<T*>(std::declval<Vector&>().data()))>
-  Span(Vector&& vector) : data_(vector.data()), size_(vector.size()) {}  // NOLINT: as std::span
+  ArrayView(Vector&& vector) : data_(vector.data()), size_(vector.size()) {}  // NOLINT: as std::span
 
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
