@@ -3,13 +3,23 @@
 // --benchmark_filter=Lines.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+
 #include "beams/line_evidence.h"
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/query/distance_field.h"
+#include "bki_mapping/query/frontiers.h"
+#include "bki_mapping/query/nearest_obstacle.h"
+#include "bki_mapping/query/points.h"
+#include "bki_mapping/query/rays.h"
+#include "bki_mapping/query/section.h"
+#include "bki_mapping/query/shapes.h"
 #include "io/voxel_points.h"
 #include "map/view_kernels.h"
 #include "mapping/scan_preprocessor.h"
+#include "parallel/counter_random.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
 #include "simd/instruction_sets.h"
@@ -171,6 +181,150 @@ void voxelCloud(benchmark::State& state) {
   }
 }
 
+/// A map of ten scans of a drive, and random places around it.
+struct QueryFixture {
+  QueryFixture() : mapper(MapperConfig(), fixture().classes) {
+    const simulation::Drive drive({10, 8.0, 1, {}});
+    for (std::size_t n = 0; n < drive.size(); ++n) mapper.integrate(drive.frame(n).scan());
+    middle = drive.frame(5).scan().origin;
+    std::uint64_t drawn = 0;
+    const auto within = [&drawn](double reach) {
+      return reach * (2.0 * counterRandom(1, 0, 0, drawn++) - 1.0);
+    };
+    for (std::size_t n = 0; n < 200000; ++n) {
+      points.emplace_back(middle + Eigen::Vector3d(within(40.0), within(20.0), within(2.0)));
+      const Eigen::Vector3d from = middle + Eigen::Vector3d(within(10.0), within(3.0), within(0.5));
+      rays.push_back({from, {within(1.0), within(1.0), within(0.2)}, 20.0});
+    }
+    for (std::size_t n = 0; n < 2000; ++n) {
+      poses.emplace_back(Eigen::Translation3d(points[n]) *
+                         Eigen::AngleAxisd(within(3.1), Eigen::Vector3d::UnitZ()));
+    }
+  }
+  Eigen::AlignedBox3d region(double x, double y, double z) const {
+    const Eigen::Vector3d half(0.5 * x, 0.5 * y, 0.5 * z);
+    return {middle - half, middle + half};
+  }
+
+  SemanticMapper mapper;
+  Eigen::Vector3d middle;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Ray> rays;
+  std::vector<Eigen::Isometry3d> poses;
+};
+
+QueryFixture& queryFixture() {
+  static QueryFixture instance;
+  return instance;
+}
+
+/// Decides all blocks of the map, one after the other.
+void decideStates(benchmark::State& state) {
+  const SemanticMap& map = queryFixture().mapper.map();
+  for (auto _ : state) {
+    const StateMap states(map, 1);
+    for (const auto& entry : map.entries()) benchmark::DoNotOptimize(states.find(entry.index));
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(map.size()));
+}
+
+/// @param query called as query(const StateMap&); answers `items`.
+template <typename Query>
+void ask(benchmark::State& state, int threads, std::size_t items, Query&& query) {
+  const StateMap states(queryFixture().mapper.map(), threads);
+  for (auto _ : state) query(states);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(items));
+}
+
+void readingPoints(benchmark::State& state, int threads, bool posterior, bool sorted) {
+  std::vector<Eigen::Vector3d> points = queryFixture().points;
+  const GridGeometry& geometry = queryFixture().mapper.map().geometry();
+  const auto blockOf = [&](const Eigen::Vector3d& p) { return GridGeometry::blockOf(geometry.voxelAt(p)); };
+  if (sorted) {
+    std::sort(points.begin(), points.end(),
+              [&](const auto& a, const auto& b) { return blockOf(a) < blockOf(b); });
+  }
+  std::vector<VoxelState> found(points.size());
+  std::vector<float> occupancy(points.size()), variance(points.size());
+  PointValues values;
+  values.states = found.data();
+  if (posterior) values.occupancy = occupancy.data();
+  if (posterior) values.variance = variance.data();
+  ask(state, threads, points.size(), [&](const StateMap& states) { readPoints(states, points, values); });
+}
+
+/// The states of points from the evidence of each, without a StateMap.
+void readingEachPoint(benchmark::State& state) {
+  const QueryFixture& f = queryFixture();
+  for (auto _ : state) {
+    for (const Eigen::Vector3d& point : f.points) {
+      benchmark::DoNotOptimize(viewWithoutEntropy(f.mapper.map(), f.mapper.map().geometry().voxelAt(point)));
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.points.size()));
+}
+
+void castingRays(benchmark::State& state, int threads, const RayStops& stops) {
+  const std::vector<Ray>& rays = queryFixture().rays;
+  std::vector<RayHit> hits(rays.size());
+  ask(state, threads, rays.size(), [&](const StateMap& states) { castRays(states, rays, stops, hits); });
+}
+
+/// The footprint of a car at random poses.
+void footprints(benchmark::State& state, int threads) {
+  const auto& poses = queryFixture().poses;
+  std::vector<SpaceContent> contents(poses.size());
+  const OrientedBox car = {Eigen::Isometry3d::Identity(), {2.5, 1.0, 0.75}};
+  ask(state, threads, poses.size(),
+      [&](const StateMap& states) { contentsAlong(states, car, poses, contents); });
+}
+
+void nearestObstacles(benchmark::State& state) {
+  const auto& points = queryFixture().points;
+  constexpr std::size_t kPoints = 2000;
+  ask(state, 1, kPoints, [&](const StateMap& states) {
+    for (std::size_t n = 0; n < kPoints; ++n) benchmark::DoNotOptimize(nearestObstacle(states, points[n]));
+  });
+}
+
+/// 100 m x 100 m.
+void sections(benchmark::State& state, int threads) {
+  const QueryFixture& f = queryFixture();
+  const Eigen::Vector2d middle = f.middle.head<2>(), half(50.0, 50.0);
+  ask(state, threads, 1, [&](const StateMap& states) {
+    benchmark::DoNotOptimize(horizontalSection(states, f.middle.z(), {middle - half, middle + half}));
+  });
+}
+
+void findingFrontiers(benchmark::State& state, int threads) {
+  ask(state, threads, 1, [&](const StateMap& states) { benchmark::DoNotOptimize(frontiers(states)); });
+}
+
+/// A region of 100 m x 100 m x 10 m.
+void distances(benchmark::State& state, int threads, const ObstacleRules& rules) {
+  const Eigen::AlignedBox3d region = queryFixture().region(100.0, 100.0, 10.0);
+  ask(state, threads, 1,
+      [&](const StateMap& states) { benchmark::DoNotOptimize(DistanceField(states, region, rules)); });
+}
+
+/// An update of that where the next scan has changed the map.
+void updatingDistances(benchmark::State& state, int threads) {
+  QueryFixture& f = queryFixture();
+  const SemanticMap before = f.mapper.snapshot();
+  const Scan scan = simulation::Drive({11, 8.0, 1, {}}).frame(10).scan();
+  f.mapper.integrate(scan);
+  const std::vector<GridIndex> changed = f.mapper.touchedBlocks();
+  const SemanticMap after = f.mapper.snapshot();
+  f.mapper.withdraw(scan);
+  const StateMap old_states(before, threads), new_states(after, threads);
+  DistanceField field(old_states, f.region(100.0, 100.0, 10.0));
+  for (auto _ : state) {
+    field.update(new_states, changed);
+    field.update(old_states, changed);
+  }
+  state.SetItemsProcessed(2 * state.iterations());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -193,6 +347,29 @@ int main(int argc, char** argv) {
   add("LinesFromRtree", [](auto& state) { lines(state, BeamIndexType::kRtree, ""); });
   add("Snapshot", snapshots);
   add("Query", queries);
+  add("DecideStates", decideStates);
+  add("PointsOneByOne", readingEachPoint);
+  for (const int threads : {1, 2}) {
+    const std::string on = "/threads:" + std::to_string(threads);
+    const auto addOn = [&](const std::string& name, auto&& body) {
+      benchmark::RegisterBenchmark((name + on).c_str(), body)->Unit(benchmark::kMillisecond)->UseRealTime();
+    };
+    addOn("PointStates", [=](auto& state) { readingPoints(state, threads, false, false); });
+    addOn("PointStatesSorted", [=](auto& state) { readingPoints(state, threads, false, true); });
+    addOn("PointPosteriors", [=](auto& state) { readingPoints(state, threads, true, false); });
+    addOn("PointPosteriorsSorted", [=](auto& state) { readingPoints(state, threads, true, true); });
+    addOn("Rays", [=](auto& state) { castingRays(state, threads, {}); });
+    addOn("RaysToUnknown", [=](auto& state) { castingRays(state, threads, {ClassFilter::all(), true}); });
+    addOn("Footprints", [=](auto& state) { footprints(state, threads); });
+    addOn("Section", [=](auto& state) { sections(state, threads); });
+    addOn("Frontiers", [=](auto& state) { findingFrontiers(state, threads); });
+    addOn("DistanceField", [=](auto& state) { distances(state, threads, {}); });
+    addOn("DistanceFieldUnknown", [=](auto& state) {
+      distances(state, threads, {ClassFilter::all(), true});
+    });
+    addOn("DistanceUpdate", [=](auto& state) { updatingDistances(state, threads); });
+  }
+  add("NearestObstacle", nearestObstacles);
   add("VoxelCloud", voxelCloud);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
