@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "map/calibration.h"
 #include "map/view_kernels.h"
 
 namespace bki_mapping {
@@ -32,6 +33,27 @@ BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
 /// - p log(p), accurate for p near 1, too. @param others sum of the other concentrations.
 double entropyTerm(double alpha, double others) {
   return alpha / (alpha + others) * std::log1p(others / alpha);
+}
+
+/// Equation 13: the probability that something is in a voxel. @param best evidence of the likeliest class.
+double occupancyOf(double prior, double best, double gain, double free) {
+  const double something = kPriorOfSomething * prior + best;
+  const double nothing =
+      kPriorOfNothing * prior + kBesideSurfaces * something + kWeightOfFree * std::max(gain, 1.0) * free;
+  return something / (something + nothing);
+}
+
+/// Sum of (alpha_k / alpha)^2 over all classes k.
+double squaredRatios(const SemanticMap& map, const Block& block, int offset, double alpha) {
+  constexpr double kUnit = kEvidenceUnit;
+  const auto square = [](double ratio) { return ratio * ratio; };
+  double sum = static_cast<double>(map.classCount()) * square(map.prior() / alpha);
+  for (std::size_t i = 0; i < block.classes().size(); ++i) {
+    const double evidence = kUnit * std::max(block.plane(i)[offset], 0);
+    if (block.classes()[i] == kFreeClass || evidence == 0.0) continue;
+    sum += square((map.prior() + evidence) / alpha) - square(map.prior() / alpha);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -95,12 +117,11 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int off
   const double prior = map.prior(), prior_of_classes = prior * static_cast<double>(map.classCount());
   const double own = occupied ? best : free, alpha = prior + own;
   const double others = prior_of_classes + (of_classes + free - own), sum = alpha + others;
-  const double something = prior_of_classes + of_classes;
   view.evidence = static_cast<float>(of_classes + free);
   view.probability = static_cast<float>(alpha / sum);
   view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
-  view.occupancy = static_cast<float>(something / (something + prior + static_cast<double>(gain) * free));
-  view.class_probability = static_cast<float>((prior + best) / something);
+  view.occupancy = static_cast<float>(occupancyOf(prior, best, static_cast<double>(gain), free));
+  view.class_probability = static_cast<float>(1.0 / squaredRatios(map, block, offset, prior + best));
   return view;
 }
 

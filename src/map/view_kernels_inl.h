@@ -2,6 +2,7 @@
 /// the same for one voxel, in double precision.
 #pragma once
 
+#include "map/calibration.h"
 #include "map/vec_log_inl.h"
 #include "map/view_kernels.h"
 
@@ -28,6 +29,18 @@ struct ExactSum {
   }
 };
 
+/// A sum with the rounding of each addition taken into account in the next (Kahan): there may be 255
+/// terms.
+struct CompensatedSum {
+  FloatVec sum, lost;
+
+  [[gnu::always_inline]] void add(FloatVec term) {
+    const FloatVec corrected = term - lost, next = sum + corrected;
+    lost = (next - sum) - corrected;
+    sum = next;
+  }
+};
+
 [[gnu::always_inline]] inline FloatVec evidenceOf(IntVec units) {
   return kEvidenceUnit * ConvertTo<FloatVec>(units);
 }
@@ -39,10 +52,12 @@ struct Likeliest {
   FloatVec gain;  ///< of that class
   Mask decays;    ///< whether the gain depends on `best`
   ExactSum classes;
+  CompensatedSum squares;  ///< of the evidence of the classes
 };
 
+template <bool kPosterior>
 [[gnu::always_inline]] inline Likeliest findLikeliest(const BlockPlanes& planes, int v) {
-  Likeliest found = {{}, Set(kFreeClass), Set(1.0f), {}, {{}, {}}};
+  Likeliest found = {{}, Set(kFreeClass), Set(1.0f), {}, {{}, {}}, {{}, {}}};
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
     const IntVec units = Max(LoadU(plane.units + v), IntVec{});
@@ -51,7 +66,10 @@ struct Likeliest {
     found.label = IfThenElse(more, Set(plane.id), found.label);
     found.gain = IfThenElse(more, Set(plane.gain), found.gain);
     found.decays = IfThenElse(more, Set(-static_cast<int>(plane.decays)), found.decays);
+    if constexpr (!kPosterior) continue;
     found.classes.add(units);
+    const FloatVec evidence = evidenceOf(units);
+    found.squares.add(evidence * evidence);
   }
   return found;
 }
@@ -92,18 +110,6 @@ struct Concentrations {
   float prior;
   FloatVec inverse_sum;  ///< 1 / sum(alpha)
   FloatVec others;       ///< sum(alpha) minus the largest
-};
-
-/// A sum with the rounding of each addition taken into account in the next (Kahan): the entropy may have 255
-/// terms.
-struct CompensatedSum {
-  FloatVec sum, lost;
-
-  [[gnu::always_inline]] void add(FloatVec term) {
-    const FloatVec corrected = term - lost, next = sum + corrected;
-    lost = (next - sum) - corrected;
-    sum = next;
-  }
 };
 
 /// - p log(p) of one concentration, of at most half the sum.
@@ -147,15 +153,20 @@ struct CompensatedSum {
 /// The priors of the map.
 struct Priors {
   float once, classes, sum;  ///< of one concentration, of all classes, and of `free`, too
+  float squares;             ///< sum of the squares of those of the classes
+  float something, nothing;  ///< of what is in a voxel
 
   explicit Priors(const SemanticMap& map) {
-    // Far below a unit of evidence a smaller prior makes no difference, and floats could not hold it.
-    const double least = 1e-30;
+    // Far below a unit of evidence a smaller prior makes no difference, and floats could not hold its square.
+    const double least = 1e-18;
     const double prior = map.prior() > least ? map.prior() : least;
     const auto count = static_cast<double>(map.classCount());
     once = static_cast<float>(prior);
     classes = static_cast<float>(prior * count);
     sum = static_cast<float>(prior * (count + 1.0));
+    squares = static_cast<float>(prior * prior * count);
+    something = static_cast<float>(kPriorOfSomething * prior);
+    nothing = static_cast<float>(kPriorOfNothing * prior);
   }
 };
 
@@ -172,13 +183,17 @@ template <bool kEntropy>
   others.subtract(own);
   const FloatVec p = (prior.once + evidenceOf(own)) * inverse_sum,
                  not_p = (prior.classes + others.evidence()) * inverse_sum;
-  const FloatVec something = prior.classes + found.classes.evidence(),
-                 nothing = prior.once + found.gain * evidenceOf(free);
+  const FloatVec best = evidenceOf(found.best), alpha = prior.once + best, something = prior.something + best,
+                 weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
+                 nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something +
+                           weight * evidenceOf(free);
+  // The sum of (prior + e)^2 over the classes.
+  const FloatVec squares = prior.squares + 2.0f * prior.once * found.classes.evidence() + found.squares.sum;
   StoreU(evidence, view.evidence.data() + v);
   StoreU(p, view.probability.data() + v);
   StoreU(p * not_p / (sum + 1.0f), view.variance.data() + v);
   StoreU(something / (something + nothing), view.occupancy.data() + v);
-  StoreU((prior.once + evidenceOf(found.best)) / something, view.class_probability.data() + v);
+  StoreU(alpha * alpha / squares, view.class_probability.data() + v);
   if constexpr (!kEntropy) return;
 
   others = total;
@@ -205,7 +220,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
   int unknown = -1;  // first voxel of a vector without any evidence: all these vectors are alike
   for (int v = 0; v < kBlockVoxels; v += kLanes) {
     const IntVec free = Max(LoadU(planes.free + v), IntVec{});
-    Likeliest found = findLikeliest(planes, v);
+    Likeliest found = findLikeliest<kPosterior>(planes, v);
     decay(planes, free, found);
     const Mask is_known = (found.best | free) != 0;
     const Mask is_occupied = is_known & occupied(found, free);

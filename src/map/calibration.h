@@ -1,0 +1,17 @@
+/// @file The constants of the occupancy, Equation 13 in docs/method.md, which were fitted to drives whose
+/// truth is known (docs/tuning.md).
+#pragma once
+
+namespace bki_mapping {
+
+/// Prior concentrations of something and of nothing, in units of the prior alpha0 of a class. Their sum says
+/// how much evidence outweighs them: some hundredths of that of one hit.
+constexpr double kPriorOfSomething = 0.1, kPriorOfNothing = 6.0;
+/// Weight of the evidence for `free`: beams that pass through a voxel without hitting what is in it are that
+/// common. A gain above 1 multiplies it.
+constexpr double kWeightOfFree = 0.05;
+/// Evidence for nothing that comes with each unit of evidence of hits: kernels reach voxels beside the
+/// surfaces that were hit.
+constexpr double kBesideSurfaces = 0.1;
+
+}  // namespace bki_mapping
