@@ -18,7 +18,7 @@ target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS}
 set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG)
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
-bki_mapping_room(evaluation SOURCES dynamics_evaluation.cpp label_noise.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
+bki_mapping_room(evaluation SOURCES dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation Boost::program_options)

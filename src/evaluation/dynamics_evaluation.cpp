@@ -30,6 +30,11 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
   ++added_;
 }
 
+bool DynamicsEvaluation::hasBeenLeft(const VoxelIndex& index, const Taken& taken) const {
+  const std::uint32_t n = index_of_.find(index);
+  return n == kNoPosition ? !(taken && taken(index)) : !mayBeOccupied(voxels_[n], taken);
+}
+
 std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,
                                                                         const Taken& taken) const {
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;

@@ -77,6 +77,9 @@ class DynamicsEvaluation {
   /// table. Ids of the class table do not say what moves: points labelled by id all count as static.
   void add(const Scan& scan, const ClassTable& classes);
 
+  /// Whether what moved through a voxel has left it: no point of the last scans hits the voxel, and it is not
+  /// taken. @param taken may be empty.
+  bool hasBeenLeft(const VoxelIndex& index, const Taken& taken = {}) const;
   /// @param taken may be empty.
   DynamicsQuality compare(const SemanticMap& map, const Taken& taken = {}) const;
   /// The outcome for each voxel that has points of static or of early moving objects.

@@ -33,7 +33,7 @@ class Errors {
     for (const SemanticClass& c : classes.classes()) {
       if (!c.unlabelled && (scan.labels_are_ids || !c.raw.empty())) known_.push_back(&c);
     }
-    if (noise.errors != LabelErrors::kBorders) return;
+    if (noise.errors != LabelErrors::kBorders && noise.errors != LabelErrors::kNetwork) return;
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
       if (classOf(i)) labels_in_[cubeAt(scan, i, kBorderEdge)].push_back(scan.labels[i]);
     }
@@ -41,19 +41,24 @@ class Errors {
 
   /// The label that the mapper is given for a point.
   std::uint32_t labelOf(std::size_t i) const {
+    const double rate = noise_.rate;
     switch (noise_.errors) {
       case LabelErrors::kEven:
-        return random(i, 0) < noise_.rate ? otherLabel(i, random(i, 1), false) : scan_.labels[i];
+        return random(i, 0) < rate ? otherLabel(i, random(i, 1), false) : scan_.labels[i];
       case LabelErrors::kSimilar:
-        return random(i, 0) < noise_.rate ? otherLabel(i, random(i, 1), true) : scan_.labels[i];
-      case LabelErrors::kFar: {
-        const double rate = noise_.rate * static_cast<double>(scan_.points[i].norm()) / kFarDistance;
         return random(i, 0) < rate ? otherLabel(i, random(i, 1), true) : scan_.labels[i];
-      }
       case LabelErrors::kObjects:
-        return labelOfObject(i);
+        return labelOfObject(i, rate);
       case LabelErrors::kBorders:
-        return labelAtBorder(i);
+        return labelAtBorder(i, rate);
+      case LabelErrors::kFar:
+        return labelFarAway(i, rate);
+      case LabelErrors::kNetwork: {
+        const std::uint32_t of_object = labelOfObject(i, 0.5 * rate);
+        if (of_object != scan_.labels[i]) return of_object;
+        const std::uint32_t at_border = labelAtBorder(i, rate);
+        return at_border != scan_.labels[i] ? at_border : labelFarAway(i, 0.5 * rate);
+      }
     }
     return scan_.labels[i];
   }
@@ -81,19 +86,24 @@ class Errors {
     return scan_.labels_are_ids ? chosen.id : chosen.raw.front();
   }
 
-  std::uint32_t labelOfObject(std::size_t i) const {
+  std::uint32_t labelFarAway(std::size_t i, double rate_at_far_distance) const {
+    const double rate = rate_at_far_distance * static_cast<double>(scan_.points[i].norm()) / kFarDistance;
+    return random(i, 2) < rate ? otherLabel(i, random(i, 3), true) : scan_.labels[i];
+  }
+
+  std::uint32_t labelOfObject(std::size_t i, double rate) const {
     const SemanticClass* own = classOf(i);
     const auto [x, y, z] = cubeAt(scan_, i, kObjectEdge);
     std::uint64_t key = own ? own->id : kFreeClass;
     for (const int coordinate : {x, y, z}) key = mixBits(key ^ static_cast<std::uint32_t>(coordinate));
     const std::uint64_t when = scan_.stamp / kObjectTime;
-    if (counterRandom(noise_.seed, when, key, 0) >= noise_.rate) return scan_.labels[i];
+    if (counterRandom(noise_.seed, when, key, 0) >= rate) return scan_.labels[i];
     return otherLabel(i, counterRandom(noise_.seed, when, key, 1), true);
   }
 
-  std::uint32_t labelAtBorder(std::size_t i) const {
+  std::uint32_t labelAtBorder(std::size_t i, double rate) const {
     const SemanticClass* own = classOf(i);
-    if (!own || random(i, 0) >= noise_.rate) return scan_.labels[i];
+    if (!own || random(i, 0) >= rate) return scan_.labels[i];
     std::vector<std::uint32_t> others;
     for (const std::uint32_t label : labels_in_.at(cubeAt(scan_, i, kBorderEdge))) {
       if (classes_.classOf(label, labelValues(scan_)) != own->id) others.push_back(label);
@@ -112,15 +122,14 @@ class Errors {
 }  // namespace
 
 LabelErrors labelErrorsNamed(const std::string& name) {
-  static const std::map<std::string, LabelErrors> kNamed = {{"even", LabelErrors::kEven},
-                                                            {"similar", LabelErrors::kSimilar},
-                                                            {"objects", LabelErrors::kObjects},
-                                                            {"borders", LabelErrors::kBorders},
-                                                            {"far", LabelErrors::kFar}};
+  static const std::map<std::string, LabelErrors> kNamed = {
+      {"even", LabelErrors::kEven},       {"similar", LabelErrors::kSimilar},
+      {"objects", LabelErrors::kObjects}, {"borders", LabelErrors::kBorders},
+      {"far", LabelErrors::kFar},         {"network", LabelErrors::kNetwork}};
   const auto found = kNamed.find(name);
   if (found != kNamed.end()) return found->second;
   throw std::invalid_argument("there are no label errors " + name +
-                              "; known: even, similar, objects, borders, far");
+                              "; known: even, similar, objects, borders, far, network");
 }
 
 std::vector<std::uint32_t> withLabelNoise(const Scan& scan, const ClassTable& classes,

@@ -18,8 +18,11 @@ enum class LabelErrors {
   kObjects,  ///< all labels of a class within a cube of 2 m, for a second; a similar class
   kBorders,  ///< labels of points within a cube of 0.5 m in which there are several classes; one of these
   kFar,  ///< any label, the more often the farther: at 20 m with the probability asked for; a similar class
+  kNetwork,  ///< as networks err: kObjects with half the probability; else kBorders; else kFar with half of
+             ///< it
 };
-/// "even", "similar", "objects", "borders" or "far". @throws std::invalid_argument for another name.
+/// "even", "similar", "objects", "borders", "far" or "network". @throws std::invalid_argument for another
+/// name.
 LabelErrors labelErrorsNamed(const std::string& name);
 
 struct LabelNoise {

@@ -98,8 +98,8 @@ void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table
   table.percent("voxel mIoU", truth.meanIou(classes),
                 "of the classes of voxels, over the classes that occur");
   table.percent("voxel IoU", truth.occupiedIou(classes), "of occupied voxels, whatever their class");
-  table.percent("ECE occupancy", truth.occupancy.error(),
-                "the same of the probability that something is in a voxel");
+  table.percent("ECE true occupancy", truth.occupancy.error(),
+                "ECE occupancy by the scene instead of by the points");
   table.text(std::to_string(truth.ghosts) + " ghosts among " + std::to_string(truth.movable) +
              " voxels of classes that can move (nothing movable near for 0.5 s); " +
              figureText(truth.mean_ghosts) + " on average while mapping");
@@ -123,10 +123,18 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");
   table.percent("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
+  table.percent("  present: map", s.map_of_present.meanIou(), "without the points of what has moved away");
+  table.percent("  present: input", s.input_of_present.meanIou(),
+                "the same of the labels given to the mapper");
+  table.percent("  occupied: map", s.map_of_occupied.meanIou(), "of these, at the points in occupied voxels");
+  table.percent("  occupied: input", s.input_of_occupied.meanIou(),
+                "the same of the labels given to the mapper");
   table.percent("ECE probability", s.probability.error(),
                 "expected calibration error of p, in which the class and free share");
   table.percent("ECE class_probability", s.class_probability.error(),
                 "the same of the probability of the class, given that something is there");
+  table.percent("ECE occupancy", quality.occupancy.error(),
+                "the same of the probability that something is in a voxel, by the points");
   table.percent("AUSE", s.sparsification_error, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
@@ -163,10 +171,15 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"ha", d.harmonicAccuracy()},
                   {"miou_map", s.map.meanIou()},
                   {"miou_input", s.input.meanIou()},
+                  {"miou_map_present", s.map_of_present.meanIou()},
+                  {"miou_input_present", s.input_of_present.meanIou()},
+                  {"miou_map_occupied", s.map_of_occupied.meanIou()},
+                  {"miou_input_occupied", s.input_of_occupied.meanIou()},
                   {"accuracy_map", s.map.accuracy()},
                   {"accuracy_input", s.input.accuracy()},
                   {"probability_calibration_error", s.probability.error()},
                   {"class_probability_calibration_error", s.class_probability.error()},
+                  {"occupancy_calibration_error", quality.occupancy.error()},
                   {"sparsification_error", s.sparsification_error},
                   {"median_ms", quality.median_ms},
                   {"labels_not_in_table", quality.unknown_labels},
@@ -182,6 +195,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
   }
   figures["probability_reliability"] = reliabilityJson(s.probability);
   figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
+  figures["occupancy_reliability"] = reliabilityJson(quality.occupancy);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";
 }

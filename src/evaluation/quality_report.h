@@ -5,6 +5,7 @@
 #include <string>
 
 #include "evaluation/dynamics_evaluation.h"
+#include "evaluation/occupancy_evaluation.h"
 #include "evaluation/semantic_evaluation.h"
 #include "evaluation/truth_evaluation.h"
 
@@ -13,6 +14,7 @@ namespace bki_mapping::tools {
 struct MapQuality {
   DynamicsQuality dynamics;
   SemanticQuality semantics;
+  Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
   std::optional<simulation::TruthQuality> truth;   ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< median time of a scan [ms]

@@ -104,7 +104,8 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto truth = classes.classOf(scan.labels[i], labelValues(scan));
     if (!truth || truth == classes.unlabelled() || !geometry_.contains(point)) continue;
-    input_.add(*truth, classes.classOf(predicted[i], labelValues(scan)).value_or(kFreeClass));
+    const ClassId given = classes.classOf(predicted[i], labelValues(scan)).value_or(kFreeClass);
+    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
     const std::uint32_t n = index_of_.insert(index, fresh);
@@ -112,23 +113,38 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
       voxels_.push_back(index);
       points_.emplace_back();
     }
-    ++points_[n][*truth];
+    const auto alike = [&](const Points& p) {
+      return p.truth == *truth && p.predicted == given && p.moving == moving;
+    };
+    const auto known = std::find_if(points_[n].begin(), points_[n].end(), alike);
+    if (known == points_[n].end()) {
+      points_[n].push_back({*truth, given, moving, 1});
+    } else {
+      ++known->count;
+    }
   }
 }
 
-SemanticQuality SemanticEvaluation::compare(const SemanticMap& map) const {
+SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const Left& left) const {
   SemanticQuality quality;
-  quality.input = input_;
   std::vector<Ranked> ranked;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
+    const bool occupied = view.state == VoxelState::kOccupied, has_left = left && left(voxels_[n]);
     Ranked voxel{static_cast<double>(view.variance), 0, 0};
-    for (const auto& [truth, points] : points_[n]) {
-      quality.map.add(truth, view.label, points);
-      voxel.points += points;
-      voxel.wrong += truth == view.label ? 0 : points;
+    for (const Points& p : points_[n]) {
+      quality.map.add(p.truth, view.label, p.count);
+      quality.input.add(p.truth, p.predicted, p.count);
+      voxel.points += p.count;
+      voxel.wrong += p.truth == view.label ? 0 : p.count;
+      if (p.moving && has_left) continue;
+      quality.map_of_present.add(p.truth, view.label, p.count);
+      quality.input_of_present.add(p.truth, p.predicted, p.count);
+      if (!occupied) continue;
+      quality.map_of_occupied.add(p.truth, view.label, p.count);
+      quality.input_of_occupied.add(p.truth, p.predicted, p.count);
     }
-    if (view.state != VoxelState::kOccupied) continue;
+    if (!occupied) continue;
     ranked.push_back(voxel);
     const std::size_t right = voxel.points - voxel.wrong;
     quality.probability.add(static_cast<double>(view.probability), voxel.points, right);
@@ -142,7 +158,9 @@ std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map) 
   std::vector<VoxelIndex> wrong;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
-    if (view.state == VoxelState::kOccupied && points_[n].count(view.label) == 0) wrong.push_back(voxels_[n]);
+    const auto is_right = [&](const Points& p) { return p.truth == view.label; };
+    const bool right = std::any_of(points_[n].begin(), points_[n].end(), is_right);
+    if (view.state == VoxelState::kOccupied && !right) wrong.push_back(voxels_[n]);
   }
   return wrong;
 }

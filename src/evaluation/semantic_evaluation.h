@@ -3,7 +3,11 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <map>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
@@ -58,10 +62,14 @@ class Reliability {
 struct SemanticQuality {
   Confusion map;    ///< predicted by the voxel that contains the point
   Confusion input;  ///< predicted by the label given to the mapper
+  /// The same without the points of what has moved away: clearing these is right.
+  Confusion map_of_present, input_of_present;
+  /// Of these, the points in occupied voxels: what the map says of all that it keeps.
+  Confusion map_of_occupied, input_of_occupied;
 
   // Over the points in occupied voxels:
   Reliability probability;        ///< of p, the class's share of the whole posterior, `free` included
-  Reliability class_probability;  ///< of C, the class's share of what is not `free`
+  Reliability class_probability;  ///< of C, the probability of the class alone
 
   /// Area under the sparsification error curve (AUSE; Ilg et al., ECCV 2018). Removing the voxels with the
   /// largest variance first leaves more errors than removing those with the most errors first; this is the
@@ -72,23 +80,36 @@ struct SemanticQuality {
 /// Counts labelled points in each voxel, and compares a map with them.
 class SemanticEvaluation {
  public:
-  explicit SemanticEvaluation(const GridGeometry& geometry) : geometry_(geometry) {}
+  /// @param moving raw labels of objects that move.
+  explicit SemanticEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving = {})
+      : geometry_(geometry), moving_(std::move(moving)) {}
 
   /// Adds the points of a scan. Skips those that are not finite, unlabelled, or have a true label outside of
-  /// the class table.
+  /// the class table. Ids of the class table do not say what moves.
   /// @param predicted the labels given to the mapper, one for each of scan.labels, which are the true ones.
   void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes);
 
-  SemanticQuality compare(const SemanticMap& map) const;
+  /// Whether what moved through a voxel has left it by the end.
+  using Left = std::function<bool(const VoxelIndex&)>;
+
+  /// @param left may be empty: nothing has left.
+  SemanticQuality compare(const SemanticMap& map, const Left& left = {}) const;
   /// Occupied voxels whose class is not the true one of any point in them.
   std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map) const;
 
  private:
+  /// Points of one voxel that have all of this in common.
+  struct Points {
+    ClassId truth, predicted;
+    bool moving;
+    std::uint32_t count;
+  };
+
   GridGeometry geometry_;
-  Confusion input_;
+  std::set<std::uint32_t> moving_;
   GridTable index_of_;
   std::vector<VoxelIndex> voxels_;
-  std::vector<std::map<ClassId, std::size_t>> points_;  ///< in each voxel, by true class
+  std::vector<std::vector<Points>> points_;  ///< in each voxel
 };
 
 }  // namespace bki_mapping

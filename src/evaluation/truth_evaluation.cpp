@@ -5,12 +5,11 @@
 #include <limits>
 
 #include "bki_mapping/map/map_query.h"
+#include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping::simulation {
 namespace {
 
-/// One beam in this many is followed to find crossed voxels, which bounds the time of add().
-constexpr std::size_t kBeamStride = 16;
 /// A voxel is a ghost if nothing movable was near for kGhostAge [s], sampled every kGhostStep [s].
 constexpr double kGhostAge = 0.5, kGhostStep = 0.1;
 
@@ -50,12 +49,8 @@ void TruthEvaluation::add(const Scan& scan) {
     const Eigen::Vector3d way = scan.points[i].cast<double>();
     if (!geometry_.contains(scan.origin + way)) continue;
     seen(geometry_.voxelAt(scan.origin + way)).hit = true;
-    if (i % kBeamStride != 0) continue;
-    const double step = 0.5 * geometry_.resolution();
-    for (double at = 0.0; at < way.norm() - geometry_.resolution(); at += step) {
-      seen(geometry_.voxelAt(scan.origin + at * way.normalized())).crossed = true;
-    }
   }
+  forEachCrossedVoxel(scan, geometry_, [this](const VoxelIndex& index) { seen(index).crossed = true; });
 }
 
 std::size_t TruthEvaluation::distanceBin(const VoxelIndex& index) const {

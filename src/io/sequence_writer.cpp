@@ -23,18 +23,28 @@ void writeBinary(const fs::path& path, const std::vector<T>& values) {
   if (!out) throw writeFailure(path.string(), std::strerror(errno));
 }
 
+/// Creates a folder. @param instead what to do if there are files in it.
+void makeEmptyFolder(const fs::path& path, const std::string& instead) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw std::runtime_error(path.string() + " cannot be made: " + error.message());
+  if (!fs::is_empty(path)) throw std::runtime_error(path.string() + " is not empty; " + instead);
+}
+
 }  // namespace
+
+LabelWriter::LabelWriter(const std::string& sequence, const std::string& labels)
+    : folder_((fs::path(sequence) / labels).string()) {
+  makeEmptyFolder(folder_, "give a new folder, or remove the old labels first");
+}
+
+void LabelWriter::write(const std::string& name, const std::vector<std::uint32_t>& labels) const {
+  writeBinary(fs::path(folder_) / (name + ".label"), labels);
+}
 
 SequenceWriter::SequenceWriter(const std::string& folder) : folder_(folder) {
   for (const char* name : {"velodyne", "labels"}) {
-    const fs::path path = fs::path(folder) / name;
-    std::error_code error;
-    fs::create_directories(path, error);
-    if (error) throw std::runtime_error(path.string() + " cannot be made: " + error.message());
-    if (!fs::is_empty(path)) {
-      throw std::runtime_error(path.string() +
-                               " is not empty; give a new folder, or remove the old scans first");
-    }
+    makeEmptyFolder(fs::path(folder) / name, "give a new folder, or remove the old scans first");
   }
 }
 

@@ -36,9 +36,11 @@ po::options_description options() {
       "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("FRACTION")->default_value(0.0),
       "probability that a label is replaced by a wrong one")(
       "label-errors", po::value<std::string>()->value_name("KIND")->default_value("even"),
-      "which labels --label-noise replaces: even, similar, objects, borders or far")(
+      "which labels --label-noise replaces: even, similar, objects, borders, far or network")(
       "predictions", po::value<std::string>()->value_name("FOLDER"),
       "name of a folder with predicted labels to map; those of --labels are the truth")(
+      "write-predictions", po::value<std::string>()->value_name("FOLDER"),
+      "name of a folder for the labels that are mapped, to be read by --predictions")(
       "pose-noise", po::value<std::string>()->value_name("M,DEG"),
       "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
       "pose-drift", po::value<std::string>()->value_name("M,DEG"),
@@ -53,6 +55,7 @@ po::options_description options() {
 struct Evaluation {
   DynamicsEvaluation dynamics;
   SemanticEvaluation semantics;
+  OccupancyEvaluation occupancy;
   std::optional<simulation::TruthEvaluation> truth;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
@@ -63,6 +66,7 @@ struct Evaluation {
   void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes) {
     dynamics.add(scan, classes);
     semantics.add(scan, predicted, classes);
+    occupancy.add(scan);
     if (truth) truth->add(scan);
     labels += scan.labels.size();
     for (const std::uint32_t label : scan.labels) {
@@ -81,7 +85,9 @@ struct Evaluation {
   tools::MapQuality compare(const SemanticMap& map) const {
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map, taken());
-    quality.semantics = semantics.compare(map);
+    const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
+    quality.semantics = semantics.compare(map, left);
+    quality.occupancy = occupancy.compare(map, left);
     if (truth) quality.truth = truth->compare(map, end);
     quality.labels = labels;
     quality.unknown_labels = unknown_labels;
@@ -146,6 +152,9 @@ int evaluate(const po::variables_map& given) {
   std::optional<Sequence> predictions;
   if (given.count("predictions"))
     predictions.emplace(sequence.folder(), given["predictions"].as<std::string>());
+  std::optional<LabelWriter> label_writer;
+  if (given.count("write-predictions"))
+    label_writer.emplace(sequence.folder(), given["write-predictions"].as<std::string>());
   if (given.count("errors") &&
       std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
     throw std::invalid_argument("--errors must end in .png");
@@ -154,9 +163,10 @@ int evaluate(const po::variables_map& given) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   const GridGeometry& geometry = mapper.map().geometry();
-  Evaluation evaluation{DynamicsEvaluation(geometry, DynamicsEvaluation::movingOfSemanticKitti(),
-                                           last - first, tools::count(given, "late")),
-                        SemanticEvaluation(geometry), std::nullopt};
+  const auto moving = DynamicsEvaluation::movingOfSemanticKitti();
+  Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
+                        SemanticEvaluation(geometry, moving), OccupancyEvaluation(geometry, moving),
+                        std::nullopt};
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   // A map that drifts is in no frame of the true scene.
@@ -174,6 +184,7 @@ int evaluate(const po::variables_map& given) {
     scan.labels_are_ids = input.labels_are_ids = mapper.config().label_values == LabelValues::kId;
     if (predictions) input.labels = predictions->read(i).labels;
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
+    if (label_writer) label_writer->write(sequence.name(i), input.labels);
     times.push_back(mapper.integrate(input).totalMs());
     evaluation.add(scan, input.labels, mapper.classes());
     if (drive) {

@@ -100,6 +100,28 @@ TEST(LabelNoise, ErrsAtBordersOnly) {
   EXPECT_EQ(wrongFraction(scan, {0.3, LabelErrors::kBorders, 1}), 0.0);
 }
 
+TEST(LabelNoise, ErrsAsNetworksDo) {
+  const LabelNoise noise{0.4, LabelErrors::kNetwork, 1};
+  const auto wrongAt = [&](float distance) {
+    double wrong = 0.0;  // over many objects, far from borders
+    for (int n = 0; n < 300; ++n) {
+      Scan scan = scanAt({0.0f, 0.0f, distance}, {10}, 20);
+      scan.origin.x() = 10.0 * n + 1.0;
+      wrong += wrongFraction(scan, noise) / 300;
+    }
+    return wrong;
+  };
+  EXPECT_NEAR(wrongAt(0.1f), 0.2, 0.06) << "whole objects";
+  EXPECT_NEAR(wrongAt(50.1f), 0.2 + 0.8 * 0.5, 0.06) << "and half of the labels at 50 m";
+  double at_border = 0.0;
+  for (int n = 0; n < 300; ++n) {
+    Scan scan = scanAt({0.1f, 0.0f, 0.0f}, {10, 50}, 20);
+    scan.origin.x() = 10.0 * n + 1.0;
+    at_border += wrongFraction(scan, noise) / 300;
+  }
+  EXPECT_NEAR(at_border, 0.2 + 0.8 * 0.4, 0.06);
+}
+
 TEST(LabelNoise, KnowsItsKindsByName) {
   EXPECT_EQ(labelErrorsNamed("far"), LabelErrors::kFar);
   EXPECT_THROW(labelErrorsNamed("near"), std::invalid_argument);

@@ -37,7 +37,7 @@ void add(SemanticMap& map, const Eigen::Vector3d& point, ClassId id, float evide
 
 class Quality : public testing::Test {
  protected:
-  Quality() : map_(GridGeometry(1.0), 1e-9, 4), evaluation_(GridGeometry(1.0)) {}
+  Quality() : map_(GridGeometry(1.0), 1e-9, 4), evaluation_(GridGeometry(1.0), {kMoving}) {}
 
   /// Points in the middle of voxel x with a true and a predicted label (classes times ten).
   void see(int x, std::uint32_t truth, std::uint32_t predicted, int times = 1) {
@@ -49,6 +49,8 @@ class Quality : public testing::Test {
     evaluation_.add(scan, std::vector<std::uint32_t>(scan.labels.size(), predicted), *classes_);
   }
   void set(int x, ClassId id, float evidence) { add(map_, {x + 0.5, 0.5, 0.5}, id, evidence); }
+
+  static constexpr std::uint32_t kMoving = 20;  ///< the raw label of what moves
 
   std::shared_ptr<const ClassTable> classes_ = reference::smallTable();
   SemanticMap map_;
@@ -73,6 +75,33 @@ TEST_F(Quality, ComparesWhatMapAndInputTell) {
   EXPECT_DOUBLE_EQ(quality.input.iou(1), 0.75);
   EXPECT_DOUBLE_EQ(quality.input.iou(2), 2.0 / 3.0);
   EXPECT_EQ(quality.map.points(0), 0u);
+}
+
+TEST_F(Quality, WhatHasLeftDoesNotCountAsPresent) {
+  see(0, 10, 30, 2);            // stands, and is kept
+  see(1, 10, 10, 3);            // stands, and is lost
+  see(2, kMoving, kMoving, 4);  // has left, and is cleared
+  see(3, kMoving, kMoving, 5);  // has left, and is kept
+  see(4, kMoving, kMoving, 6);  // is still there
+  set(0, 1, 1.0f);
+  set(1, kFreeClass, 1.0f);
+  set(2, kFreeClass, 1.0f);
+  set(3, 2, 1.0f);
+  set(4, 2, 1.0f);
+  const auto left = [](const VoxelIndex& voxel) { return voxel.x <= 3; };
+  const SemanticQuality quality = evaluation_.compare(map_, left), all = evaluation_.compare(map_);
+  EXPECT_EQ(quality.map.count(2, kFreeClass), 4u) << "all points";
+  EXPECT_EQ(quality.input.points(2), 15u);
+  EXPECT_EQ(quality.map_of_present.points(1), 5u);
+  EXPECT_EQ(quality.map_of_present.count(1, kFreeClass), 3u);
+  EXPECT_EQ(quality.map_of_present.points(2), 6u);
+  EXPECT_EQ(quality.input_of_present.points(2), 6u);
+  EXPECT_EQ(quality.input_of_present.count(1, 3), 2u);
+  EXPECT_EQ(quality.map_of_occupied.points(1), 2u);
+  EXPECT_EQ(quality.map_of_occupied.count(2, 2), 6u);
+  EXPECT_EQ(quality.input_of_occupied.count(1, 3), 2u);
+  EXPECT_EQ(quality.input_of_occupied.points(1), 2u);
+  EXPECT_EQ(all.map_of_present.points(2), 15u) << "nothing has left";
 }
 
 TEST_F(Quality, WrongVoxelsAreOccupiedByAClassThatNoPointHas) {

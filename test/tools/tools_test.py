@@ -163,7 +163,7 @@ class Tools(unittest.TestCase):
     def test_evaluation_with_errors(self):
         clean = self.evaluation()
         self.assertEqual(clean['miou_input'], 1.0)
-        for kind in ('even', 'similar', 'objects', 'borders', 'far'):
+        for kind in ('even', 'similar', 'objects', 'borders', 'far', 'network'):
             noisy = self.evaluation(more=('--label-noise', '0.5', '--label-errors', kind))
             self.assertLess(noisy['miou_input'], 0.99, kind)
             self.assertEqual(noisy['static_points'], clean['static_points'], kind)
@@ -173,6 +173,16 @@ class Tools(unittest.TestCase):
         self.assertEqual(predicted['building']['iou_input'], 0.0)
         self.assertEqual(predicted['building']['iou_map'], 0.0)
         self.assertEqual(predicted['road']['iou_input'], 1.0)
+        # Predictions that were written are read again; a folder with some is not overwritten.
+        network = ('--label-noise', '0.5', '--label-errors', 'network')
+        written = self.evaluation(more=(*network, '--write-predictions', 'written'))
+        self.addCleanup(shutil.rmtree, os.path.join(self.drive, 'written'))
+        read = self.evaluation(more=('--predictions', 'written'))
+        for figures in (written, read):
+            del figures['median_ms']
+        self.assertEqual(read, written)
+        self.assertLess(read['miou_input'], 0.9)
+        self.fails('written is not empty', 'evaluate_map', '--sequence', self.drive, '--write-predictions', 'written')
         # Points are judged where they are: a map of poses that are a metre wrong keeps fewer. Where poses drift, the
         # frame of the map drifts with them, and there is no truth to compare it with.
         shaken = self.evaluation(more=('--pose-noise', '1,1'))

@@ -29,7 +29,7 @@ class Sequence {
   /// Offset added to all times [ns], because time 0 means "the latest" to tf.
   static constexpr std::uint64_t kFirstStamp = 1000000000;
 
-  /// @param labels name of the folder with the labels.
+  /// @param labels name of the folder with the labels, or an absolute path.
   /// @throws std::runtime_error in one sentence: a missing folder or file, a scan whose name is not a number,
   /// a value that is not a number, a singular or missing calibration, a scan without a pose or time.
   explicit Sequence(const std::string& folder, const std::string& labels = "labels");
@@ -52,6 +52,19 @@ class Sequence {
   std::vector<std::string> names_;
   std::vector<Eigen::Isometry3d> poses_;
   std::vector<std::uint64_t> stamps_;
+};
+
+/// Writes a folder of labels for the scans of a sequence, as Sequence reads them.
+class LabelWriter {
+ public:
+  /// Creates sequence/labels. @param labels name of the folder, or an absolute path.
+  /// @throws std::runtime_error if that fails, or if the folder is not empty.
+  LabelWriter(const std::string& sequence, const std::string& labels);
+  /// @param name of the scan: Sequence::name. @throws std::runtime_error if the file cannot be written.
+  void write(const std::string& name, const std::vector<std::uint32_t>& labels) const;
+
+ private:
+  std::string folder_;
 };
 
 /// Writes frames in the same layout; Tr is the identity.
