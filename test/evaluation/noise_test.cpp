@@ -107,6 +107,7 @@ TEST(LabelNoise, ErrsAsNetworksDo) {
     for (int n = 0; n < 300; ++n) {
       Scan scan = scanAt({0.0f, 0.0f, distance}, {10}, 20);
       scan.origin.x() = 10.0 * n + 1.0;
+      scan.stamp = static_cast<std::uint64_t>(n);
       wrong += wrongFraction(scan, noise) / 300;
     }
     return wrong;
@@ -117,6 +118,7 @@ TEST(LabelNoise, ErrsAsNetworksDo) {
   for (int n = 0; n < 300; ++n) {
     Scan scan = scanAt({0.1f, 0.0f, 0.0f}, {10, 50}, 20);
     scan.origin.x() = 10.0 * n + 1.0;
+    scan.stamp = static_cast<std::uint64_t>(n);
     at_border += wrongFraction(scan, noise) / 300;
   }
   EXPECT_NEAR(at_border, 0.2 + 0.8 * 0.4, 0.06);
