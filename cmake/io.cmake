@@ -1,5 +1,5 @@
 # Files and simulation, and the programs that need no ROS: yaml-cpp, nlohmann-json and PCL's file formats.
-find_package(PCL REQUIRED COMPONENTS common filters io)
+find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
@@ -9,7 +9,7 @@ find_package(octomap REQUIRED)
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
     class_table_yaml.cpp cleaned_points.cpp config_yaml.cpp export_file.cpp grid_export.cpp map_export.cpp map_picture.cpp
-    map_statistics.cpp mapper_file.cpp octomap_export.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
+    map_statistics.cpp mapper_file.cpp octomap_export.cpp pcd_file.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
   LINK bki_mapping_mapping bki_mapping_store)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io PRIVATE pcl_common pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
@@ -18,9 +18,9 @@ target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS}
 set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG)
 bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
-bki_mapping_room(evaluation SOURCES dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
+bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation)
-target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json)
+target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation Boost::program_options)
 
 function(bki_mapping_tool target)

@@ -15,26 +15,14 @@
 
 namespace bki_mapping {
 
-/// The accuracies of the DynamicMap benchmark (Zhang et al., ITSC 2023), counted over the points of the
-/// scans.
-struct DynamicsQuality {
-  std::size_t static_points = 0;  ///< labelled points of static objects, in all scans
-  std::size_t static_kept = 0;    ///< of these, those in occupied voxels
-  /// Static points, and those of them kept, by class flag: ground, dynamic (could move, but stands still),
-  /// and neither.
-  std::size_t ground_points = 0, ground_kept = 0, standing_points = 0, standing_kept = 0, other_points = 0,
-              other_kept = 0;
-  std::size_t floor_voxels = 0;    ///< voxels with static points of ground
-  std::size_t floor_holes = 0;     ///< of these, those that are not occupied
-  std::size_t moving_points = 0;   ///< points of moving objects in the first half of the scans, in voxels
-                                   ///< that no point of the last scans hits and that are not taken
-  std::size_t moving_removed = 0;  ///< of these, those in voxels that are not occupied
+/// The accuracies of the DynamicMap benchmark (Zhang et al., ITSC 2023), of counted points.
+struct Accuracies {
+  std::size_t static_points = 0;   ///< points of static objects
+  std::size_t static_kept = 0;     ///< of these, those that the map keeps
+  std::size_t moving_points = 0;   ///< points of moving objects
+  std::size_t moving_removed = 0;  ///< of these, those that the map does not keep
 
-  double staticAccuracy() const { return fraction(static_kept, static_points); }  ///< SA
-  double groundAccuracy() const { return fraction(ground_kept, ground_points); }
-  double standingAccuracy() const { return fraction(standing_kept, standing_points); }
-  double otherAccuracy() const { return fraction(other_kept, other_points); }
-  double holes() const { return fraction(floor_holes, floor_voxels); }
+  double staticAccuracy() const { return fraction(static_kept, static_points); }       ///< SA
   double dynamicAccuracy() const { return fraction(moving_removed, moving_points); }   ///< DA
   double accuracy() const { return std::sqrt(staticAccuracy() * dynamicAccuracy()); }  ///< AA
   double harmonicAccuracy() const {                                                    ///< HA
@@ -42,11 +30,28 @@ struct DynamicsQuality {
     return sum == 0.0 ? 0.0 : 2.0 * staticAccuracy() * dynamicAccuracy() / sum;
   }
 
- private:
-  /// NaN if `whole` is 0.
-  static double fraction(std::size_t part, std::size_t whole) {
-    return static_cast<double>(part) / static_cast<double>(whole);
+ protected:
+  /// NaN of nothing.
+  static double fraction(std::size_t part, std::size_t all) {
+    return static_cast<double>(part) / static_cast<double>(all);
   }
+};
+
+/// The accuracies of a map, counted over the labelled points of the scans: static ones of all scans, and
+/// moving ones of the first half, in voxels that no point of the last scans hits and that are not taken. The
+/// map keeps a point if its voxel is occupied.
+struct DynamicsQuality : Accuracies {
+  /// Static points, and those of them kept, by class flag: ground, dynamic (could move, but stands still),
+  /// and neither.
+  std::size_t ground_points = 0, ground_kept = 0, standing_points = 0, standing_kept = 0, other_points = 0,
+              other_kept = 0;
+  std::size_t floor_voxels = 0;  ///< voxels with static points of ground
+  std::size_t floor_holes = 0;   ///< of these, those that are not occupied
+
+  double groundAccuracy() const { return fraction(ground_kept, ground_points); }
+  double standingAccuracy() const { return fraction(standing_kept, standing_points); }
+  double otherAccuracy() const { return fraction(other_kept, other_points); }
+  double holes() const { return fraction(floor_holes, floor_voxels); }
 };
 
 /// The outcome for a voxel, by its points: of static or of moving objects.

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "bki_mapping/core/named_parameter.h"
+
 namespace bki_mapping::tools {
 namespace {
 
@@ -91,6 +93,36 @@ class Table {
   std::ostringstream out_;
 };
 
+void addCloud(const CloudQuality& cloud, Table& table) {
+  const std::string distance = numberText(cloud.distance) + " m";
+  table.text("as the DynamicMap benchmark counts, with the " + std::to_string(cloud.cleaned_points) +
+             " points in occupied voxels as the cleaned cloud:");
+  table.percent("  SA", cloud.staticAccuracy(),
+                "of the static points of the truth have a cleaned point within " + distance);
+  table.percent("  DA", cloud.dynamicAccuracy(), "of its moving points have none");
+  table.percent("  AA", cloud.accuracy(), "sqrt(SA DA)");
+  table.percent("  HA", cloud.harmonicAccuracy(), "2 SA DA / (SA + DA)");
+  table.text("  " + std::to_string(cloud.static_points) + " static and " +
+             std::to_string(cloud.moving_points) + " moving points of the truth" +
+             (cloud.not_finite == 0
+                  ? ""
+                  : "; " + std::to_string(cloud.not_finite) + " that are not finite do not count"));
+}
+
+Json cloudJson(const CloudQuality& cloud) {
+  return {{"sa", cloud.staticAccuracy()},
+          {"da", cloud.dynamicAccuracy()},
+          {"aa", cloud.accuracy()},
+          {"ha", cloud.harmonicAccuracy()},
+          {"static_points", cloud.static_points},
+          {"static_kept", cloud.static_kept},
+          {"moving_points", cloud.moving_points},
+          {"moving_removed", cloud.moving_removed},
+          {"cleaned_points", cloud.cleaned_points},
+          {"points_not_finite", cloud.not_finite},
+          {"distance", cloud.distance}};
+}
+
 void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table) {
   for (const SpaceFigure& figure : kSpaceFigures) {
     table.percent(figure.name, (truth.all.*figure.proportion).fraction(), figure.meaning);
@@ -137,6 +169,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
                 "the same of the probability that something is in a voxel, by the points");
   table.percent("AUSE", s.sparsification_error, "area under the sparsification error curve, by variance");
   if (quality.truth) addTruth(*quality.truth, classes, table);
+  if (quality.cloud) addCloud(*quality.cloud, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
              " of moving objects; median " + figureText(quality.median_ms) + " ms a scan");
   if (quality.labels_are_ids) {
@@ -196,6 +229,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
   figures["probability_reliability"] = reliabilityJson(s.probability);
   figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
   figures["occupancy_reliability"] = reliabilityJson(quality.occupancy);
+  if (quality.cloud) figures["cloud"] = cloudJson(*quality.cloud);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";
 }

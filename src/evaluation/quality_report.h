@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "evaluation/cloud_evaluation.h"
 #include "evaluation/dynamics_evaluation.h"
 #include "evaluation/occupancy_evaluation.h"
 #include "evaluation/semantic_evaluation.h"
@@ -15,6 +16,7 @@ struct MapQuality {
   DynamicsQuality dynamics;
   SemanticQuality semantics;
   Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
+  std::optional<CloudQuality> cloud;               ///< compared with a ground-truth cloud
   std::optional<simulation::TruthQuality> truth;   ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< median time of a scan [ms]

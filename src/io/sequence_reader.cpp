@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/sequence.h"
+#include "io/pcd_file.h"
 
 namespace bki_mapping {
 namespace {
@@ -90,21 +91,21 @@ std::vector<T> readBinary(const fs::path& path, std::size_t record) {
   return values;
 }
 
-/// The file names of the scans, without their extension, by number.
-std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
+/// The file names of the scans, without their extension, by number. @param extension such as ".bin".
+std::map<std::size_t, std::string> scanNames(const fs::path& folder, const std::string& extension) {
   if (!fs::is_directory(folder)) {
-    fail(folder.string() + " is not a folder; give the folder of a sequence, with velodyne/ inside");
+    fail(folder.string() + " is not a folder; give the folder of a sequence, with velodyne/ or pcd/ inside");
   }
   std::map<std::size_t, std::string> names;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() != ".bin") continue;
+    if (entry.path().extension() != extension) continue;
     const std::string name = entry.path().stem().string();
     std::size_t number = 0;
     const char* const end = name.data() + name.size();
     const auto [rest, error] = std::from_chars(name.data(), end, number);
     if (error != std::errc() || rest != end) {
-      fail(entry.path().string() + " is not named by the number of its scan; rename it to NNNNNN.bin, line " +
-           "NNNNNN + 1 of poses.txt being its pose, or move it elsewhere");
+      fail(entry.path().string() + " is not named by the number of its scan; rename it to NNNNNN" +
+           extension + ", line NNNNNN + 1 of poses.txt being its pose, or move it elsewhere");
     }
     const auto [known, is_new] = names.emplace(number, name);
     if (!is_new) {
@@ -112,7 +113,7 @@ std::map<std::size_t, std::string> scanNames(const fs::path& folder) {
            std::max(known->second, name) + " have the same number; remove one");
     }
   }
-  if (names.empty()) fail(folder.string() + " holds no scans (*.bin)");
+  if (names.empty()) fail(folder.string() + " holds no scans (*" + extension + ")");
   return names;
 }
 
@@ -124,6 +125,30 @@ const std::vector<double>& lineOf(const std::vector<std::vector<double>>& lines,
        std::to_string(lines.size()) + " lines; line 1 belongs to scan 000000");
 }
 
+void readVelodyne(const fs::path& path, SequenceFrame& frame) {
+  const auto values = readBinary<float>(path, 4 * sizeof(float));
+  frame.points.reserve(values.size() / 4);
+  frame.remissions.reserve(values.size() / 4);
+  for (std::size_t p = 0; p < values.size(); p += 4) {
+    frame.points.emplace_back(values[p], values[p + 1], values[p + 2]);
+    frame.remissions.push_back(values[p + 3]);
+  }
+}
+
+/// Reads points of the map frame into the sensor frame of the frame's pose.
+void readPcd(const std::string& path, SequenceFrame& frame) {
+  const PcdPoints cloud = readPcdPoints(path);
+  const Eigen::Isometry3d T_sensor_map = frame.T_map_sensor.inverse();
+  frame.points.reserve(cloud.points.size());
+  for (const Eigen::Vector3f& point : cloud.points) {
+    frame.points.push_back((T_sensor_map * point.cast<double>()).cast<float>());
+  }
+  frame.remissions.assign(cloud.points.size(), 0.0f);
+  for (std::size_t i = 0; i < cloud.intensity.size(); ++i) {
+    frame.remissions[i] = static_cast<float>(cloud.intensity[i]);
+  }
+}
+
 std::string sixDigits(std::size_t number) {
   const std::string digits = std::to_string(number);
   return std::string(6 - std::min<std::size_t>(digits.size(), 6), '0') + digits;
@@ -133,11 +158,33 @@ std::string sixDigits(std::size_t number) {
 
 Sequence::Sequence(const std::string& folder, const std::string& labels) : folder_(folder), labels_(labels) {
   const fs::path root(folder), poses_file = root / "poses.txt", times_file = root / "times.txt";
-  const auto names = scanNames(root / "velodyne");
+  const fs::path pcd = root / "pcd", scans = root / "velodyne";
+  std::vector<std::vector<double>> times;
+  const bool timed = fs::exists(times_file);
+  const auto secondsOf = [&](std::size_t number, const std::string& name) {
+    if (!timed) return 0.1 * static_cast<double>(number);
+    const auto& line = lineOf(times, times_file, number, name);
+    if (line.empty()) {
+      fail(times_file.string() + " line " + std::to_string(number + 1) + " is empty, but scan " + name +
+           " needs a time");
+    }
+    return line.front();
+  };
+  if (fs::is_directory(pcd) && !fs::is_directory(scans)) {
+    layout_ = SequenceLayout::kDynamicMap;
+    labelled_ = fs::is_directory(root / labels);
+    if (!labelled_ && labels != "labels")
+      fail((root / labels).string() + " is not a folder; give one with labels");
+    if (timed) times = readNumberLines(times_file, "check its rights");
+    for (const auto& [number, name] : scanNames(pcd, ".pcd")) {
+      addScan(number, name, readPcdViewpoint((pcd / (name + ".pcd")).string()), secondsOf(number, name));
+    }
+    return;
+  }
+  const auto names = scanNames(scans, ".bin");
   const Eigen::Isometry3d T_camera_sensor = readCalibration(root / "calib.txt");
   const auto poses = readNumberLines(poses_file, "a sequence needs a pose a scan");
-  const bool timed = fs::exists(times_file);
-  const auto times = timed ? readNumberLines(times_file, "check its rights") : poses;
+  if (timed) times = readNumberLines(times_file, "check its rights");
   const auto pose = [&](std::size_t number, const std::string& name) {
     const auto& numbers = lineOf(poses, poses_file, number, name);
     const std::string what = poses_file.string() + " line " + std::to_string(number + 1);
@@ -145,24 +192,20 @@ Sequence::Sequence(const std::string& folder, const std::string& labels) : folde
   };
   const Eigen::Isometry3d T_first = pose(0, sixDigits(0));
   for (const auto& [number, name] : names) {
-    numbers_.push_back(number);
-    names_.push_back(name);
-    poses_.push_back(T_first.inverse() * pose(number, name));
-    double seconds = 0.1 * static_cast<double>(number);
-    if (timed) {
-      const auto& line = lineOf(times, times_file, number, name);
-      if (line.empty()) {
-        fail(times_file.string() + " line " + std::to_string(number + 1) + " is empty, but scan " + name +
-             " needs a time");
-      }
-      seconds = line.front();
-    }
-    if (!(seconds >= 0.0 && seconds < 4e9)) {
-      fail(times_file.string() + " line " + std::to_string(number + 1) +
-           ": the time must be from 0 to 4e9 s, as ROS stamps are");
-    }
-    stamps_.push_back(kFirstStamp + static_cast<std::uint64_t>(std::llround(seconds * 1e9)));
+    addScan(number, name, T_first.inverse() * pose(number, name), secondsOf(number, name));
   }
+}
+
+void Sequence::addScan(std::size_t number, const std::string& name, const Eigen::Isometry3d& T_map_sensor,
+                       double seconds) {
+  if (!(seconds >= 0.0 && seconds < 4e9)) {
+    fail((fs::path(folder_) / "times.txt").string() + " line " + std::to_string(number + 1) +
+         ": the time must be from 0 to 4e9 s, as ROS stamps are");
+  }
+  numbers_.push_back(number);
+  names_.push_back(name);
+  poses_.push_back(T_map_sensor);
+  stamps_.push_back(kFirstStamp + static_cast<std::uint64_t>(std::llround(seconds * 1e9)));
 }
 
 std::string Sequence::gaps() const {
@@ -179,28 +222,32 @@ std::string Sequence::gaps() const {
   if (missing == 0) return "";
   if (ranges > kMaxNamed) text += " and others (" + std::to_string(missing) + " in all)";
   return (missing == 1 ? "scan " + text + " is" : "scans " + text + " are") + " missing in " +
-         (fs::path(folder_) / "velodyne").string();
+         (fs::path(folder_) / (layout_ == SequenceLayout::kDynamicMap ? "pcd" : "velodyne")).string();
 }
 
 SequenceFrame Sequence::read(std::size_t i) const {
-  const fs::path scan = fs::path(folder_) / "velodyne" / (names_[i] + ".bin");
-  const fs::path label = fs::path(folder_) / labels_ / (names_[i] + ".label");
-  const auto values = readBinary<float>(scan, 4 * sizeof(float));
+  const bool is_pcd = layout_ == SequenceLayout::kDynamicMap;
+  const fs::path scan =
+      fs::path(folder_) / (is_pcd ? "pcd" : "velodyne") / (names_[i] + (is_pcd ? ".pcd" : ".bin"));
   SequenceFrame frame;
-  frame.labels = readBinary<std::uint32_t>(label, sizeof(std::uint32_t));
-  if (frame.labels.size() != values.size() / 4) {
-    fail(label.string() + " has " + std::to_string(frame.labels.size()) + " labels, but " + scan.string() +
-         " has " + std::to_string(values.size() / 4) + " points; they must be as many");
-  }
-  for (std::uint32_t& raw : frame.labels) raw &= 0xffffu;  // the upper 16 bits are the instance id
-  frame.points.reserve(values.size() / 4);
-  frame.remissions.reserve(values.size() / 4);
-  for (std::size_t p = 0; p < values.size(); p += 4) {
-    frame.points.emplace_back(values[p], values[p + 1], values[p + 2]);
-    frame.remissions.push_back(values[p + 3]);
-  }
   frame.T_map_sensor = poses_[i];
   frame.stamp = stamps_[i];
+  if (is_pcd) {
+    readPcd(scan.string(), frame);
+  } else {
+    readVelodyne(scan, frame);
+  }
+  if (!labelled_) {
+    frame.labels.assign(frame.points.size(), 0);
+    return frame;
+  }
+  const fs::path label = fs::path(folder_) / labels_ / (names_[i] + ".label");
+  frame.labels = readBinary<std::uint32_t>(label, sizeof(std::uint32_t));
+  if (frame.labels.size() != frame.points.size()) {
+    fail(label.string() + " has " + std::to_string(frame.labels.size()) + " labels, but " + scan.string() +
+         " has " + std::to_string(frame.points.size()) + " points; they must be as many");
+  }
+  for (std::uint32_t& raw : frame.labels) raw &= 0xffffu;  // the upper 16 bits are the instance id
   return frame;
 }
 

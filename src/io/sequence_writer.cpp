@@ -8,6 +8,7 @@
 
 #include "bki_mapping/io/sequence.h"
 #include "core/atomic_file.h"
+#include "io/pcd_file.h"
 
 namespace bki_mapping {
 namespace {
@@ -42,8 +43,9 @@ void LabelWriter::write(const std::string& name, const std::vector<std::uint32_t
   writeBinary(fs::path(folder_) / (name + ".label"), labels);
 }
 
-SequenceWriter::SequenceWriter(const std::string& folder) : folder_(folder) {
-  for (const char* name : {"velodyne", "labels"}) {
+SequenceWriter::SequenceWriter(const std::string& folder, SequenceLayout layout)
+    : folder_(folder), layout_(layout) {
+  for (const char* name : {layout == SequenceLayout::kDynamicMap ? "pcd" : "velodyne", "labels"}) {
     makeEmptyFolder(fs::path(folder) / name, "give a new folder, or remove the old scans first");
   }
 }
@@ -51,13 +53,22 @@ SequenceWriter::SequenceWriter(const std::string& folder) : folder_(folder) {
 void SequenceWriter::write(const SequenceFrame& frame) {
   char name[16];
   std::snprintf(name, sizeof(name), "%06zu", count_++);
-  std::vector<float> values;
-  values.reserve(4 * frame.points.size());
-  for (std::size_t i = 0; i < frame.points.size(); ++i) {
-    values.insert(values.end(),
-                  {frame.points[i].x(), frame.points[i].y(), frame.points[i].z(), frame.remissions[i]});
+  if (layout_ == SequenceLayout::kDynamicMap) {
+    std::vector<Eigen::Vector3f> points;
+    points.reserve(frame.points.size());
+    for (const Eigen::Vector3f& point : frame.points)
+      points.push_back((frame.T_map_sensor * point.cast<double>()).cast<float>());
+    writePcdPoints((fs::path(folder_) / "pcd" / (std::string(name) + ".pcd")).string(), points,
+                   frame.remissions, frame.T_map_sensor);
+  } else {
+    std::vector<float> values;
+    values.reserve(4 * frame.points.size());
+    for (std::size_t i = 0; i < frame.points.size(); ++i) {
+      values.insert(values.end(),
+                    {frame.points[i].x(), frame.points[i].y(), frame.points[i].z(), frame.remissions[i]});
+    }
+    writeBinary(fs::path(folder_) / "velodyne" / (std::string(name) + ".bin"), values);
   }
-  writeBinary(fs::path(folder_) / "velodyne" / (std::string(name) + ".bin"), values);
   writeBinary(fs::path(folder_) / "labels" / (std::string(name) + ".label"), frame.labels);
 
   std::ostringstream pose, time;
@@ -74,8 +85,9 @@ void SequenceWriter::write(const SequenceFrame& frame) {
 }
 
 void SequenceWriter::finish() {
-  writeTextFile((fs::path(folder_) / "poses.txt").string(), poses_);
   writeTextFile((fs::path(folder_) / "times.txt").string(), times_);
+  if (layout_ == SequenceLayout::kDynamicMap) return;
+  writeTextFile((fs::path(folder_) / "poses.txt").string(), poses_);
   writeTextFile((fs::path(folder_) / "calib.txt").string(), "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
 }
 

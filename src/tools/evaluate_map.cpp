@@ -10,6 +10,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "core/quantile.h"
+#include "evaluation/cloud_evaluation.h"
 #include "evaluation/label_noise.h"
 #include "evaluation/pose_noise.h"
 #include "evaluation/quality_report.h"
@@ -45,6 +46,13 @@ po::options_description options() {
       "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
       "pose-drift", po::value<std::string>()->value_name("M,DEG"),
       "the same for errors of each step from pose to pose, which add up")(
+      "cloud", po::bool_switch(),
+      "also compare the points in occupied voxels with a ground-truth cloud, as the DynamicMap benchmark "
+      "does: "
+      "gt_cloud.pcd beside pcd/, otherwise the labelled points of the scans")(
+      "cloud-distance",
+      tools::realOption("--cloud-distance", 0.0, 10.0)->value_name("M")->default_value(0.05),
+      "distance within which points of the two clouds match [m]")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
       "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -57,6 +65,7 @@ struct Evaluation {
   SemanticEvaluation semantics;
   OccupancyEvaluation occupancy;
   std::optional<simulation::TruthEvaluation> truth;
+  std::optional<CloudEvaluation> cloud;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
   std::size_t labels = 0, unknown_labels = 0;
@@ -67,13 +76,24 @@ struct Evaluation {
     dynamics.add(scan, classes);
     semantics.add(scan, predicted, classes);
     occupancy.add(scan);
-    if (truth) truth->add(scan);
+    addPoints(scan);
     labels += scan.labels.size();
     for (const std::uint32_t label : scan.labels) {
       if (classes.classOf(label, labelValues(scan))) continue;
       ++unknown_labels;
       unknown_label = label;
     }
+  }
+
+  /// The same for a scan without labels: the ground-truth cloud, if there is one, says what moves.
+  void addUnlabelled(const Scan& scan, const ClassTable& classes) {
+    dynamics.add(cloud ? cloud->labelled(scan) : Scan(), classes);
+    addPoints(scan);
+  }
+
+  void addPoints(const Scan& scan) {
+    if (truth) truth->add(scan);
+    if (cloud) cloud->add(scan);
   }
 
   /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known.
@@ -89,6 +109,7 @@ struct Evaluation {
     quality.semantics = semantics.compare(map, left);
     quality.occupancy = occupancy.compare(map, left);
     if (truth) quality.truth = truth->compare(map, end);
+    if (cloud) quality.cloud = cloud->compare(map);
     quality.labels = labels;
     quality.unknown_labels = unknown_labels;
     quality.unknown_label = unknown_label;
@@ -134,6 +155,33 @@ std::optional<PoseNoise> poseNoise(const po::variables_map& given) {
                    degrees * 3.14159265358979323846 / 180.0, tools::count(given, "noise-seed"));
 }
 
+/// @throws std::invalid_argument if the sequence, or what is mapped of it, has no such measure.
+std::optional<CloudEvaluation> cloudEvaluation(const po::variables_map& given, const Sequence& sequence,
+                                               const MapperConfig& config) {
+  if (!given["cloud"].as<bool>()) return std::nullopt;
+  const double distance = given["cloud-distance"].as<double>();
+  if (sequence.layout() != SequenceLayout::kDynamicMap) {
+    if (config.label_values == LabelValues::kId) {
+      throw std::invalid_argument(
+          "--cloud needs raw labels, because class ids do not say what moves; leave out "
+          "label_values=id");
+    }
+    return CloudEvaluation(std::nullopt, distance);
+  }
+  if (given["first"].as<std::int64_t>() > 0 || given.count("scans") || given.count("pose-drift")) {
+    throw std::invalid_argument(
+        "--cloud compares with the cloud of all scans at their poses; leave out --first, --scans and "
+        "--pose-drift");
+  }
+  const std::filesystem::path file = std::filesystem::path(sequence.folder()) / "gt_cloud.pcd";
+  if (!std::filesystem::exists(file)) {
+    throw std::invalid_argument(
+        "--cloud needs " + file.string() +
+        ", a cloud of all scans whose points of moving objects have intensity 1; it is missing");
+  }
+  return CloudEvaluation(readTruthCloud(file.string()), distance);
+}
+
 void drawErrors(const std::string& picture, const std::string& rows) {
   const std::filesystem::path path(picture);
   const std::string table = std::filesystem::path(path).replace_extension(".csv").string();
@@ -166,7 +214,7 @@ int evaluate(const po::variables_map& given) {
   const auto moving = DynamicsEvaluation::movingOfSemanticKitti();
   Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
                         SemanticEvaluation(geometry, moving), OccupancyEvaluation(geometry, moving),
-                        std::nullopt};
+                        std::nullopt, cloudEvaluation(given, sequence, mapper.config())};
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   // A map that drifts is in no frame of the true scene.
@@ -186,7 +234,11 @@ int evaluate(const po::variables_map& given) {
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
     times.push_back(mapper.integrate(input).totalMs());
-    evaluation.add(scan, input.labels, mapper.classes());
+    if (sequence.labelled()) {
+      evaluation.add(scan, input.labels, mapper.classes());
+    } else {
+      evaluation.addUnlabelled(scan, mapper.classes());
+    }
     if (drive) {
       evaluation.end = drive->timeOf(sequence.number(i));
       const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;

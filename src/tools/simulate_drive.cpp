@@ -1,6 +1,9 @@
-// Writes a simulated drive as a folder in SemanticKITTI's layout.
+// Writes a simulated drive as a folder in the layout of SemanticKITTI or of the DynamicMap benchmark.
 #include <iostream>
 
+#include <filesystem>
+
+#include "evaluation/cloud_evaluation.h"
 #include "simulation/drive_file.h"
 #include "tools/options.h"
 
@@ -32,6 +35,8 @@ po::options_description options() {
       "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
       "speed", po::value<double>()->value_name("M/S"),
       "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2")(
+      "layout", value<std::string>("NAME", "semantic_kitti"),
+      "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
       "seed of the street and of the noise");
   return options;
@@ -66,19 +71,31 @@ simulation::DriveConfig driveConfig(const po::variables_map& given) {
   return drive;
 }
 
+SequenceLayout layoutNamed(const std::string& name) {
+  if (name == "semantic_kitti") return SequenceLayout::kSemanticKitti;
+  if (name == "dynamic_map") return SequenceLayout::kDynamicMap;
+  throw std::invalid_argument("there is no layout " + name + "; known layouts: semantic_kitti, dynamic_map");
+}
+
 int simulate(const po::variables_map& given) {
   const simulation::DriveConfig config = driveConfig(given);
   const simulation::Drive drive(config);
   const std::string folder = given["output"].as<std::string>();
-  SequenceWriter writer(folder);
+  const SequenceLayout layout = layoutNamed(given["layout"].as<std::string>());
+  SequenceWriter writer(folder, layout);
+  TruthCloud truth;
   std::size_t points = 0;
   for (std::size_t i = 0; i < drive.size(); ++i) {
     const SequenceFrame frame = drive.frame(i);
     writer.write(frame);
+    if (layout == SequenceLayout::kDynamicMap) truth.add(frame.scan());
     points += frame.points.size();
     tools::showProgress(i + 1, drive.size(), "scans");
   }
   writer.finish();
+  if (layout == SequenceLayout::kDynamicMap) {
+    writeTruthCloud((std::filesystem::path(folder) / "gt_cloud.pcd").string(), truth);
+  }
   simulation::writeDriveFile(folder, config);
   std::cout << drive.size() << " scans, " << points / drive.size() << " points a scan, in " << folder << "\n";
   return 0;
@@ -88,8 +105,8 @@ int simulate(const po::variables_map& given) {
 
 int main(int argc, char** argv) {
   return tools::run("simulate_drive", [&] {
-    const auto given = tools::parse(
-        argc, argv, "Writes a simulated drive in SemanticKITTI's layout (raw labels).", options());
+    const auto given =
+        tools::parse(argc, argv, "Writes a simulated drive with raw labels of SemanticKITTI.", options());
     return given ? simulate(*given) : 0;
   });
 }

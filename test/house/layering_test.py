@@ -35,7 +35,7 @@ LIBRARIES = {
     'mapping/semantic_mapper.cpp': ('malloc.h',),
     'store': ('sqlite3.h', 'zlib.h'),
     'io': ('octomap/', 'pcl/', 'png.h', 'yaml-cpp/'),
-    'evaluation': ('nlohmann/',),
+    'evaluation': ('nlohmann/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),

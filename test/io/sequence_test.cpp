@@ -80,6 +80,35 @@ TEST_F(SequenceFolder, WithoutTimesScansAreATenthApart) {
   EXPECT_EQ(Sequence(folder_ / "drive").read(1).stamp, Sequence::kFirstStamp + 100000000);
 }
 
+TEST_F(SequenceFolder, TheLayoutOfTheDynamicMapBenchmarkReadsAlike) {
+  SequenceWriter writer(folder_ / "pcd_drive", SequenceLayout::kDynamicMap);
+  writer.write(frameAt(0.0, 0));
+  writer.write(frameAt(1.0, 250000000));
+  writer.finish();
+  const SequenceFrame expected = frameAt(1.0, 250000000);
+  const auto check = [&](std::uint64_t stamp, const std::vector<std::uint32_t>& labels) {
+    const Sequence sequence(folder_ / "pcd_drive");
+    ASSERT_EQ(sequence.size(), 2u);
+    EXPECT_EQ(sequence.layout(), SequenceLayout::kDynamicMap);
+    EXPECT_EQ(sequence.labelled(), labels[0] != 0);
+    const SequenceFrame frame = sequence.read(1);
+    ASSERT_EQ(frame.points.size(), expected.points.size());
+    for (std::size_t i = 0; i < frame.points.size(); ++i)
+      EXPECT_TRUE(frame.points[i].isApprox(expected.points[i], 1e-6f)) << frame.points[i].transpose();
+    EXPECT_EQ(frame.labels, labels);
+    EXPECT_EQ(frame.remissions, expected.remissions);
+    EXPECT_EQ(frame.stamp, Sequence::kFirstStamp + stamp);
+    EXPECT_TRUE(frame.T_map_sensor.isApprox(expected.T_map_sensor, 1e-12));
+  };
+  check(250000000, expected.labels);
+  std::filesystem::remove(folder_ / "pcd_drive/times.txt");
+  std::filesystem::remove_all(folder_ / "pcd_drive/labels");
+  check(100000000, {0, 0});
+  EXPECT_THROW(Sequence(folder_ / "pcd_drive", "predictions"), std::runtime_error);
+  std::filesystem::rename(folder_ / "pcd_drive/pcd/000001.pcd", folder_ / "pcd_drive/pcd/last.pcd");
+  EXPECT_THROW(Sequence(folder_ / "pcd_drive"), std::runtime_error);
+}
+
 TEST_F(SequenceFolder, NamesMissingThings) {
   std::filesystem::remove(folder_ / "drive/labels/000001.label");
   expectFault("000001.label cannot be read");

@@ -138,6 +138,45 @@ class Tools(unittest.TestCase):
         self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
         self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
 
+    def cloud_figures(self, drive, *more):
+        result = call('evaluate_map', '--sequence', drive, '--late', '1', '--cloud', '--json', self.path('figures.json'), *more)
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        self.assertIn('as the DynamicMap benchmark counts', result.stdout)
+        with open(self.path('figures.json')) as file:
+            return json.load(file)
+
+    def test_clouds_are_compared_as_the_dynamicmap_benchmark_does(self):
+        export = self.path('export')
+        made = call('simulate_drive', '--output', export, '--scans', '4', '--beams', '16', '--columns', '400', '--layout', 'dynamic_map')
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertEqual(sorted(os.listdir(export)), ['gt_cloud.pcd', 'labels', 'pcd', 'simulation.yaml', 'times.txt'])
+        of_points, of_cloud = self.cloud_figures(self.drive), self.cloud_figures(export)
+        for name in ('static_points', 'moving_points'):
+            self.assertEqual(of_points['cloud'][name], of_cloud['cloud'][name])
+        self.assertGreater(of_cloud['cloud']['moving_points'], 20)
+        for name in ('sa', 'da', 'aa', 'ha'):  # coordinates are rounded to floats in another frame
+            self.assertAlmostEqual(of_points['cloud'][name], of_cloud['cloud'][name], delta=0.01)
+        self.assertLess(of_cloud['cloud']['sa'], 1.0)
+        hits_alone = self.cloud_figures(export, '--set', 'free_space/mode=none')
+        self.assertEqual((hits_alone['cloud']['sa'], hits_alone['cloud']['da']), (1.0, 0.0))
+
+        # Without labels: the ground truth says what moves, but not what is of which class.
+        shutil.rmtree(os.path.join(export, 'labels'))
+        blind = self.cloud_figures(export, '--classes', 'occupancy')
+        self.assertAlmostEqual(blind['sa'], of_cloud['sa'], delta=0.1)
+        self.assertEqual(blind['static_points'] , of_cloud['cloud']['static_points'])
+        self.assertIsNone(blind['miou_map'])
+        self.fails('leave out --first, --scans and --pose-drift', 'evaluate_map', '--sequence', export, '--cloud', '--scans', '2')
+        os.remove(os.path.join(export, 'gt_cloud.pcd'))
+        self.fails('gt_cloud.pcd, a cloud of all scans', 'evaluate_map', '--sequence', export, '--cloud')
+        self.fails('class ids do not say what moves', 'evaluate_map', '--sequence', self.drive, '--cloud', '--set', 'label_values=id')
+        scan = os.path.join(export, 'pcd', '000002.pcd')
+        with open(scan, 'rb') as file:
+            text = file.read()
+        with open(scan, 'wb') as file:
+            file.write(text.replace(b'VIEWPOINT', b'# VIEWPOINT'))
+        self.fails('has no line VIEWPOINT', 'evaluate_map', '--sequence', export)
+
     def test_evaluation_against_the_truth_of_the_simulation(self):
         hits_alone, lines = self.evaluation('free_space/mode=none'), self.evaluation()
         self.assertEqual(hits_alone['truth']['free_recall'], 0.0)

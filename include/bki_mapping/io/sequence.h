@@ -1,4 +1,5 @@
-/// @file Reads and writes sequences of scans in SemanticKITTI's layout.
+/// @file Reads and writes sequences of scans, in the layouts of SemanticKITTI and of the DynamicMap
+/// benchmark.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -20,10 +21,18 @@ struct SequenceFrame {
   Scan scan() const { return scanFromSensorFrame(T_map_sensor, points, labels, stamp); }
 };
 
+enum class SequenceLayout {
+  kSemanticKitti,  ///< velodyne/, labels/, poses.txt, calib.txt
+  kDynamicMap,     ///< pcd/; labels/ is optional
+};
+
 /// A folder with velodyne/NNNNNN.bin, LABELS/NNNNNN.label, poses.txt (3x4 row-major, camera frame of scan 0),
 /// calib.txt (Tr: sensor to camera) and, optionally, times.txt [s]; without it scans are 0.1 s apart. Line
 /// N + 1 of poses and times belongs to scan NNNNNN = N, even if earlier scans are missing. The map frame is
 /// the sensor's frame at the pose in the first line. Rotations are orthonormalised.
+///
+/// Or a folder of the DynamicMap benchmark, with pcd/NNNNNN.pcd: points in the map frame, and the pose of the
+/// sensor in VIEWPOINT. LABELS and times.txt are optional there; without labels, all are 0.
 class Sequence {
  public:
   /// Offset added to all times [ns], because time 0 means "the latest" to tf.
@@ -37,6 +46,9 @@ class Sequence {
   /// Number of scans that exist; the index `i` below runs over these, without gaps.
   std::size_t size() const { return poses_.size(); }
   const std::string& folder() const { return folder_; }
+  SequenceLayout layout() const { return layout_; }
+  /// Whether the scans have labels.
+  bool labelled() const { return labelled_; }
   /// File name of a scan without its extension.
   const std::string& name(std::size_t i) const { return names_[i]; }
   /// The number in the file name.
@@ -47,7 +59,12 @@ class Sequence {
   SequenceFrame read(std::size_t i) const;
 
  private:
+  void addScan(std::size_t number, const std::string& name, const Eigen::Isometry3d& T_map_sensor,
+               double seconds);
+
   std::string folder_, labels_;
+  SequenceLayout layout_ = SequenceLayout::kSemanticKitti;
+  bool labelled_ = true;
   std::vector<std::size_t> numbers_;
   std::vector<std::string> names_;
   std::vector<Eigen::Isometry3d> poses_;
@@ -67,18 +84,19 @@ class LabelWriter {
   std::string folder_;
 };
 
-/// Writes frames in the same layout; Tr is the identity.
+/// Writes frames in the same layouts, with labels and times; Tr is the identity.
 class SequenceWriter {
  public:
   /// Creates the folders. @throws std::runtime_error if that fails, or if `folder` already holds scans.
-  explicit SequenceWriter(const std::string& folder);
+  explicit SequenceWriter(const std::string& folder, SequenceLayout layout = SequenceLayout::kSemanticKitti);
   /// @throws std::runtime_error if a file cannot be written.
   void write(const SequenceFrame& frame);
-  /// Writes poses.txt, times.txt and calib.txt.
+  /// Writes times.txt and, in SemanticKITTI's layout, poses.txt and calib.txt.
   void finish();
 
  private:
   std::string folder_, poses_, times_;
+  SequenceLayout layout_;
   std::size_t count_ = 0;
 };
 

@@ -1,0 +1,157 @@
+#include "evaluation/cloud_evaluation.h"
+
+#include <pcl/kdtree/kdtree_flann.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/map/map_query.h"
+#include "io/pcd_file.h"
+#include "parallel/thread_pool.h"
+
+namespace bki_mapping {
+namespace {
+
+// Of the benchmark's converter for SemanticKITTI.
+constexpr float kMostRange = 50.0f, kOwnCar = 3.0f;
+constexpr std::uint32_t kUnlabelled = 0, kOutlier = 1, kMovingCar = 252;
+
+Eigen::Vector3f inMapFrame(const Scan& scan, std::size_t i) {
+  return (scan.origin + scan.points[i].cast<double>()).cast<float>();
+}
+
+}  // namespace
+
+void TruthCloud::add(const Scan& scan) {
+  static const std::set<std::uint32_t> moves = DynamicsEvaluation::movingOfSemanticKitti();
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const float range = scan.points[i].norm();
+    if (!std::isfinite(range)) ++not_finite;
+    if (!(range < kMostRange)) continue;
+    const std::uint32_t label = scan.labels[i];
+    const bool own_car = range < kOwnCar && (label == kUnlabelled || label == kOutlier);
+    points.push_back(inMapFrame(scan, i));
+    moving.push_back(own_car || moves.count(label) > 0);
+  }
+}
+
+TruthCloud readTruthCloud(const std::string& path) {
+  const PcdPoints file = readPcdPoints(path);
+  const std::vector<double>& values = file.label.empty() ? file.intensity : file.label;
+  const std::string name = file.label.empty() ? "intensity" : "label";
+  if (values.size() != file.points.size()) {
+    throw std::runtime_error(path +
+                             " has neither a field label nor a field intensity; one of them must be 1 "
+                             "for points of moving objects, and 0 for others");
+  }
+  TruthCloud cloud;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] != 0.0 && values[i] != 1.0) {
+      throw std::runtime_error(path + ": point " + std::to_string(i) + " has " + name + " " +
+                               numberText(values[i]) + ", but must have 1 (moving) or 0");
+    }
+    if (!file.points[i].allFinite()) {
+      ++cloud.not_finite;
+      continue;
+    }
+    cloud.points.push_back(file.points[i]);
+    cloud.moving.push_back(values[i] == 1.0);
+  }
+  return cloud;
+}
+
+void writeTruthCloud(const std::string& path, const TruthCloud& cloud) {
+  writePcdPoints(path, cloud.points, {cloud.moving.begin(), cloud.moving.end()},
+                 Eigen::Isometry3d::Identity());
+}
+
+struct NearestPoints::Tree {
+  pcl::KdTreeFLANN<pcl::PointXYZ> points;
+};
+
+NearestPoints::NearestPoints(const std::vector<Eigen::Vector3f>& points) {
+  if (points.empty()) return;  // PCL wants one at least
+  const auto cloud = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+  cloud->reserve(points.size());
+  for (const Eigen::Vector3f& point : points) cloud->emplace_back(point.x(), point.y(), point.z());
+  tree_ = std::make_unique<Tree>();
+  tree_->points.setInputCloud(cloud);
+}
+
+NearestPoints::~NearestPoints() = default;
+NearestPoints::NearestPoints(NearestPoints&&) noexcept = default;
+
+std::optional<std::size_t> NearestPoints::find(const Eigen::Vector3f& point, float distance) const {
+  if (!tree_ || !point.allFinite()) return std::nullopt;
+  std::vector<int> index(1);
+  std::vector<float> squared(1);
+  if (tree_->points.nearestKSearch({point.x(), point.y(), point.z()}, 1, index, squared) == 0)
+    return std::nullopt;
+  if (std::sqrt(squared[0]) > distance) return std::nullopt;
+  return static_cast<std::size_t>(index[0]);
+}
+
+CloudQuality compareClouds(const TruthCloud& truth, const std::vector<Eigen::Vector3f>& cleaned,
+                           double distance) {
+  const NearestPoints nearest(cleaned);
+  std::vector<std::uint8_t> kept(truth.points.size());
+  ThreadPool pool(0);
+  constexpr std::size_t kChunk = 4096;  // points
+  pool.forEach((kept.size() + kChunk - 1) / kChunk, [&](std::size_t chunk, std::size_t) {
+    const std::size_t end = std::min(kept.size(), (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i)
+      kept[i] = nearest.find(truth.points[i], static_cast<float>(distance)).has_value();
+  });
+  CloudQuality quality;
+  quality.distance = distance;
+  quality.cleaned_points = cleaned.size();
+  quality.not_finite = truth.not_finite;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    (truth.moving[i] ? quality.moving_points : quality.static_points) += 1;
+    quality.moving_removed += truth.moving[i] && !kept[i];
+    quality.static_kept += !truth.moving[i] && kept[i];
+  }
+  return quality;
+}
+
+CloudEvaluation::CloudEvaluation(std::optional<TruthCloud> truth, double distance) : distance_(distance) {
+  if (!truth) return;
+  truth_ = std::move(*truth);
+  nearest_in_truth_.emplace(truth_.points);
+}
+
+void CloudEvaluation::add(const Scan& scan) {
+  if (!nearest_in_truth_) truth_.add(scan);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.points[i].allFinite()) points_.push_back(inMapFrame(scan, i));
+  }
+}
+
+Scan CloudEvaluation::labelled(const Scan& scan) const {
+  Scan known = scan;
+  known.points.clear();
+  known.labels.clear();
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const auto same = nearest_in_truth_->find(inMapFrame(scan, i), static_cast<float>(distance_));
+    if (!same) continue;
+    known.points.push_back(scan.points[i]);
+    known.labels.push_back(truth_.moving[*same] ? kMovingCar : kUnlabelled);
+  }
+  return known;
+}
+
+CloudQuality CloudEvaluation::compare(const SemanticMap& map) const {
+  std::vector<Eigen::Vector3f> cleaned;
+  for (const Eigen::Vector3f& point : points_) {
+    const Eigen::Vector3d at = point.cast<double>();
+    if (!map.geometry().contains(at)) continue;
+    const VoxelView view = viewWithoutEntropy(map, map.geometry().voxelAt(at));
+    if (view.state == VoxelState::kOccupied) cleaned.push_back(point);
+  }
+  return compareClouds(truth_, cleaned, distance_);
+}
+
+}  // namespace bki_mapping

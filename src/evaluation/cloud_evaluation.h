@@ -1,0 +1,80 @@
+/// @file Compares the points that a map keeps with a ground-truth cloud, as the DynamicMap benchmark does
+/// (Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps", ITSC 2023).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/core/scan.h"
+#include "bki_mapping/map/semantic_map.h"
+#include "evaluation/dynamics_evaluation.h"
+
+namespace bki_mapping {
+
+/// A cloud in the map frame of which it is known what moves.
+struct TruthCloud {
+  std::vector<Eigen::Vector3f> points;  ///< all finite [m]
+  std::vector<std::uint8_t> moving;     ///< whether each point is of a moving object
+  std::size_t not_finite = 0;           ///< number of points left out
+
+  /// Adds a scan with raw labels of SemanticKITTI, as the benchmark makes its clouds from them: 252 to 259
+  /// move, and so do points without a class (0, 1) within 3 m, which are of the car itself. Points 50 m away
+  /// and farther are left out, because their labels are not reliable.
+  void add(const Scan& scan);
+};
+
+/// Reads a cloud whose field `label` or, if it has none, `intensity` is 1 for points of moving objects and 0
+/// for others. @throws std::runtime_error in one sentence if the file or a value is wrong.
+TruthCloud readTruthCloud(const std::string& path);
+/// Writes such a cloud, with the field `intensity`. @throws std::runtime_error if that fails.
+void writeTruthCloud(const std::string& path, const TruthCloud& cloud);
+
+/// Finds the nearest of many points.
+class NearestPoints {
+ public:
+  /// @param points finite.
+  explicit NearestPoints(const std::vector<Eigen::Vector3f>& points);
+  ~NearestPoints();
+  NearestPoints(NearestPoints&&) noexcept;
+  /// The position of the nearest point; nullopt if none is within `distance`. May be called in many threads.
+  std::optional<std::size_t> find(const Eigen::Vector3f& point, float distance) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+struct CloudQuality : Accuracies {
+  double distance = 0.0;           ///< within which points match [m]
+  std::size_t cleaned_points = 0;  ///< points that the map keeps
+  std::size_t not_finite = 0;      ///< points of the truth that do not count
+};
+
+/// A point of the truth counts as kept if a point of the cleaned cloud is within `distance`, otherwise as
+/// removed; what the cleaned cloud has beyond the truth does not count.
+CloudQuality compareClouds(const TruthCloud& truth, const std::vector<Eigen::Vector3f>& cleaned,
+                           double distance);
+
+/// Collects the points of a drive, and compares those that lie in occupied voxels in the end with the truth.
+class CloudEvaluation {
+ public:
+  /// @param truth if given, a cloud of the drive; otherwise it is made of the scans by TruthCloud::add.
+  /// @param distance within which points match [m].
+  CloudEvaluation(std::optional<TruthCloud> truth, double distance);
+
+  void add(const Scan& scan);
+  /// The points of a scan that are in the truth, with raw labels: 252 for those that move there, otherwise 0.
+  Scan labelled(const Scan& scan) const;
+  CloudQuality compare(const SemanticMap& map) const;
+
+ private:
+  TruthCloud truth_;
+  std::optional<NearestPoints> nearest_in_truth_;  ///< if the truth was given
+  double distance_;
+  std::vector<Eigen::Vector3f> points_;  ///< of all scans, map frame [m]
+};
+
+}  // namespace bki_mapping
