@@ -22,7 +22,8 @@ struct SpaceFigure {
   const char* meaning;
 };
 constexpr SpaceFigure kSpaceFigures[] = {
-    {"free_precision", &SpaceQuality::free_precision, "of the voxels free in the map are empty"},
+    {"free_precision", &SpaceQuality::free_precision, "of the voxels free in the map are mostly empty"},
+    {"free_empty", &SpaceQuality::free_empty, "of the same have nothing in them"},
     {"free_recall", &SpaceQuality::free_recall, "of the empty voxels that beams crossed are free in the map"},
     {"occupied_precision", &SpaceQuality::occupied_precision,
      "of the voxels occupied in the map have something in them"},
@@ -80,8 +81,21 @@ std::string figureText(double figure) {
   return text.str();
 }
 
+/// Such as "up to 20 m".
+std::string distanceText(std::size_t bin) {
+  const auto& ends = TruthQuality::kDistances;
+  return bin < ends.size() ? "up to " + numberText(ends[bin]) + " m" : "beyond";
+}
+
 class Table {
  public:
+  /// A line of cells of equal width, after the first.
+  template <typename Text>
+  void row(const std::string& name, std::size_t cells, const Text& text) {
+    out_ << std::left << std::setw(22) << name << std::right;
+    for (std::size_t i = 0; i < cells; ++i) out_ << std::setw(12) << text(i);
+    out_ << "\n";
+  }
   void percent(const std::string& name, double fraction, const std::string& meaning) {
     out_ << std::left << std::setw(22) << name << std::right << std::setw(6) << figureText(100.0 * fraction)
          << " %  " << meaning << "\n";
@@ -126,6 +140,12 @@ Json cloudJson(const CloudQuality& cloud) {
 void addTruth(const TruthQuality& truth, const ClassTable& classes, Table& table) {
   for (const SpaceFigure& figure : kSpaceFigures) {
     table.percent(figure.name, (truth.all.*figure.proportion).fraction(), figure.meaning);
+  }
+  const auto& bins = truth.by_distance;
+  table.row("by distance [%]", bins.size(), distanceText);
+  for (const SpaceFigure& figure : kSpaceFigures) {
+    table.row(std::string("  ") + figure.name, bins.size(),
+              [&](std::size_t bin) { return figureText(100.0 * (bins[bin].*figure.proportion).fraction()); });
   }
   table.percent("voxel mIoU", truth.meanIou(classes),
                 "of the classes of voxels, over the classes that occur");

@@ -10,6 +10,8 @@
 namespace bki_mapping::simulation {
 namespace {
 
+/// A voxel is mostly empty if less than this fraction of it is inside of something.
+constexpr double kMostlyEmpty = 0.5;
 /// A voxel is a ghost if nothing movable was near for kGhostAge [s], sampled every kGhostStep [s].
 constexpr double kGhostAge = 0.5, kGhostStep = 0.1;
 
@@ -79,9 +81,8 @@ bool TruthEvaluation::isGhost(const VoxelIndex& index, double time) const {
   return true;
 }
 
-ClassId TruthEvaluation::classAt(const VoxelIndex& index, double time) const {
-  const auto label = truth_.labelAt(index, time);
-  return label ? classes_.classOfRaw(*label).value_or(kFreeClass) : kFreeClass;
+ClassId TruthEvaluation::classOf(const VoxelContent& content) const {
+  return content.label ? classes_.classOfRaw(*content.label).value_or(kFreeClass) : kFreeClass;
 }
 
 std::vector<VoxelIndex> TruthEvaluation::ghosts(const SemanticMap& map, double time) const {
@@ -106,7 +107,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
   };
   for (const Seen& voxel : voxels_) {
     const std::size_t bin = distanceBin(voxel.index);
-    const ClassId truth = classAt(voxel.index, time);
+    const ClassId truth = classOf(truth_.contentAt(voxel.index, time));
     const VoxelView view = viewWithoutEntropy(map, voxel.index);
     quality.voxels.add(truth, view.label);
     if (view.evidence > 0.0f) {
@@ -122,8 +123,12 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
   forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
     if (view.state != VoxelState::kFree && view.state != VoxelState::kOccupied) return;
     const std::size_t bin = distanceBin(index);
-    const ClassId truth = classAt(index, time);
-    if (view.state == VoxelState::kFree) return add(&SpaceQuality::free_precision, bin, truth == kFreeClass);
+    const VoxelContent content = truth_.contentAt(index, time);
+    const ClassId truth = classOf(content);
+    if (view.state == VoxelState::kFree) {
+      add(&SpaceQuality::free_precision, bin, content.filled < kMostlyEmpty);
+      return add(&SpaceQuality::free_empty, bin, !content.label);
+    }
     add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
     add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
     if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, view.label);

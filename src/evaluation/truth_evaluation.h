@@ -27,7 +27,8 @@ struct Proportion {
 
 /// Precision and recall of free and occupied voxels, against the ground truth at the end of the drive.
 struct SpaceQuality {
-  Proportion free_precision;      ///< of the voxels free in the map, those that are empty
+  Proportion free_precision;      ///< of the voxels free in the map, those that are mostly empty
+  Proportion free_empty;          ///< of the same, those with nothing in them
   Proportion free_recall;         ///< of the empty voxels crossed by a beam, those free in the map
   Proportion occupied_precision;  ///< of the voxels occupied in the map, those with something in them
   Proportion occupied_near;       ///< of the same, those with something within one voxel's edge
@@ -36,7 +37,7 @@ struct SpaceQuality {
 
 struct TruthQuality {
   /// Upper limits of the distance bins [m], measured from the trajectory; the last bin has no limit.
-  static constexpr std::array<double, 3> kDistances{10.0, 20.0, 40.0};
+  static constexpr std::array<double, 5> kDistances{10.0, 20.0, 40.0, 60.0, 80.0};
   std::array<SpaceQuality, kDistances.size() + 1> by_distance;
   SpaceQuality all;
   /// Classes of the voxels that were hit or crossed, or are occupied in the map; kFreeClass for free ones.
@@ -81,7 +82,7 @@ class TruthEvaluation {
   bool isMovable(std::uint32_t raw_label) const;
   bool isGhost(const VoxelIndex& index, double time) const;
   /// The true class of a voxel; kFreeClass if it is empty.
-  ClassId classAt(const VoxelIndex& index, double time) const;
+  ClassId classOf(const VoxelContent& content) const;
 
   VoxelTruth truth_;
   GridGeometry geometry_;

@@ -32,18 +32,22 @@ std::vector<Shape> VoxelTruth::shapesAt(const VoxelIndex& voxel, double time, do
   return shapes;
 }
 
-std::optional<std::uint32_t> VoxelTruth::labelAt(const VoxelIndex& voxel, double time) const {
+VoxelContent VoxelTruth::contentAt(const VoxelIndex& voxel, double time) const {
   const Scene near{scene_.ground, shapesAt(voxel, time, 0.0)};
   std::map<std::uint32_t, int> votes;
+  int inside = 0;
   anyPoint(voxel, [&](const Eigen::Vector3d& point) {
-    if (const auto label = near.labelAt(point, time)) ++votes[*label];
+    const auto label = near.labelAt(point, time);
+    if (label) ++votes[*label];
+    inside += label.has_value();
     return false;
   });
-  std::optional<std::uint32_t> most;
+  VoxelContent content;
   for (const auto& [label, count] : votes) {
-    if (!most || count > votes[*most]) most = label;
+    if (!content.label || count > votes[*content.label]) content.label = label;
   }
-  return most;
+  content.filled = static_cast<double>(inside) / (kPoints * kPoints * kPoints);
+  return content;
 }
 
 bool VoxelTruth::isNear(const VoxelIndex& voxel, double time, double margin,

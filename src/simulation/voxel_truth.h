@@ -9,6 +9,14 @@
 
 namespace bki_mapping::simulation {
 
+/// What is in a voxel.
+struct VoxelContent {
+  /// The most frequent raw label among the sample points inside of something (ties: the smaller label);
+  /// nullopt if all are free.
+  std::optional<std::uint32_t> label;
+  double filled = 0.0;  ///< fraction of the sample points inside of something
+};
+
 /// The ground truth of a scene on the voxel grid of its map. Each voxel is sampled at 4 x 4 x 4 evenly spaced
 /// points.
 class VoxelTruth {
@@ -20,9 +28,8 @@ class VoxelTruth {
   }
   const GridGeometry& geometry() const { return geometry_; }
 
-  /// The most frequent raw label among the sample points inside of something (ties: the smaller label);
-  /// nullopt if all are free. @param time since the start of the drive [s].
-  std::optional<std::uint32_t> labelAt(const VoxelIndex& voxel, double time) const;
+  /// @param time since the start of the drive [s].
+  VoxelContent contentAt(const VoxelIndex& voxel, double time) const;
 
   /// Whether a shape, grown by `margin` on all sides, contains one of the sample points.
   /// @param margin [m]. @param wanted selects shapes by their label.

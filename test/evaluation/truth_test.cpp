@@ -54,12 +54,27 @@ class Truth : public testing::Test {
 };
 
 TEST_F(Truth, LabelsOfVoxels) {
-  EXPECT_EQ(truth().labelAt(voxel(3, 0, -3), 0.0), kRoad) << "half of it is under the ground";
-  EXPECT_FALSE(truth().labelAt(voxel(3, 0, -2), 0.0));
-  EXPECT_EQ(truth().labelAt(voxel(10, 0, -2), 0.0), kCar) << "its roof";
-  EXPECT_EQ(truth().labelAt(voxel(20, 0, -2), 0.0), kMovingCar);
-  EXPECT_FALSE(truth().labelAt(voxel(20, 0, -2), 1.0));
-  EXPECT_EQ(truth().labelAt(voxel(30, 0, -2), 1.0), kMovingCar);
+  EXPECT_EQ(truth().contentAt(voxel(3, 0, -3), 0.0).label, kRoad) << "half of it is under the ground";
+  EXPECT_FALSE(truth().contentAt(voxel(3, 0, -2), 0.0).label);
+  EXPECT_EQ(truth().contentAt(voxel(10, 0, -2), 0.0).label, kCar) << "its roof";
+  EXPECT_EQ(truth().contentAt(voxel(20, 0, -2), 0.0).label, kMovingCar);
+  EXPECT_FALSE(truth().contentAt(voxel(20, 0, -2), 1.0).label);
+  EXPECT_EQ(truth().contentAt(voxel(30, 0, -2), 1.0).label, kMovingCar);
+}
+
+TEST_F(Truth, AFreeVoxelIsRightIfItIsMostlyEmpty) {
+  EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, -3), 0.0).filled, 0.5);
+  T_world_map_.translation().z() = 2.7;
+  EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, -3), 0.0).filled, 0.25);
+  EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, -4), 0.0).filled, 1.0);
+  EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, 0), 0.0).filled, 0.0);
+  const TruthEvaluation evaluation(truth(), classes_);
+  SemanticMap map = emptyMap();
+  for (const int z : {-4, -3, 0}) add(map, voxel(3, 0, z), kFreeClass);
+  const SpaceQuality space = evaluation.compare(map, 0.0).all;
+  EXPECT_EQ(space.free_precision.total, 3u);
+  EXPECT_EQ(space.free_precision.correct, 2u) << "a quarter of one is in the ground";
+  EXPECT_EQ(space.free_empty.correct, 1u);
 }
 
 TEST_F(Truth, MarginsGrowShapes) {
@@ -88,6 +103,7 @@ TEST_F(Truth, VoxelsAreComparedOneByOne) {
   const TruthQuality quality = evaluation.compare(map, 1.0);
   EXPECT_EQ(quality.all.free_precision.total, 2u);
   EXPECT_EQ(quality.all.free_precision.correct, 1u);
+  EXPECT_EQ(quality.all.free_empty.correct, 1u);
   EXPECT_EQ(quality.all.occupied_precision.total, 4u);
   EXPECT_EQ(quality.all.occupied_precision.correct, 3u);
   EXPECT_EQ(quality.all.occupied_near.correct, 4u) << "the ground is near the ghost";

@@ -184,7 +184,9 @@ class Tools(unittest.TestCase):
         self.assertGreater(lines['truth']['free_precision'], 0.5)
         self.assertGreater(hits_alone['truth']['movable_voxels'], lines['truth']['movable_voxels'])
         self.assertGreater(hits_alone['truth']['occupied_recall'], lines['truth']['occupied_recall'])
-        self.assertEqual(len(lines['truth']['by_distance']), 4)
+        self.assertEqual([bin.get('up_to') for bin in lines['truth']['by_distance']], [10, 20, 40, 60, 80, None])
+        self.assertGreaterEqual(lines['truth']['free_precision'], lines['truth']['free_empty'])
+        self.assertIn('  free_precision ', self.table)
         self.assertGreater(lines['voxels_by_class']['road'], 100)
 
     def labels(self, name, change):
