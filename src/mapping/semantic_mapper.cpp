@@ -58,6 +58,7 @@ UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   rules.evidence_before_misses = config.free_space.evidence_before_misses;
   if (config.scan_limit.hits > 0.0) rules.most_hits = static_cast<float>(config.scan_limit.hits);
   if (config.scan_limit.free > 0.0) rules.most_free = static_cast<float>(config.scan_limit.free);
+  rules.free_threshold = static_cast<float>(config.scan_limit.free_threshold);
   rules.void_evidence = static_cast<float>(config.scan_limit.void_space);
   for (const SemanticClass& c : classes.classes()) rules.fixed[c.id] = !c.dynamic && !c.unlabelled;
   return rules;

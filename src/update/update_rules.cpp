@@ -58,6 +58,9 @@ void applyToFree(const UpdateRules& rules, const VoxelMask& is_protected, BlockS
       for (std::size_t v = 0; v < kBlockVoxels; ++v)
         plane.values[v] = is_protected[v] ? 0.0f : plane.values[v];
     }
+    if (rules.free_threshold > 0.0f) {
+      for (float& value : plane.values) value = std::max(value - rules.free_threshold, 0.0f);
+    }
     if (std::isfinite(rules.most_free)) {
       for (float& value : plane.values) value = std::min(value, rules.most_free);
     }

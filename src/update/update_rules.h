@@ -16,6 +16,9 @@ struct UpdateRules {
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
   float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
   float most_free = std::numeric_limits<float>::infinity();
+  /// Of evidence for `free`, only what exceeds this counts, before most_free limits it. As a difference, it
+  /// leaves no jump that would turn an error of rounding into one of a whole sum.
+  float free_threshold = 0.0f;
   float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
   std::bitset<256> fixed;      ///< the classes that cannot move, for VoidSearch
 

@@ -340,9 +340,16 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
 }
 
 TEST(Bounds, NoSettingMakesEvidenceInfinite) {
-  const char* const names[] = {
-      "prior",           "kernel/scale",    "free_gain/dynamic", "free_gain/living",     "free_gain/static",
-      "scan_limit/hits", "scan_limit/free", "scan_limit/void",   "free_gain/persistence"};
+  const char* const names[] = {"prior",
+                               "kernel/scale",
+                               "free_gain/dynamic",
+                               "free_gain/living",
+                               "free_gain/static",
+                               "scan_limit/hits",
+                               "scan_limit/free",
+                               "scan_limit/free_threshold",
+                               "scan_limit/void",
+                               "free_gain/persistence"};
   for (const char* name : names) {
     MapperConfig config;
     EXPECT_THROW(setParameters(config, {{name, "1e39"}}), std::invalid_argument) << name;

@@ -221,6 +221,19 @@ TEST_P(EveryScene, LimitsOfAScanEqualBruteForce) {
   }
 }
 
+TEST_P(EveryScene, TheThresholdOfFreeSpaceEqualsBruteForce) {
+  for (const std::string mode : {"even", "line"}) {
+    for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
+      MapperConfig config = withMode(mode);
+      config.kernel.type = kernel;
+      config.scan_limit.free_threshold = kernel == KernelType::kSparse ? 0.004 : 0.3;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold, " + mode);
+      config.scan_limit.free = 0.02;
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold and limit, " + mode);
+    }
+  }
+}
+
 /// The number of voxels that a scan alone sees empty with all their neighbours.
 std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
   SemanticMapper mapper(config, reference::smallTable());

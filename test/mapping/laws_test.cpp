@@ -106,6 +106,7 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     config.free_space.evidence_before_misses = true;
     config.scan_limit.hits = 0.05;
     config.scan_limit.free = 0.03;
+    config.scan_limit.free_threshold = 0.002;
     config.scan_limit.void_space = 0.2;
     config.free_gain.persistence = 3.0;
     configs.emplace_back(mode + ", with rules and limits", config);

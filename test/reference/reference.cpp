@@ -284,6 +284,7 @@ Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   Value value = unlimited(voxel, label);
   const ScanLimitConfig& limit = config_.scan_limit;
   if (label == kFreeClass) {
+    value.sum = std::max(value.sum - limit.free_threshold, 0.0);
     if (limit.free > 0.0) value.sum = std::min(value.sum, limit.free);
     if (limit.void_space == 0.0 || limit.free == 0.0) return value;
     const Answer is_void = isVoid(voxel);
