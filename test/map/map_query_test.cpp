@@ -70,9 +70,9 @@ TEST(MapQuery, EvidenceForFreeLowersOccupancyAndNotTheClass) {
   for (const VoxelView& view : {hit, crossed, cleared}) {
     EXPECT_NEAR(view.class_probability, 0.9, 2e-3) << "of class 1, in a free voxel, too";
   }
-  EXPECT_NEAR(hit.occupancy, occupancyOf(0.6, 0.0), 1e-6);
-  EXPECT_NEAR(crossed.occupancy, occupancyOf(0.6, 0.4), 1e-6);
-  EXPECT_NEAR(cleared.occupancy, occupancyOf(0.6, 40.0), 1e-6);
+  EXPECT_NEAR(hit.occupancy, occupancyOf(0.6, 0.0), 1e-5);
+  EXPECT_NEAR(crossed.occupancy, occupancyOf(0.6, 0.4), 1e-5);
+  EXPECT_NEAR(cleared.occupancy, occupancyOf(0.6, 40.0), 1e-5);
   const auto only_free = viewOf({{kFreeClass, 1.0f}});
   EXPECT_NEAR(only_free.class_probability, 1.0 / 3.0, 1e-6) << "nothing says which class";
   EXPECT_NEAR(only_free.occupancy, occupancyOf(0.0, 1.0), 1e-6);
