@@ -33,6 +33,9 @@ else()
   set(BKI_MAPPING_TEST_SECONDS 600)
 endif()
 
+# Tests that compute count as two processors, and rostests, which mostly wait, as one: scripts/test tells ctest that there
+# are twice as many as there are.
+
 # Less optimised than what they test: that takes a third off their compile time.
 function(bki_mapping_test_options target)
   target_compile_options(${target} PRIVATE -O1)
@@ -57,7 +60,7 @@ function(bki_mapping_unit_tests room)
     endif()
     add_test(NAME ${name} COMMAND ${name})
     # Where the last line names a skipped test, none failed: GoogleTest lists those after them.
-    set_tests_properties(${name} PROPERTIES TIMEOUT ${BKI_MAPPING_TEST_SECONDS}
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${BKI_MAPPING_TEST_SECONDS} PROCESSORS 2
       SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\] [^\n]*\n*$")
   endforeach()
 endfunction()
@@ -143,7 +146,7 @@ target_link_libraries(yaml_file_test PRIVATE bki_mapping_simulation yaml-cpp)
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
 function(bki_mapping_script_test room name)
   add_test(NAME ${name} COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/${room}/${name}.py)
-  set_tests_properties(${name} PROPERTIES TIMEOUT 300
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300 PROCESSORS 2
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
 bki_mapping_script_test(scripts figures_test)
@@ -220,6 +223,9 @@ if(CATKIN_ENABLE_TESTING)
   bki_mapping_test_options(hostile_test)
   add_dependencies(hostile_test bki_mapping_nodelets)
   add_rostest(test/ros/hostile.test)
+  # The longest start first; they mostly wait, and other tests compute meanwhile.
+  set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_replay.test commands_test PROPERTIES COST 100)
+  set_tests_properties(real_bag_rostest PROPERTIES COST 20)
   # They limit times, which another test at the same time would change.
   foreach(name soak hostile publishing)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)
