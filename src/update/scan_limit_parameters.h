@@ -26,6 +26,7 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
           "Evidence for free that one scan must exceed in a voxel; only the excess counts. Set it so "
           "that the fringes of kernels, which reach under the ground and behind walls, clear no "
           "voxels; 0 lets all evidence count."),
+      realParameter(
           "void", &C::void_space, evidence, "", Changes::kWhileMapping,
           "Further evidence for free that a scan adds to a voxel which it sees empty together with all "
           "26 neighbours: each of them without a hit and with as much evidence for free as "
