@@ -175,7 +175,7 @@ void DistanceField::searchColumns(std::size_t chunk, std::size_t y, RowWork& wor
   }
 }
 
-void DistanceField::update(const StateMap& states, ArrayView<const GridIndex> changed) {
+void DistanceField::update(const StateMap& states, Span<const GridIndex> changed) {
   checkResolution(states);
   // What is to be recomputed: chunks of columns along y in each layer, and rows along x.
   const std::size_t chunks = stride_ / kChunk;

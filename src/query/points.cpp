@@ -83,7 +83,7 @@ class PointReader {
 };
 
 template <typename Point>
-void readAny(const StateMap& states, ArrayView<const Point> points, const PointValues& values) {
+void readAny(const StateMap& states, Span<const Point> points, const PointValues& values) {
   std::atomic<std::size_t> bad_batch{points.size()};  // the first point of the first batch with a bad one
   states.parallelFor((points.size() + kPointsPerJob - 1) / kPointsPerJob, [&](std::size_t job) {
     PointReader reader(states, values);
@@ -103,11 +103,11 @@ void readAny(const StateMap& states, ArrayView<const Point> points, const PointV
 
 }  // namespace
 
-void readPoints(const StateMap& states, ArrayView<const Eigen::Vector3d> points, const PointValues& values) {
+void readPoints(const StateMap& states, Span<const Eigen::Vector3d> points, const PointValues& values) {
   readAny(states, points, values);
 }
 
-void readPoints(const StateMap& states, ArrayView<const Eigen::Vector3f> points, const PointValues& values) {
+void readPoints(const StateMap& states, Span<const Eigen::Vector3f> points, const PointValues& values) {
   readAny(states, points, values);
 }
 

@@ -176,8 +176,7 @@ RayHit castRay(const StateMap& states, const Ray& ray, const RayStops& stops) {
   return RayCaster(states, stops).cast(ray);
 }
 
-void castRays(const StateMap& states, ArrayView<const Ray> rays, const RayStops& stops,
-              ArrayView<RayHit> hits) {
+void castRays(const StateMap& states, Span<const Ray> rays, const RayStops& stops, Span<RayHit> hits) {
   if (hits.size() != rays.size()) {
     throw std::invalid_argument("there are " + std::to_string(rays.size()) + " rays and room for " +
                                 std::to_string(hits.size()) + " hits; give as many hits as rays");

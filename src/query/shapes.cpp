@@ -97,7 +97,7 @@ void read(const StateMap& states, const OrientedBox& box, ContentReader& reader,
 
 }  // namespace
 
-std::optional<ClassId> SpaceContent::worst(ArrayView<const ClassId> order) const {
+std::optional<ClassId> SpaceContent::worst(Span<const ClassId> order) const {
   const auto found =
       std::find_if(order.begin(), order.end(), [&](ClassId id) { return classes.contains(id); });
   if (found == order.end()) return std::nullopt;
@@ -137,7 +137,7 @@ SpaceContent contentOf(const StateMap& states, const OrientedBox& box) {
 }
 
 void contentsAlong(const StateMap& states, const OrientedBox& box,
-                   ArrayView<const Eigen::Isometry3d> T_map_vehicle, ArrayView<SpaceContent> contents) {
+                   Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents) {
   checkSizes(box.half_extents, "the box");
   if (contents.size() != T_map_vehicle.size()) {
     throw std::invalid_argument("there are " + std::to_string(T_map_vehicle.size()) + " poses and room for " +

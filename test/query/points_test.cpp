@@ -93,7 +93,7 @@ TEST(ReadPoints, FillsOnlyWhatIsWanted) {
   EXPECT_EQ(some.variance, all.variance);
   EXPECT_EQ(some.states, Answers(100).states);
   EXPECT_EQ(some.probability, Answers(100).probability);
-  readPoints(states, ArrayView<const Eigen::Vector3d>(), all.values());
+  readPoints(states, Span<const Eigen::Vector3d>(), all.values());
 }
 
 TEST(ReadPoints, OfAnEmptyMapAreUnknown) {

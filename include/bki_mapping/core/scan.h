@@ -10,6 +10,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/sensor_model.h"
 #include "bki_mapping/core/soft_labels.h"
+#include "bki_mapping/core/span.h"
 
 namespace bki_mapping {
 
@@ -42,24 +43,6 @@ struct Scan {
   std::uint64_t stamp = 0;
 };
 
-/// A view of contiguous values that it does not own, like C++20's std::span.
-template <typename T>
-class Span {
- public:
-  Span() = default;
-  Span(const T* data, std::size_t size) : data_(data), size_(size) {}
-  Span(const std::vector<T>& values) : Span(values.data(), values.size()) {}
-
-  std::size_t size() const { return size_; }
-  const T& operator[](std::size_t i) const { return data_[i]; }
-  const T* begin() const { return data_; }
-  const T* end() const { return data_ + size_; }
-
- private:
-  const T* data_ = nullptr;
-  std::size_t size_ = 0;
-};
-
 /// A scan that does not own its points and labels; a message or a NumPy array may hold them. The members have
 /// the meanings of those of Scan. Valid as long as the data that it refers to.
 struct ScanView {
@@ -76,11 +59,11 @@ struct ScanView {
         stamp(scan.stamp) {}
 
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Span<Eigen::Vector3f> points;
-  Span<std::uint32_t> labels;
+  Span<const Eigen::Vector3f> points;
+  Span<const std::uint32_t> labels;
   bool labels_are_ids = false;
   const SoftLabels* soft = nullptr;  ///< nullptr if there are only hard labels
-  Span<Eigen::Vector3f> no_returns;
+  Span<const Eigen::Vector3f> no_returns;
   bool no_returns_at_max_range = false;
   std::optional<SensorModelConfig> sensor_model;
   std::uint64_t stamp = 0;

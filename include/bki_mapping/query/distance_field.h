@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
@@ -46,7 +46,7 @@ class DistanceField {
   /// obstacles along y, of the results of that along x, and of those along z.
   /// @param changed the blocks that may have changed, been created or erased; those outside of the region are
   /// ignored. @throws std::invalid_argument if the resolution differs.
-  void update(const StateMap& states, ArrayView<const GridIndex> changed);
+  void update(const StateMap& states, Span<const GridIndex> changed);
 
   /// The voxel with the smallest coordinates, and the number of voxels along each axis.
   const VoxelIndex& min() const { return min_; }
@@ -59,7 +59,7 @@ class DistanceField {
   /// @param voxel in the region.
   float distance(const VoxelIndex& voxel) const { return distances_[positionOf(voxel)]; }
   /// All distances: x fastest, then y, then z. Valid until compute() or the destructor.
-  ArrayView<const float> distances() const { return {distances_.get(), width_ * height_ * layers_}; }
+  Span<const float> distances() const { return {distances_.get(), width_ * height_ * layers_}; }
 
   struct Value {
     float distance;            ///< [m]

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/query/state_map.h"
 
 namespace bki_mapping {
@@ -23,7 +23,7 @@ struct PointValues {
 /// classes of the block; sorted points are faster than scattered ones. docs/queries.md has figures.
 /// @param points map frame [m].
 /// @throws std::invalid_argument if a coordinate is not finite; the arrays may then be partly filled.
-void readPoints(const StateMap& states, ArrayView<const Eigen::Vector3d> points, const PointValues& values);
-void readPoints(const StateMap& states, ArrayView<const Eigen::Vector3f> points, const PointValues& values);
+void readPoints(const StateMap& states, Span<const Eigen::Vector3d> points, const PointValues& values);
+void readPoints(const StateMap& states, Span<const Eigen::Vector3f> points, const PointValues& values);
 
 }  // namespace bki_mapping

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <limits>
 
-#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
@@ -58,7 +58,6 @@ RayHit castRay(const StateMap& states, const Ray& ray, const RayStops& stops = {
 /// The same for many rays, on all threads. @param hits as long as `rays`.
 /// @throws std::invalid_argument as castRay, naming the ray, or if the lengths differ; `hits` is then
 /// unchanged.
-void castRays(const StateMap& states, ArrayView<const Ray> rays, const RayStops& stops,
-              ArrayView<RayHit> hits);
+void castRays(const StateMap& states, Span<const Ray> rays, const RayStops& stops, Span<RayHit> hits);
 
 }  // namespace bki_mapping

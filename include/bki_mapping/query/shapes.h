@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "bki_mapping/query/array_view.h"
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
@@ -31,7 +31,7 @@ struct SpaceContent {
   bool isFree() const { return occupied == 0 && unknown == 0; }
   bool isKnown() const { return unknown == 0; }
   /// The first of the classes in `order`, the worst first, that is present.
-  std::optional<ClassId> worst(ArrayView<const ClassId> order) const;
+  std::optional<ClassId> worst(Span<const ClassId> order) const;
 };
 
 /// Shapes that overlap more voxels are refused; so are boxes about such shapes.
@@ -50,6 +50,6 @@ SpaceContent contentOf(const StateMap& states, const OrientedBox& box);
 /// @param contents as long as the poses. @throws std::invalid_argument as contentOf, naming the pose, or if
 /// the lengths differ.
 void contentsAlong(const StateMap& states, const OrientedBox& box,
-                   ArrayView<const Eigen::Isometry3d> T_map_vehicle, ArrayView<SpaceContent> contents);
+                   Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents);
 
 }  // namespace bki_mapping

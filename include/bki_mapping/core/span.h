@@ -1,4 +1,4 @@
-/// @file A view of an array, like std::span of C++20.
+/// @file A view of contiguous values.
 #pragma once
 
 #include <cstddef>
@@ -6,14 +6,15 @@
 
 namespace bki_mapping {
 
-/// The elements of an array that belongs to the caller, for instance of a std::vector or of NumPy.
+/// A view of contiguous values that it does not own, such as those of a std::vector or a NumPy array; like
+/// std::span of C++20. Span<const T> reads only.
 template <typename T>
-class ArrayView {
+class Span {
  public:
-  ArrayView() = default;
-  ArrayView(T* data, std::size_t size) : data_(data), size_(size) {}
+  Span() = default;
+  Span(T* data, std::size_t size) : data_(data), size_(size) {}
   template <typename Vector, typename = decltype(static_cast<T*>(std::declval<Vector&>().data()))>
-  ArrayView(Vector&& vector) : data_(vector.data()), size_(vector.size()) {}  // NOLINT: as std::span
+  Span(Vector&& vector) : data_(vector.data()), size_(vector.size()) {}  // NOLINT: as std::span
 
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
