@@ -221,7 +221,7 @@ TEST_F(LongerSequence, NumbersNeedNotBePadded) {
 
 TEST_F(LongerSequence, NamesThatPairWithNothingAreRefused) {
   rename("000004", "000009");
-  expectFault("poses.txt has no line 10 for scan 000009");
+  expectFault("times.txt has no line 10 for scan 000009");
   rename("000009", "99999999999999999999999");
   expectFault("99999999999999999999999");
   rename("99999999999999999999999", "3");

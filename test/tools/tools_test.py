@@ -498,7 +498,7 @@ class Tools(unittest.TestCase):
         self.fails('the resolution of', *begin, '--resume', front, '--set', 'resolution=0.2')
         self.fails('the prior of', *begin, '--resume', front, '--set', 'prior=0.5')
         self.fails('class', *begin, '--resume', front, '--classes', 'toy')
-        self.fails("holds drive 'drive/000000-000001' already", *begin, '--scans', '2', '--resume', front)
+        self.fails("already holds drive 'drive/000000-000001'", *begin, '--scans', '2', '--resume', front)
 
     def test_moving_maps(self):
         a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
