@@ -50,6 +50,7 @@ LEFT_OUT = {
 # Slow parts of commands and their replacements. Everything else is run as written.
 SHORTER = {
     '--scans 300': '--scans 4',
+    '--scans 200': '--scans 4',
     '--scans 1000 --every 10': '--scans 50 --every 10',
     ' --curves curves': '',  # two thousand simulated scans in each mode; tools_test draws curves
 }
