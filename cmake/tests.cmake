@@ -225,6 +225,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/hostile.test)
   # The longest start first; they mostly wait, and other tests compute meanwhile.
   set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_replay.test commands_test PROPERTIES COST 100)
+  set_tests_properties(commands_test PROPERTIES TIMEOUT 900)
   set_tests_properties(real_bag_rostest PROPERTIES COST 20)
   # They limit times, which another test at the same time would change.
   foreach(name soak hostile publishing)
