@@ -11,13 +11,13 @@ namespace {
 /// Median times of a scan [ms] on SemanticKITTI 04 with two threads. A test compares them with
 /// docs/performance.md.
 struct Medians {
-  double none = 3.1;
-  double linear = 7.5;     ///< one sample per beam
-  double linear_5 = 12.9;  ///< five samples per beam
-  double uniform = 7.1;    ///< one sample per beam
-  double even = 27.1;      ///< gap 1 m
-  double line_mapped = 12.6;
-  double line_observed = 20.7;
+  double none = 2.4;
+  double linear = 5.8;     ///< one sample per beam
+  double linear_5 = 10.5;  ///< five samples per beam
+  double uniform = 4.9;    ///< one sample per beam
+  double even = 22.2;      ///< gap 1 m
+  double line_mapped = 10.1;
+  double line_observed = 16.4;
 };
 
 /// The measured time of a mode [ms].
