@@ -142,7 +142,9 @@ std::vector<double> valuesOf(const pcl::PCLPointCloud2& cloud, const std::string
 }  // namespace
 
 PcdPoints readPcdPoints(const std::string& path) {
-  checkSize(readHeader(path), path);
+  const Header header = readHeader(path);
+  checkSize(header, path);
+  if (std::stod(header.lines.at("POINTS").front()) == 0.0) return {};  // PCL 1.11 refuses empty clouds
   pcl::PCLPointCloud2 cloud;
   try {
     if (pcl::PCDReader().read(path, cloud) < 0) fail(path, "is damaged: PCL cannot read it");

@@ -43,6 +43,15 @@ Inspected inspect(const std::string& path) {
   return result;
 }
 
+/// A random map with a voxel of which only occlusion is known.
+SemanticMap markedMap(unsigned seed, int blocks, int extent) {
+  SemanticMap map = randomMap(seed, blocks, extent);
+  Block::Occlusion marks;
+  marks[5] = true;
+  map.getOrAllocate({extent + 1, 0, 0}).setOcclusion(marks);
+  return map;
+}
+
 /// The whole map with the gains of infoWithGains().
 SemanticMap mapWithGains(unsigned seed, int blocks, int extent) {
   SemanticMap map = infoOf().emptyMap();
@@ -50,14 +59,14 @@ SemanticMap mapWithGains(unsigned seed, int blocks, int extent) {
   map.setFreeGain(0, 1.0);   // unlabelled
   map.setFreeGain(40, 2.5);  // by its own gain
   map.setFreeGain(80, 0.01);
-  map.add(randomMap(seed, blocks, extent));
+  map.add(markedMap(seed, blocks, extent));
   return map;
 }
 
 TEST(MapStatistics, CountsVoxelsAsTheMapperSeesThem) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  saveMap(path, infoWithGains(), {driveOf("a")}, randomMap(3));
+  saveMap(path, infoWithGains(), {driveOf("a")}, markedMap(3, 60, 12));
   const MapStatistics found = inspect(path).statistics;
   const SemanticMap map = mapWithGains(3, 60, 12);
   MapStatistics expected;
@@ -152,7 +161,7 @@ void expectSame(const Picture& found, const Picture& expected) {
 TEST(MapPicture, ShowsWhatIsNearest) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  saveMap(path, infoWithGains(), {}, randomMap(3, 60, 3));
+  saveMap(path, infoWithGains(), {}, markedMap(3, 60, 3));
   const Inspected inspected = inspect(path);
   const SemanticMap map = mapWithGains(3, 60, 3);
   const GridIndex &low = inspected.statistics.low, &high = inspected.statistics.high;
