@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -241,13 +242,14 @@ void sortUnique(std::vector<GridIndex>& tiles) {
   tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
 }
 
-TileLists listTiles(const std::vector<Group>& groups) {
+TileLists listTiles(const std::vector<Group>& groups, const std::optional<TileColumns>& columns) {
   TileLists lists;
   for (const Group& group : groups) {
     std::vector<GridIndex>& tiles = lists.of_group.emplace_back();
     for (const Summand& summand : group) {
       const std::vector<GridIndex> more = summand.tiles();
-      tiles.insert(tiles.end(), more.begin(), more.end());
+      std::copy_if(more.begin(), more.end(), std::back_inserter(tiles),
+                   [&](const GridIndex& tile) { return !columns || columns->contain(tile); });
     }
     sortUnique(tiles);
     lists.all.insert(lists.all.end(), tiles.begin(), tiles.end());
@@ -301,7 +303,7 @@ MergeReport mergeMaps(const MergeOptions& options) {
   });
   NewMapFile output(options.output, info, replaced == files.end() ? nullptr : &(*replaced)->file);
   for (const DriveRecord& drive : report.drives) output.content().putDrive(drive);
-  const TileLists lists = listTiles(groups);
+  const TileLists lists = listTiles(groups, options.columns);
   std::size_t done = 0;
   for (const GridIndex& tile : lists.all) {
     SemanticMap sum = info.emptyMap();

@@ -1,5 +1,7 @@
 // Merges map files: each drive counts once, whatever the order of the files.
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <iostream>
 #include <stdexcept>
 
@@ -22,10 +24,34 @@ po::options_description options() {
       "keep-drives", po::bool_switch(), "also store each drive separately, so that it can be taken out")(
       "without", po::value<Words>()->value_name("DRIVE")->composing(),
       "leave a drive out, by its id; repeatable")(
+      "tiles", po::value<std::string>()->value_name("X0,Y0,X1,Y1"),
+      "write only the tiles whose indices x and y are between these, which are included; a tile is a cube of "
+      "64 voxels")(
       "transform", po::value<Words>()->value_name("FILE=X,Y,Z,YAW")->composing(),
       "turn the map in FILE about the z axis by YAW degrees, then move it by X, Y, Z metres; repeatable. "
       "Whole voxels and multiples of 90 degrees are exact, others approximate");
   return options;
+}
+
+/// @param text as in --tiles.
+TileColumns parseColumns(const std::string& text) {
+  std::array<std::int32_t, 4> numbers{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t n = 0; n < numbers.size(); ++n) {
+    const auto [next, fault] = std::from_chars(at, end, numbers[n]);
+    const bool last = n + 1 == numbers.size();
+    if (fault != std::errc() || (last ? next != end : next == end || *next != ',')) {
+      throw std::invalid_argument("--tiles " + text +
+                                  " is not of the form X0,Y0,X1,Y1 with four whole numbers");
+    }
+    at = next + 1;
+  }
+  const TileColumns columns{numbers[0], numbers[1], numbers[2], numbers[3]};
+  if (columns.low_x > columns.high_x || columns.low_y > columns.high_y) {
+    throw std::invalid_argument("--tiles " + text + " has a first index above the last; exchange them");
+  }
+  return columns;
 }
 
 /// @param text as in --transform.
@@ -67,6 +93,7 @@ MergeOptions mergeOptions(const po::variables_map& given) {
   }
   options.keep_drives = given["keep-drives"].as<bool>();
   options.without = words(given, "without");
+  if (given.count("tiles")) options.columns = parseColumns(given["tiles"].as<std::string>());
   for (const std::string& text : words(given, "transform")) {
     const auto [path, placement] = parsePlacement(text);
     bool found = false;

@@ -174,6 +174,34 @@ TEST_F(MapMerge, AddsMapsInAnyOrder) {
   EXPECT_EQ(drivesOf(folder_ / "sum"), "a0 b0 c0 d0 ");
 }
 
+TEST_F(MapMerge, SumsColumnsOfTilesApart) {
+  MergeOptions options;
+  for (const char id : {'a', 'b', 'c'}) options.inputs.push_back({make({id}, {id}), std::nullopt});
+  options.output = folder_ / "columns";
+  const SemanticMap whole = sumOf("abc");
+  std::size_t blocks = 0;
+  for (const TileColumns& columns :
+       std::vector<TileColumns>{{-9, -9, -1, 9}, {0, -9, 0, -1}, {0, 0, 9, 9}, {1, -9, 9, -1}}) {
+    options.columns = columns;
+    const MergeReport report = mergeMaps(options);
+    SemanticMap expected = infoOf().emptyMap();
+    for (const auto& [index, block] : whole.entries()) {
+      const GridIndex tile = Region::regionOf(index);
+      if (tile.x < columns.low_x || tile.x > columns.high_x || tile.y < columns.low_y ||
+          tile.y > columns.high_y)
+        continue;
+      Block& to = expected.getOrAllocate(index);
+      for (std::size_t p = 0; p < block->classes().size(); ++p) to.add(block->classes()[p], block->plane(p));
+      to.setOcclusion(block->occlusion());
+    }
+    EXPECT_TRUE(same(loadMap(options.output).map, expected));
+    EXPECT_EQ(report.blocks, expected.size());
+    EXPECT_EQ(report.drives.size(), 3u);
+    blocks += report.blocks;
+  }
+  EXPECT_EQ(blocks, whole.size());
+}
+
 TEST_F(MapMerge, CountsADriveOnce) {
   const std::string a = make("a", "a"), b = make("b", "b"), ab = folder_ / "ab";
   merge({a, b}, ab);

@@ -500,6 +500,15 @@ class Tools(unittest.TestCase):
         self.fails('class', *begin, '--resume', front, '--classes', 'toy')
         self.fails("already holds drive 'drive/000000-000001'", *begin, '--scans', '2', '--resume', front)
 
+    def test_merging_some_tiles(self):
+        a, some = self.map_of('a.bkm', 0, 2), self.path('some.bkm')
+        whole = self.tiles_of(a)
+        x, y = min((tile[2], tile[1]) for tile in whole)
+        self.succeeds('merge_maps', a, '--tiles', f'{x},{y},{x},{y + 1}', '--output', some)
+        expected = {tile: content for tile, content in whole.items() if tile[2] == x and y <= tile[1] <= y + 1}
+        self.assertEqual(self.tiles_of(some), expected)
+        self.assertLess(len(expected), len(whole))
+
     def test_moving_maps(self):
         a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
         self.assertEqual(self.succeeds('merge_maps', a, '--transform', f'{a}=0.3,-1.2,3,90', '--output', there).stderr, '')
@@ -520,6 +529,9 @@ class Tools(unittest.TestCase):
         self.fails('is not finite', 'merge_maps', a, '--transform', f'{a}=0,0,nan,0', *output)
         self.fails('names b.bkm, which is none of the maps', 'merge_maps', a, '--transform', 'b.bkm=0,0,0,0', *output)
         self.fails('given twice', 'merge_maps', a, *(2 * ('--transform', f'{a}=0,0,0,0')), *output)
+        for columns in ('', '0,0,1', '0,0,1,1,1', '0,0,1,1 ', '0,0,x,1', '0,0,1,99999999999'):
+            self.fails(f'--tiles {columns} is not of the form', 'merge_maps', a, '--tiles', columns, *output)
+        self.fails('--tiles 0,2,1,1 has a first index above the last', 'merge_maps', a, '--tiles', '0,2,1,1', *output)
         self.fails('cannot be opened', 'merge_maps', a, self.path('missing.bkm'), *output)
         self.assertFalse(os.path.exists(output[1]))
 

@@ -25,11 +25,22 @@ struct MergeInput {
   std::optional<MapPlacement> placement;
 };
 
+/// Columns of tiles, of every height: indices x and y from `low` to `high`, both included.
+struct TileColumns {
+  std::int32_t low_x = 0, low_y = 0, high_x = 0, high_y = 0;
+
+  bool contain(const GridIndex& tile) const {
+    return tile.x >= low_x && tile.x <= high_x && tile.y >= low_y && tile.y <= high_y;
+  }
+};
+
 struct MergeOptions {
   std::vector<MergeInput> inputs;
   std::string output;                ///< may be one of the inputs
   bool keep_drives = false;          ///< also stores each drive separately, as far as the inputs allow
   std::vector<std::string> without;  ///< ids of the drives to leave out
+  /// Only these tiles of the result; all of them without a value. The result lists all drives even so.
+  std::optional<TileColumns> columns;
   /// Called with the number of tiles done, and of all.
   std::function<void(std::size_t done, std::size_t all)> progress;
 };
