@@ -25,6 +25,11 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
     if (c.unlabelled) unlabelled_ = c.id;
     if (c.any_raw && any_raw_) fault("more than one class takes all other raw labels");
     if (c.any_raw) any_raw_ = c.id;
+    if (c.cost < 0 || c.cost > 100) {
+      fault("the cost of class '" + c.name + "' is " + std::to_string(c.cost) + " and must be 0 to 100");
+    } else if (c.cost > 0 && !c.ground) {
+      fault("class '" + c.name + "' has a cost, but not the flag ground: only ground has one");
+    }
     for (const std::uint32_t raw : c.raw) {
       if (!class_of_raw_.emplace(raw, c.id).second) {
         fault("raw label " + std::to_string(raw) + " is given twice");

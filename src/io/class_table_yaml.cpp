@@ -99,7 +99,7 @@ std::string nameOf(const std::string& file, const YAML::Node& node, const std::s
 /// @param number position of the class in the list, counted from 1.
 SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::size_t number) {
   if (!node.IsMap()) fail(file, "class " + std::to_string(number) + " of the list is not a map");
-  checkKeys(file, node, "a class", {"id", "name", "color", "raw", "flags", "free_gain"});
+  checkKeys(file, node, "a class", {"id", "name", "color", "raw", "flags", "free_gain", "cost"});
   for (const char* key : {"id", "name", "color"}) {
     if (!node[key]) fail(file, std::string("a class has no '") + key + "'");
   }
@@ -130,6 +130,8 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
     if (!(*c.free_gain > 0.0 && std::isfinite(*c.free_gain)))
       fail(file, "the free_gain of class '" + c.name + "' must be a number > 0");
   }
+  if (node["cost"] && !YAML::convert<int>::decode(node["cost"], c.cost))
+    fail(file, "the cost of class '" + c.name + "' must be a whole number from 0 to 100");
   return c;
 }
 

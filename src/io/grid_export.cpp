@@ -77,11 +77,9 @@ std::string gridImagePath(const std::string& path) {
 
 void exportGrid(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                 const ColumnRules& rules) {
-  std::vector<GridIndex> blocks;
-  for (const auto& [index, block] : map.entries()) blocks.push_back(index);
   ColumnMap columns;
   columns.start(rules);
-  columns.update(map, classes, blocks);
+  columns.update(map, classes);
   const Extent extent = extentOf(columns);
   if (extent.width() == 0)
     throw std::invalid_argument("the map is empty, and map_server refuses empty images");

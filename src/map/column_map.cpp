@@ -52,6 +52,9 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
       view.occupancy = ColumnView::Occupancy::kOccupied;
     }
   }
+  const bool graded = grounded && view.occupancy == ColumnView::Occupancy::kFree;
+  view.cost = static_cast<std::int8_t>(graded ? classes.find(view.ground_class)->cost
+                                              : static_cast<int>(view.occupancy));
   return view;
 }
 
@@ -93,6 +96,19 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
     }
   }
   return stacks;
+}
+
+std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const ClassTable& classes) {
+  std::vector<GridIndex> blocks;
+  for (const auto& entry : map.entries()) blocks.push_back(entry.index);
+  return update(map, classes, blocks);
+}
+
+const ColumnView* ColumnMap::find(const VoxelIndex& voxel) const {
+  const BlockIndex block = GridGeometry::blockOf(voxel);
+  const auto stack = columns_.find({block.x, block.y});
+  if (stack == columns_.end()) return nullptr;
+  return &stack->second[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel)) % stack->second.size()];
 }
 
 }  // namespace bki_mapping

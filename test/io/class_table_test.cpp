@@ -48,6 +48,59 @@ TEST(ClassTable, FlagsAndGainsBelongToClasses) {
   EXPECT_NAMES(faultOf(head + "free_gain: 0}\n"), "free_gain of class 'a' must be a number > 0");
 }
 
+TEST(ClassTable, GroundMayCost) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "file.yaml";
+  std::ofstream(file) << "classes:\n"
+                         "  - {id: 0, name: road, color: [1, 2, 3], flags: [ground]}\n"
+                         "  - {id: 1, name: grass, color: [1, 2, 3], flags: [ground], cost: 60}\n"
+                         "  - {id: 2, name: water, color: [1, 2, 3], flags: [ground], cost: 100}\n"
+                         "  - {id: 3, name: wall, color: [1, 2, 3], cost: 0}\n";
+  const ClassTable table = loadClassTable(file);
+  for (const auto& [id, cost] : {std::pair(0, 0), std::pair(1, 60), std::pair(2, 100), std::pair(3, 0)}) {
+    EXPECT_EQ(table.find(static_cast<ClassId>(id))->cost, cost);
+  }
+  const std::string grass = "classes:\n  - {id: 0, name: grass, color: [1, 2, 3], flags: [ground], cost: ";
+  for (const char* cost : {"-1", "101", "255", "1000"}) {
+    EXPECT_NAMES(faultOf(grass + cost + "}\n"),
+                 std::string("the cost of class 'grass' is ") + cost + " and must be 0 to 100");
+  }
+  for (const char* cost : {"12.5", "high", "~", "[60]", ".nan", ".inf", "99999999999", "60 70"}) {
+    EXPECT_NAMES(faultOf(grass + cost + "}\n"),
+                 "the cost of class 'grass' must be a whole number from 0 to 100");
+  }
+  EXPECT_NAMES(faultOf("classes:\n  - {id: 0, name: wall, color: [1, 2, 3], cost: 60}\n"),
+               "class 'wall' has a cost, but not the flag ground");
+  EXPECT_NAMES(faultOf("classes:\n  - {id: 0, name: a, color: [1, 2, 3], costs: 60}\n"),
+               "did you mean 'cost'?");
+}
+
+TEST(ClassTable, ShippedTablesGradeTheGround) {
+  const std::map<std::string, std::map<std::string, int>> costs = {
+      {"semantic_kitti",
+       {{"road", 0}, {"parking", 0}, {"sidewalk", 30}, {"other-ground", 50}, {"terrain", 60}}},
+      {"nuscenes", {{"driveable-surface", 0}, {"sidewalk", 30}, {"other-flat", 50}, {"terrain", 60}}},
+      {"carla",
+       {{"road", 0},
+        {"road-line", 0},
+        {"sidewalk", 30},
+        {"ground", 50},
+        {"rail-track", 50},
+        {"terrain", 60}}},
+      {"kitti", {{"road", 0}, {"sidewalk", 30}}},
+      {"nclt", {{"road", 0}, {"sidewalk", 30}, {"terrain", 60}}},
+      {"toy", {}},
+      {"occupancy", {}}};
+  for (const auto& [name, expected] : costs) {
+    std::map<std::string, int> found;
+    const ClassTable table = loadClassTable(name);
+    for (const SemanticClass& c : table.classes()) {
+      if (c.ground) found[c.name] = c.cost;
+    }
+    EXPECT_EQ(found, expected) << name;
+  }
+}
+
 TEST(ClassTable, AllShippedTablesLoad) {
   const std::map<std::string, std::size_t> sizes = {{"semantic_kitti", 20}, {"nuscenes", 17}, {"carla", 23},
                                                     {"kitti", 12},          {"nclt", 14},     {"toy", 4},

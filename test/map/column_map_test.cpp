@@ -9,22 +9,25 @@
 namespace bki_mapping {
 namespace {
 
-enum : ClassId { kRoad = 0, kCar = 1, kSky = 2 };
+enum : ClassId { kRoad = 0, kCar = 1, kSky = 2, kGrass = 3, kWater = 4 };
 
 ClassTable table() {
-  std::vector<SemanticClass> classes(3);
-  for (std::uint8_t id = 0; id < 3; ++id) {
+  std::vector<SemanticClass> classes(5);
+  for (std::uint8_t id = 0; id < 5; ++id) {
     classes[id].id = id;
     classes[id].name = "class" + std::to_string(id);
   }
   classes[kRoad].ground = true;
   classes[kSky].ignored = true;
+  for (const ClassId id : {kGrass, kWater}) classes[id].ground = true;
+  classes[kGrass].cost = 60;
+  classes[kWater].cost = 100;
   return ClassTable("test", classes);
 }
 
 class Columns : public testing::Test {
  protected:
-  Columns() : map_(GridGeometry(0.5), 0.001, 3) {}
+  Columns() : map_(GridGeometry(0.5), 0.001, 5) {}
 
   void add(const VoxelIndex& voxel, ClassId id) {
     std::vector<EvidenceUnits> plane(kBlockVoxels, 0);
@@ -46,8 +49,8 @@ class Columns : public testing::Test {
   ColumnView column(const ColumnRules& rules = {}) const {
     ColumnMap columns;
     columns.start(rules);
-    columns.update(map_, classes_, allBlocks());
-    return columns.columns().at({0, 0})[0];
+    columns.update(map_, classes_);
+    return *columns.find({{0, 0, 0}});
   }
 
   SemanticMap map_;
@@ -111,6 +114,47 @@ TEST_F(Columns, WithoutGroundBelowAnObstacleCountsAtAnyHeight) {
   EXPECT_EQ(column(rules).occupancy, Occupancy::kOccupied);
 }
 
+TEST_F(Columns, CostWhatTheirGroundCosts) {
+  add({{0, 0, 0}}, kSky);
+  EXPECT_EQ(column().cost, -1) << "unknown";
+  add({{0, 0, 3}}, kFreeClass);
+  EXPECT_EQ(column().cost, 0) << "free, without ground";
+  add({{0, 0, -4}}, kGrass);
+  EXPECT_EQ(column().cost, 60);
+  add({{0, 0, -3}}, kRoad);  // laid on it
+  EXPECT_EQ(column().cost, 0);
+  add({{0, 0, -2}}, kWater);
+  EXPECT_EQ(column().cost, 100) << "never, although it is ground";
+  EXPECT_EQ(column().occupancy, Occupancy::kFree);
+  add({{0, 0, -1}}, kGrass);
+  EXPECT_EQ(column().cost, 60);
+  add({{0, 0, 2}}, kGrass);  // a bridge: the ground below counts
+  EXPECT_EQ(column().cost, 60);
+  add({{0, 0, 1}}, kCar);
+  EXPECT_EQ(column().cost, 100);
+  ColumnRules rules;
+  rules.max_z = 0.5;  // below the car
+  EXPECT_EQ(column(rules).cost, 60);
+}
+
+/// The cost, from the definition: of the class at the top of the lowest uninterrupted run of ground.
+int costOf(const SemanticMap& map, const ClassTable& classes, const ColumnView& view,
+           const ColumnMap::StackIndex& stack, int cell) {
+  if (view.occupancy != Occupancy::kFree) return static_cast<int>(view.occupancy);
+  int cost = 0;
+  bool in_ground = false;
+  for (int z = -24; z < 24; ++z) {
+    const VoxelIndex voxel{
+        {kBlockEdge * stack.first + cell % kBlockEdge, kBlockEdge * stack.second + cell / kBlockEdge, z}};
+    const VoxelView voxel_view = viewPoint(map, map.geometry().voxelCentre(voxel));
+    const bool ground = voxel_view.state == VoxelState::kOccupied && classes.find(voxel_view.label)->ground;
+    if (in_ground && !ground) break;
+    if (ground) cost = classes.find(voxel_view.label)->cost;
+    in_ground = ground;
+  }
+  return cost;
+}
+
 TEST_F(Columns, UpdatesEqualARecomputation) {
   std::mt19937 random(5);
   const auto draw = [&](int edge) {
@@ -121,8 +165,8 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
     std::vector<GridIndex> changed;
     for (int i = 0; i < 20; ++i) {
       const VoxelIndex voxel{{draw(20), draw(20), draw(20)}};
-      const ClassId ids[] = {kRoad, kCar, kSky, kFreeClass};
-      add(voxel, ids[random() % 4]);
+      const ClassId ids[] = {kRoad, kCar, kSky, kFreeClass, kGrass, kWater};
+      add(voxel, ids[random() % 6]);
       changed.push_back(GridGeometry::blockOf(voxel));
     }
     if (round % 5 == 4) {
@@ -137,12 +181,20 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
     ColumnMap fresh;
     fresh.update(map_, classes_, allBlocks());
     ASSERT_EQ(kept.columns().size(), fresh.columns().size());
+    for (const VoxelIndex& voxel :
+         {VoxelIndex{{-20, 19, 3}}, VoxelIndex{{7, -8, -99}}, VoxelIndex{{80, 0, 0}}}) {
+      const auto stack = fresh.columns().find(
+          {static_cast<int>(std::floor(voxel.x / 8.0)), static_cast<int>(std::floor(voxel.y / 8.0))});
+      const auto cell = static_cast<std::size_t>((voxel.x & 7) + 8 * (voxel.y & 7));
+      ASSERT_EQ(fresh.find(voxel), stack == fresh.columns().end() ? nullptr : &stack->second[cell]);
+    }
     const auto same = [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); };
     for (const auto& [stack, columns] : fresh.columns()) {
       for (std::size_t c = 0; c < columns.size(); ++c) {
         const ColumnView &a = columns[c], &b = kept.columns().at(stack)[c];
         ASSERT_TRUE(same(a.ground, b.ground) && same(a.clearance, b.clearance) && a.occluded == b.occluded &&
-                    a.occupancy == b.occupancy && a.ground_class == b.ground_class);
+                    a.occupancy == b.occupancy && a.ground_class == b.ground_class && a.cost == b.cost);
+        ASSERT_EQ(a.cost, costOf(map_, classes_, a, stack, static_cast<int>(c)));
       }
     }
   }

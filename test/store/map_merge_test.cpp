@@ -353,6 +353,22 @@ TEST_F(MapMerge, RefusesOtherGridsFramesAndFilesWithoutDrives) {
   expectHolds(folder_ / "c", "a");
 }
 
+TEST_F(MapMerge, KnowsNoCosts) {
+  const std::string a = make("a", "a"), b = folder_ / "b", sum = folder_ / "sum";
+  MapInfo costly = infoOf();
+  std::vector<SemanticClass> classes = costly.classes->classes();
+  classes[2].cost = 60;
+  costly.classes = std::make_shared<const ClassTable>(costly.classes->name(), classes);
+  saveMap(b, costly, {driveOf("a")}, mapOf('a'));
+  EXPECT_TRUE(bytesOf(a) == bytesOf(b)) << "files of vehicles with other costs are the same";
+  EXPECT_EQ(loadMap(b).info.classes->find(80)->cost, 0);
+  checkFits(MapFile(b, MapFile::Access::kRead), costly);
+  checkFits(MapFile(b, MapFile::Access::kRead), infoOf());
+  saveMap(b, costly, {driveOf("b")}, mapOf('b'));
+  merge({a, b}, sum);
+  expectHolds(sum, "ab");
+}
+
 TEST_F(MapMerge, TakesColoursAndParametersFromTheNewestDrive) {
   const std::string a = make("a", "a"), b = folder_ / "b";
   MapInfo info = infoOf();

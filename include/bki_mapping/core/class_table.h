@@ -27,13 +27,17 @@ struct SemanticClass {
   bool ignored = false;                 ///< navigation ignores it: it is neither ground nor an obstacle
   std::optional<double> free_gain;      ///< replaces the gain of the mapper's settings, > 0
   bool living = false;                  ///< people, riders, animals: `dynamic`, but never parked
+  /// Cost of driving on it, as nav_msgs/OccupancyGrid counts: 0, freely, to 100, never. Above 0 only with
+  /// `ground`. Belongs to the vehicle, not to the map: map files do not store it.
+  int cost = 0;
 };
 
 /// Maps the labels of clouds to classes. Immutable.
 class ClassTable {
  public:
   /// @throws std::invalid_argument that lists every fault: no class, more than 254 classes, a duplicate id,
-  /// name or raw label, an id above 253, more than one unlabelled or catch-all class.
+  /// name or raw label, an id above 253, more than one unlabelled or catch-all class, a cost that is not
+  /// allowed.
   ClassTable(std::string name, std::vector<SemanticClass> classes);
 
   const std::string& name() const { return name_; }

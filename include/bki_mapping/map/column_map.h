@@ -46,6 +46,9 @@ struct ColumnView {
   /// unknown. If heights are measured from the ground, obstacles in columns without ground count at
   /// any height.
   Occupancy occupancy = Occupancy::kUnknown;
+  /// The cost of driving here, as nav_msgs/OccupancyGrid counts: if free, SemanticClass::cost of the ground's
+  /// class, and 0 without ground; otherwise the value of `occupancy`.
+  std::int8_t cost = static_cast<std::int8_t>(Occupancy::kUnknown);
 };
 
 /// The columns of a map, updated block by block. Columns are stored by stack, a vertical column of blocks.
@@ -68,7 +71,12 @@ class ColumnMap {
   std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes,
                               const std::vector<GridIndex>& changed);
 
+  /// Recomputes all stacks of a map. @return them.
+  std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes);
+
   const std::map<StackIndex, Columns>& columns() const { return columns_; }
+  /// The column that contains a voxel; nullptr if no block is above or below it, or it.
+  const ColumnView* find(const VoxelIndex& voxel) const;
 
  private:
   ColumnRules rules_;

@@ -61,9 +61,7 @@ class ColumnPublisher : public MapPublisher {
     if (!all) return columns_.update(map, snapshot.classes, changed.blocks());
     columns_.start(rulesOf(snapshot.config));
     known_ = true;
-    std::vector<GridIndex> blocks;
-    for (const auto& entry : map.entries()) blocks.push_back(entry.index);
-    return columns_.update(map, snapshot.classes, blocks);
+    return columns_.update(map, snapshot.classes);
   }
 
   /// Calls write(index in the rectangle's arrays, view) for every known column in a rectangle of whole

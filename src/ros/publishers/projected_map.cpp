@@ -57,9 +57,7 @@ class ProjectedMap : public ColumnPublisher {
   std::vector<std::int8_t> cells(const CellRectangle& rectangle) const {
     std::vector<std::int8_t> data(std::size_t{rectangle.width} * rectangle.height,
                                   static_cast<std::int8_t>(ColumnView::Occupancy::kUnknown));
-    forEachCell(rectangle, [&](std::size_t i, const ColumnView& view) {
-      data[i] = static_cast<std::int8_t>(view.occupancy);
-    });
+    forEachCell(rectangle, [&](std::size_t i, const ColumnView& view) { data[i] = view.cost; });
     return data;
   }
 
