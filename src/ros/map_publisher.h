@@ -109,6 +109,14 @@ struct PublisherContext {
     };
     return advertise<Message>(topic, connected, false);
   }
+  /// Advertises updates of the maps on another topic of `owner`. A new subscriber makes `owner` publish its
+  /// whole map again: who subscribes to updates only once it has a map, as costmap_2d does, has missed those
+  /// in between.
+  template <typename Message>
+  ros::Publisher advertiseUpdatesOf(const std::string& topic, MapPublisher& owner) const {
+    return advertise<Message>(
+        topic, [&owner](const ros::SingleSubscriberPublisher&) { owner.changed.addAll(); }, false);
+  }
 
  private:
   template <typename Message, typename Connected>

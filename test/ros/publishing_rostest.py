@@ -77,19 +77,19 @@ class Publishing(MapperTest):
 
     def test_grids_from_above_follow_the_map(self):
         self.drive(range(1))
-        grid = Listener('projected_map', OccupancyGrid)
+        grid, elevation = Listener('projected_map', OccupancyGrid), Listener('elevation_map', ElevationMap)
+        grid.wait_for(lambda m: m.data, 'a whole grid')
         updates = Listener('projected_map_updates', OccupancyGridUpdate)
-        elevation = Listener('elevation_map', ElevationMap)
         for listener in (grid, updates, elevation):
             self.addCleanup(listener.close)
-        grid.wait_for(lambda m: m.data, 'a whole grid')
+        wait_until(lambda: len(grid.messages) == 2, 'another grid because of the subscriber of updates')
         elevation.wait_for(lambda m: m.whole, 'a whole elevation map')
         # A second drive at the same place: the grid does not grow.
         for seed in range(1, 3):
             stamp = self.integrate(*random_scan(seed))
         updates.wait_for(lambda m: m.header.stamp == stamp, 'the update of the last scan')
-        self.assertEqual(len(grid.messages), 1)
-        width, cells = grid.messages[0].info.width, list(grid.messages[0].data)
+        self.assertEqual(len(grid.messages), 2)
+        width, cells = grid.messages[1].info.width, list(grid.messages[1].data)
         for update in updates.messages:
             self.assertLess(update.width * update.height, len(cells))
             for row in range(update.height):
@@ -100,7 +100,7 @@ class Publishing(MapperTest):
         self.addCleanup(again.close)
         whole = again.wait_for(lambda m: True, 'the whole grid again')
         self.assertEqual((whole.info.width, whole.info.origin.position.x),
-                         (width, grid.messages[0].info.origin.position.x))
+                         (width, grid.messages[1].info.origin.position.x))
         self.assertEqual(list(whole.data), cells)
         self.assertEqual({-1, 0, 100}, set(cells))
         # The road is ground: it is no obstacle, and has a height.

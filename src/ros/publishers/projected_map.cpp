@@ -21,8 +21,7 @@ class ProjectedMap : public ColumnPublisher {
           if (!fits(grid_, 1)) return warnOfSize(grid_);
           subscriber.publish(whole(snapshot));
         });
-    updates_ = context.advertiseUpdates<map_msgs::OccupancyGridUpdate>(
-        "projected_map_updates", *this, [](const auto&, const MapSnapshot&) {});
+    updates_ = context.advertiseUpdatesOf<map_msgs::OccupancyGridUpdate>("projected_map_updates", *this);
   }
 
   bool wanted() const override { return MapPublisher::wanted() || updates_.getNumSubscribers() > 0; }
