@@ -32,6 +32,14 @@ class Launch(unittest.TestCase):
             self.assertEqual(status.labels_not_in_table, 0, preset)
             self.assertIn('Mapped 1 of 1 clouds; dropped none', mapping.printed(), preset)
 
+    def test_navigation_measures_heights_from_the_ground(self):
+        with Mapping('navigation:=true') as mapping:
+            settings = rospy.get_param('/mapping')
+            status = mapping.scan()
+        self.assertTrue(status.integrated_last, status)
+        self.assertEqual([settings[name] for name in ('occupancy_height', 'occupancy_min_z', 'occupancy_max_z')], ['ground', 0.1, 2.0])
+        self.assertEqual(settings['prior'], 0.0001, 'besides, the preset of robots')
+
     def test_a_clock_that_goes_back_is_a_time_jump(self):
         rospy.set_param('/use_sim_time', True)
         self.addCleanup(rospy.set_param, '/use_sim_time', False)
