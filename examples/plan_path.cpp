@@ -9,9 +9,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iostream>
 #include <queue>
 #include <set>
+#include <string>
+#include <vector>
 
 using namespace bki_mapping;
 

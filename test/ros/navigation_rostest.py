@@ -18,7 +18,7 @@ FREE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 253, 254, 255  # costs of costmap_2
 
 
 class StaticLayer:
-    """Does with grids what costmap_2d 1.17 does: it subscribes to a map, waits for it, and only then to its updates."""
+    """Does with grids what that of costmap_2d for Noetic does: it subscribes to a map, waits for it, and only then to its updates."""
     DEFAULTS = {'map_topic': 'map', 'subscribe_to_updates': False, 'first_map_only': False, 'track_unknown_space': True,
                 'unknown_cost_value': -1, 'lethal_cost_threshold': 100, 'trinary_costmap': True, 'use_maximum': False}
 

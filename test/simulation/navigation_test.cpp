@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <memory>
+#include <optional>
+#include <random>
 #include <sstream>
 #include <vector>
 
@@ -67,7 +70,10 @@ class Navigation : public testing::Test {
   }
   static std::vector<Pose> plan(const std::string& words,
                                 const std::string& classes = kTables + "classes/semantic_kitti.yaml") {
-    std::istringstream text(say(words, classes));
+    return read(say(words, classes));
+  }
+  static std::vector<Pose> read(const std::string& printed) {
+    std::istringstream text(printed);
     std::string line;
     std::getline(text, line);
     EXPECT_EQ(line, "x,y,z,yaw,cost");
@@ -78,6 +84,20 @@ class Navigation : public testing::Test {
           std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf,%lf", &pose.x, &pose.y, &pose.z, &pose.yaw, &pose.cost),
           5)
           << line;
+    }
+    return path;
+  }
+  /// The class table with other costs of road and sidewalk.
+  static std::string tableWith(const std::string& road, const std::string& sidewalk) {
+    const std::string path = *folder_ / ("road_" + road + ".yaml");
+    std::ifstream original(kTables + "classes/semantic_kitti.yaml");
+    std::ofstream table(path);
+    for (std::string line; std::getline(original, line);) {
+      if (line.find("name: road,") != std::string::npos)
+        line.replace(line.rfind('}'), 1, ", cost: " + road + "}");
+      const std::size_t cost = line.find("cost: 30");
+      if (cost != std::string::npos) line.replace(cost, 8, "cost: " + sidewalk);
+      table << line << "\n";
     }
     return path;
   }
@@ -150,6 +170,27 @@ TEST_F(Navigation, HitsNothingThatStands) {
   EXPECT_GT(hitsOf(straight(first, last)), 10u) << "there is nothing to drive around";
 }
 
+TEST_F(Navigation, HitsNothingBetweenOtherPlaces) {
+  std::mt19937 random(1);
+  const auto draw = [&](int least, int most) {
+    return std::to_string(std::uniform_int_distribution<int>(least, most)(random));
+  };
+  int ways = 0, blocked = 0;
+  for (int i = 0; i < 8; ++i) {
+    const std::string words =
+        draw(-5, 15) + " " + draw(-7, 9) + " 0 " + draw(25, 50) + " " + draw(-7, 9) + " 0";
+    const std::string text = say(words);
+    if (text.rfind("plan_path: the ", 0) == 0) continue;  // no place to stand, or no way
+    const std::vector<Pose> path = read(text);
+    ASSERT_FALSE(path.empty()) << words;
+    EXPECT_EQ(hitsOf(path), 0u) << words;
+    blocked += hitsOf(straight(path.front(), path.back())) > 0;
+    ++ways;
+  }
+  EXPECT_GE(ways, 3);
+  EXPECT_GE(blocked, 1);
+}
+
 TEST_F(Navigation, DrivesArcsOfTheTurningRadius) {
   const std::vector<Pose> path = plan(kAcross);
   for (std::size_t i = 1; i < path.size(); ++i) {
@@ -162,21 +203,17 @@ TEST_F(Navigation, DrivesArcsOfTheTurningRadius) {
 }
 
 TEST_F(Navigation, PrefersWhatCostsLess) {
-  const std::string table = *folder_ / "walker.yaml";
-  std::ifstream original(kTables + "classes/semantic_kitti.yaml");
-  std::ofstream walker(table);
-  for (std::string line; std::getline(original, line);) {
-    if (line.find("name: road,") != std::string::npos) line.replace(line.rfind('}'), 1, ", cost: 90}");
-    if (line.find("name: sidewalk,") != std::string::npos) line.replace(line.find(", cost: 30"), 10, "");
-    walker << line << "\n";
-  }
-  walker.close();
+  const std::string table = tableWith("90", "0");
   const std::vector<Pose> car = plan(kAcross), foot = plan(kAcross, table);
   EXPECT_EQ(hitsOf(foot), 0u);
   EXPECT_GT(shareOf(car, kRoad), 0.7);
   EXPECT_LT(shareOf(foot, kRoad), 0.5);
   EXPECT_GT(shareOf(foot, kSidewalk), 0.5);
   for (const Pose& pose : car) EXPECT_TRUE(pose.cost == 0.0 || pose.cost == 30.0) << pose.cost;
+}
+
+TEST_F(Navigation, NeverDrivesOnWhatCosts100) {
+  EXPECT_EQ(say(kAcross, tableWith("100", "0")), "plan_path: the map shows no way from start to goal\n");
 }
 
 TEST_F(Navigation, RefusesPlacesWhereTheRobotCannotStand) {
