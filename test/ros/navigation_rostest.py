@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""config/navigation makes of projected_map what planners need. costmap_2d itself is not at hand: its StaticLayer is acted."""
+"""config/navigation gives planners what they need of projected_map. A stand-in takes the place of costmap_2d's StaticLayer."""
 import os
 import sys
 import threading
@@ -18,7 +18,7 @@ FREE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 253, 254, 255  # costs of costmap_2
 
 
 class StaticLayer:
-    """Does with grids what that of costmap_2d for Noetic does: it subscribes to a map, waits for it, and only then to its updates."""
+    """Does with grids what costmap_2d's for Noetic does: it subscribes to a map, waits for it, and only then to its updates."""
     DEFAULTS = {'map_topic': 'map', 'subscribe_to_updates': False, 'first_map_only': False, 'track_unknown_space': True,
                 'unknown_cost_value': -1, 'lethal_cost_threshold': 100, 'trinary_costmap': True, 'use_maximum': False}
 
