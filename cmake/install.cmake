@@ -42,7 +42,7 @@ set_target_properties(${bki_mapping_programs} PROPERTIES INSTALL_RPATH "$ORIGIN/
 install(TARGETS ${bki_mapping_programs} RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION})
 
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION include/${PROJECT_NAME})
-install(DIRECTORY config DESTINATION ${BKI_MAPPING_SHARE_DESTINATION})
+install(DIRECTORY config web DESTINATION ${BKI_MAPPING_SHARE_DESTINATION})
 
 if(BKI_MAPPING_ROS)  # catkin installs the rest of the CMake files
   export(EXPORT bki_mapping-targets NAMESPACE bki_mapping::

@@ -26,20 +26,28 @@ void exportColumns(const std::string& path, const SemanticMap& map, const ClassT
   exportGrid(path, map, classes, options.columns);
 }
 
+void exportPage(const std::string& path, const SemanticMap& map, const ClassTable& classes,
+                const ExportOptions& options) {
+  exportHtml(path, map, classes, options.html);
+}
+
 Export exportOf(const std::string& path) {
   const std::string ending = std::filesystem::path(path).extension().string();
   if (ending == ".ply" || ending == ".pcd") return exportPoints;
   if (ending == ".ot" || ending == ".bt") return exportTree;
   if (ending == ".yaml") return exportColumns;
-  throw std::invalid_argument("the exported file, " + path + ", must end in .ply, .pcd, .ot, .bt or .yaml");
+  if (ending == ".html") return exportPage;
+  throw std::invalid_argument("the exported file, " + path +
+                              ", must end in .ply, .pcd, .ot, .bt, .yaml or .html");
 }
 
 }  // namespace
 
-void checkExport(const std::string& path) {
+void checkExport(const std::string& path, const ExportOptions& options) {
   const Export chosen = exportOf(path);
   checkWritable(path);
   if (chosen == exportColumns) checkWritable(gridImagePath(path));
+  if (chosen == exportPage) checkHtml(options.html);
 }
 
 void exportFile(const std::string& path, const SemanticMap& map, const ClassTable& classes,

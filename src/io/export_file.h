@@ -6,19 +6,22 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/map/column_map.h"
 #include "bki_mapping/map/map_query.h"
+#include "io/html_export.h"
 
 namespace bki_mapping {
 
 struct ExportOptions {
   VoxelStates states{VoxelState::kOccupied};  ///< of the voxels in .ply and .pcd files
   ColumnRules columns;                        ///< of .yaml files
+  HtmlOptions html;                           ///< of .html files
 };
 
 /// Checks a name before long work. @throws std::invalid_argument if it has none of the endings .ply, .pcd,
-/// .ot, .bt and .yaml; std::runtime_error if the file, or the image of a .yaml, cannot be written.
-void checkExport(const std::string& path);
+/// .ot, .bt, .yaml and .html; std::runtime_error if the file, or the image of a .yaml, cannot be written, or
+/// three.js for a .html is missing.
+void checkExport(const std::string& path, const ExportOptions& options = {});
 
-/// Writes a map by exportMap, exportOctoMap or exportGrid. @throws as these and checkExport().
+/// Writes a map by exportMap, exportOctoMap, exportGrid or exportHtml. @throws as these and checkExport().
 void exportFile(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                 const ExportOptions& options);
 

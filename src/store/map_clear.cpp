@@ -8,22 +8,10 @@
 
 #include "bki_mapping/map/clear_box.h"
 #include "bki_mapping/store/map_file.h"
+#include "store/box_tiles.h"
 
 namespace bki_mapping {
 namespace {
-
-/// The tiles that may hold voxels of a box.
-std::pair<GridIndex, GridIndex> tilesAbout(const Eigen::AlignedBox3d& box, double resolution) {
-  const double edge = Region::kEdge * kBlockEdge * resolution;
-  // One tile more on each side because of rounding, but within the range of indices.
-  constexpr double kMost = GridGeometry::kMaxCoordinate / (Region::kEdge * kBlockEdge) + 2.0;
-  const auto tile = [&](double metres, int wider) {
-    return static_cast<int>(std::clamp(std::floor(metres / edge) + wider, -kMost, kMost));
-  };
-  const Eigen::Vector3d &low = box.min(), &high = box.max();
-  return {{tile(low.x(), -1), tile(low.y(), -1), tile(low.z(), -1)},
-          {tile(high.x(), 1), tile(high.y(), 1), tile(high.z(), 1)}};
-}
 
 /// Clears a box in all parts. @param copies whether to write unchanged tiles, too.
 ClearedFile clearParts(MapFile& file, const Eigen::AlignedBox3d& box, MapFile::Change& change, bool copies) {

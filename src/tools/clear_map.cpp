@@ -1,7 +1,5 @@
 // Clears a box of a map file.
-#include <cmath>
 #include <iostream>
-#include <sstream>
 #include <stdexcept>
 
 #include "bki_mapping/io/mapper_file.h"
@@ -22,35 +20,13 @@ po::options_description options() {
   return options;
 }
 
-/// @param text as in --box.
-Eigen::AlignedBox3d parseBox(const std::string& text) {
-  std::istringstream words(text);
-  std::vector<double> numbers;
-  for (std::string word; words >> word;) {
-    std::size_t end = 0;
-    try {
-      numbers.push_back(std::stod(word, &end));
-    } catch (const std::logic_error&) {
-      end = 0;
-    }
-    if (end != word.size() || std::isnan(numbers.back()))
-      throw std::invalid_argument("--box: " + word + " is not a number");
-  }
-  if (numbers.size() != 6) {
-    throw std::invalid_argument("--box has " + std::to_string(numbers.size()) +
-                                " numbers, but needs six: \"X0 Y0 Z0 X1 Y1 Z1\"");
-  }
-  const Eigen::Vector3d a(numbers[0], numbers[1], numbers[2]), b(numbers[3], numbers[4], numbers[5]);
-  return {a.cwiseMin(b), a.cwiseMax(b)};
-}
-
 int clearFile(const po::variables_map& given) {
   const std::string path = tools::onlyMapFile(given);
   if (!given.count("box")) throw std::invalid_argument("--box \"X0 Y0 Z0 X1 Y1 Z1\" is missing (see --help)");
   const std::string output = given.count("output") ? given["output"].as<std::string>() : path;
   if (!isMapFileName(output))
     throw std::invalid_argument("the cleared map, " + output + ", must end in .bkm");
-  const ClearedFile cleared = clearBoxOfFile(path, parseBox(given["box"].as<std::string>()), output);
+  const ClearedFile cleared = clearBoxOfFile(path, tools::parseBox(given["box"].as<std::string>()), output);
   std::cout << output << ": cleared in " << cleared.blocks << " blocks of " << cleared.tiles << " tiles\n";
   return 0;
 }

@@ -1,10 +1,13 @@
 // Exports a map file for other programs.
+#include <filesystem>
 #include <iostream>
+#include <limits>
 #include <stdexcept>
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "io/export_file.h"
+#include "io/trajectory_file.h"
 #include "tools/options.h"
 
 namespace {
@@ -20,8 +23,16 @@ po::options_description options() {
       "output", text("FILE"),
       "file to write; its extension chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
       "the colours of classes; .bt, OctoMap of occupied and free; .yaml, with an image .pgm beside it, "
-      "for map_server")("include", text("STATES")->default_value("occupied"),
-                        "voxels in a .ply or .pcd file: occupied,free,occluded")(
+      "for map_server; .html, a page for browsers, which needs libjs-three")(
+      "html", text("FILE.html"), "the same as --output FILE.html")(
+      "include", text("STATES"),
+      "voxels in a .ply, .pcd or .html file: occupied,free,occluded; default: occupied, in a .html file all")(
+      "box", text("\"X0 Y0 Z0 X1 Y1 Z1\""),
+      "export only what lies in a box: two opposite corners, in the map frame [m]; inf and -inf are allowed")(
+      "trajectory", po::value<std::vector<std::string>>()->value_name("PATH")->composing(),
+      "draw where the sensor was in a .html file: the folder of a sequence, or a file with lines "
+      "`stamp x y z qx qy qz qw`, in the map frame; repeatable")(
+      "three-js", text("FILE"), "three.js for a .html file, if it is not that of libjs-three")(
       "min-z", po::value<double>()->value_name("M")->default_value(rules.min_z),
       "lowest height of obstacles in a .yaml map")(
       "max-z", po::value<double>()->value_name("M")->default_value(rules.max_z),
@@ -40,14 +51,51 @@ ColumnRules columnRules(const po::variables_map& given) {
   return rules;
 }
 
-int exportMapFile(const po::variables_map& given) {
-  const std::string path = tools::onlyMapFile(given);
-  if (!given.count("output")) throw std::invalid_argument("--output FILE is missing (see --help)");
-  const std::string output = given["output"].as<std::string>();
-  const ExportOptions options{parseStates(given["include"].as<std::string>()), columnRules(given)};
-  checkExport(output);
+std::string outputOf(const po::variables_map& given) {
+  if (!given.count("html")) {
+    if (!given.count("output")) throw std::invalid_argument("--output FILE is missing (see --help)");
+    return given["output"].as<std::string>();
+  }
+  const std::string page = given["html"].as<std::string>();
+  if (given.count("output")) throw std::invalid_argument("--html and --output name one file each; keep one");
+  if (std::filesystem::path(page).extension() != ".html")
+    throw std::invalid_argument("--html: the page, " + page + ", must end in .html");
+  return page;
+}
 
-  const StoredMap stored = loadMapWithGains(path);
+ExportOptions exportOptions(const po::variables_map& given) {
+  ExportOptions options;
+  options.columns = columnRules(given);
+  if (given.count("include")) {
+    options.states = options.html.states = parseStates(given["include"].as<std::string>());
+  }
+  if (given.count("three-js")) options.html.three_js = given["three-js"].as<std::string>();
+  if (given.count("trajectory")) {
+    for (const std::string& path : given["trajectory"].as<std::vector<std::string>>()) {
+      options.html.trajectories.push_back(readTrajectory(path));
+    }
+  }
+  return options;
+}
+
+Eigen::AlignedBox3d boxOf(const po::variables_map& given) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (given.count("box")) return tools::parseBox(given["box"].as<std::string>());
+  return {Eigen::Vector3d::Constant(-kInfinity), Eigen::Vector3d::Constant(kInfinity)};
+}
+
+int exportMapFile(const po::variables_map& given) {
+  const std::string path = tools::onlyMapFile(given), output = outputOf(given);
+  const Eigen::AlignedBox3d box = boxOf(given);
+  ExportOptions options = exportOptions(given);
+  checkExport(output, options);
+
+  MapFile file(path, MapFile::Access::kRead);
+  const StoredMap stored = readBoxWithGains(file, box);
+  options.html.name = std::filesystem::path(path).stem().string();
+  options.html.frame = stored.info.frame;
+  options.html.drives = stored.drives;
+  options.html.parts = &file;
   exportFile(output, stored.map, *stored.info.classes, options);
   std::cout << output << ": written, in frame " << stored.info.frame << "\n";
   return 0;

@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <sstream>
 #include <stdexcept>
 
 #include "bki_mapping/io/class_table_yaml.h"
@@ -75,6 +77,27 @@ std::string onlyMapFile(const po::variables_map& given) {
     if (files.size() == 1) return files[0];
   }
   throw std::invalid_argument("name one map file (see --help)");
+}
+
+Eigen::AlignedBox3d parseBox(const std::string& text) {
+  std::istringstream words(text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    std::size_t end = 0;
+    try {
+      numbers.push_back(std::stod(word, &end));
+    } catch (const std::logic_error&) {
+      end = 0;
+    }
+    if (end != word.size() || std::isnan(numbers.back()))
+      throw std::invalid_argument("--box: " + word + " is not a number");
+  }
+  if (numbers.size() != 6) {
+    throw std::invalid_argument("--box has " + std::to_string(numbers.size()) +
+                                " numbers, but needs six: \"X0 Y0 Z0 X1 Y1 Z1\"");
+  }
+  const Eigen::Vector3d a(numbers[0], numbers[1], numbers[2]), b(numbers[3], numbers[4], numbers[5]);
+  return {a.cwiseMin(b), a.cwiseMax(b)};
 }
 
 po::options_description mapperOptions() {

@@ -1,6 +1,7 @@
 /// @file Command lines of the programs: common options, parsing and errors.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <boost/program_options.hpp>
 #include <cstdint>
 #include <functional>
@@ -40,6 +41,10 @@ std::size_t count(const po::variables_map& given, const std::string& name);
 /// The only word that parse() has found as "files". @throws std::invalid_argument if there is none, or more
 /// than one.
 std::string onlyMapFile(const po::variables_map& given);
+
+/// The box of an option --box "X0 Y0 Z0 X1 Y1 Z1": two opposite corners, which may be infinite.
+/// @throws std::invalid_argument if it is not six numbers.
+Eigen::AlignedBox3d parseBox(const std::string& text);
 
 /// Options of all programs with a mapper: --classes, --config, --set, --threads.
 po::options_description mapperOptions();

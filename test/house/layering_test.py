@@ -34,7 +34,7 @@ LIBRARIES = {
     'beams/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
     'mapping/semantic_mapper.cpp': ('malloc.h',),
     'store': ('sqlite3.h', 'zlib.h'),
-    'io': ('octomap/', 'pcl/', 'png.h', 'yaml-cpp/'),
+    'io': ('nlohmann/', 'octomap/', 'pcl/', 'png.h', 'yaml-cpp/', 'zlib.h'),
     'evaluation': ('nlohmann/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),

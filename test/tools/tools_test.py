@@ -610,7 +610,7 @@ class Tools(unittest.TestCase):
         self.assertGreater(all_heights.count(b'\0'), above_ground.count(b'\0'))
         self.fails('name one map file', 'export_map', '--output', exported)
         self.fails('--output FILE is missing', 'export_map', a)
-        self.fails('must end in .ply, .pcd, .ot, .bt or .yaml', 'export_map', a, '--output', self.path('map.bkm'))
+        self.fails('must end in .ply, .pcd, .ot, .bt, .yaml or .html', 'export_map', a, '--output', self.path('map.bkm'))
         self.fails("must be map or ground", 'export_map', a, '--output', self.path('map.yaml'), '--height', 'sea')
         self.fails('--min-z must not be above', 'export_map', a, '--output', self.path('map.yaml'), '--min-z', '1', '--max-z', '0')
         self.fails("state 'busy' is unknown", 'export_map', a, '--output', exported, '--include', 'busy')

@@ -1,6 +1,7 @@
 /// @file Keeps the map of a mapper in a map file (.bkm), and resumes from it.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -27,5 +28,10 @@ SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
 
 /// Reads a whole map as loadMap, into the map that emptyMapWithGains gives, to be asked. @throws as these.
 StoredMap loadMapWithGains(const std::string& path);
+/// The same of an open file, and of a box: voxels whose centres lie outside stay unknown, and tiles outside
+/// are not read. DriveRecord::part is as in the file.
+/// @param box map frame [m], faces included; may be infinite.
+/// @throws std::invalid_argument if a corner of the box is not a number.
+StoredMap readBoxWithGains(MapFile& file, const Eigen::AlignedBox3d& box);
 
 }  // namespace bki_mapping

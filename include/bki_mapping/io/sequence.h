@@ -53,6 +53,8 @@ class Sequence {
   const std::string& name(std::size_t i) const { return names_[i]; }
   /// The number in the file name.
   std::size_t number(std::size_t i) const { return numbers_[i]; }
+  /// T_map_sensor of a scan.
+  const Eigen::Isometry3d& pose(std::size_t i) const { return poses_[i]; }
   /// The scans missing between the first and the last one, as a clause; "" if there are none.
   std::string gaps() const;
   /// @throws std::runtime_error if the files cannot be read, or the numbers of points and labels differ.
