@@ -134,7 +134,8 @@ class TileWriter {
     return {{"index", {tile.x, tile.y, tile.z}},
             {"blocks", blocks},
             {"evidence_blocks", entry.blocks},
-            {"evidence_planes", entry.planes}};
+            {"evidence_planes", entry.planes},
+            {"evidence_checksum", entry.checksum}};
   }
 
  private:

@@ -57,7 +57,7 @@ VoxelDrives::Codes VoxelDrives::codesOf(const GridGeometry& geometry, const Bloc
   }
   Codes codes{};
   for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-    if (view.state[v] == VoxelState::kUnknown) continue;
+    if (std::max(rest[v], most[v]) <= 0) continue;
     const auto group = drives_of_part_.find(rest[v] > most[v] ? 0 : part_of[v]);
     if (group == drives_of_part_.end()) continue;
     const Eigen::Vector3d centre = geometry.voxelCentre(GridGeometry::voxelOf(index, static_cast<int>(v)));
