@@ -156,6 +156,8 @@ function(bki_mapping_script_test room name)
   set_tests_properties(${name} PROPERTIES TIMEOUT 300 PROCESSORS 2
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
+bki_mapping_script_test(io browser_test)
+set_tests_properties(browser_test PROPERTIES SKIP_RETURN_CODE 77)
 bki_mapping_script_test(scripts figures_test)
 bki_mapping_script_test(house layering_test)
 bki_mapping_script_test(house links_test)

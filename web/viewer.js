@@ -173,6 +173,7 @@ class Viewer {
   addHighlight() {
     const edges = new THREE.EdgesGeometry(new THREE.BoxBufferGeometry(1.05, 1.05, 1.05));
     this.highlight = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({color: 0xff2fa0, depthTest: false}));
+    this.highlight.renderOrder = 1;  // over all others
     this.highlight.visible = false;
     this.scene.add(this.highlight);
   }

@@ -37,6 +37,9 @@ class Skips(unittest.TestCase):
     def test_without_an_emulator(self):
         self.assertEqual(self.outcome('nehalem_test', PATH='/no/such'), 'skipped')
 
+    def test_without_a_browser(self):
+        self.assertEqual(self.outcome('browser_test', PATH='/no/such'), 'skipped')
+
     def test_what_tests_something_is_not_skipped(self):
         self.assertEqual(self.outcome('grid_geometry_test'), 'passed')
 

@@ -1,0 +1,364 @@
+#!/usr/bin/env python3
+"""An exported page in headless Chromium, from the disk: what is drawn, picked and read is what the map says."""
+import json
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+try:
+    from selenium import webdriver
+except ImportError:
+    webdriver = None
+CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
+if webdriver is None or CHROMIUM is None or DRIVER is None:
+    print('SKIPPED: needs the packages of scripts/dependencies.browser.txt', file=sys.stderr)
+    sys.exit(77)
+if not os.path.exists('/usr/share/javascript/three/three.min.js'):
+    print('SKIPPED: needs libjs-three', file=sys.stderr)
+    sys.exit(77)
+
+BIN = os.environ['BKI_MAPPING_BIN']
+HOSTILE = '</script><script>alert(1)'
+SWITCHES = ('--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
+            '--disable-background-networking', '--disable-component-update', '--disable-sync', '--disable-dev-shm-usage')
+CLASSES = """name: hostile
+classes:
+  - {{id: 0, name: unlabelled, color: [0, 0, 0], raw: any, flags: [unlabelled]}}
+  - {{id: 3, name: car, color: [100, 150, 245], raw: [10, 252], flags: [dynamic]}}
+  - {{id: 9, name: "{}", color: [255, 0, 255], raw: [40, 60], flags: [ground]}}
+  - {{id: 253, name: building, color: [255, 200, 0], raw: [50]}}
+  - {{id: 17, name: terrain, color: [150, 240, 80], raw: [72, 48], flags: [ground]}}
+"""
+PROPERTIES = ('x', 'y', 'z', 'red', 'green', 'blue', 'label', 'state', 'probability', 'occupancy', 'class_probability', 'variance',
+              'entropy', 'evidence')
+
+
+def call(program, *arguments):
+    done = subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+
+
+def vertices(path):
+    """The voxels of a PLY file, as dictionaries."""
+    with open(path, 'rb') as file:
+        data = file.read()
+    begin = data.index(b'end_header\n') + len(b'end_header\n')
+    return [dict(zip(PROPERTIES, values)) for values in struct.iter_unpack('<fffBBBHBffffff', data[begin:])]
+
+
+class Browser(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        drive, table, bkm = cls.path('drive'), cls.path('classes.yaml'), cls.path('map.bkm')
+        with open(table, 'w') as file:
+            file.write(CLASSES.format(HOSTILE))
+        call('simulate_drive', '--output', drive, '--scans', '4', '--beams', '32', '--columns', '600')
+        call('map_sequence', '--sequence', drive, '--classes', table, '--output', bkm, '--drive', HOSTILE)
+        call('export_map', bkm, '--html', cls.path('map.html'), '--trajectory', drive)
+        call('export_map', bkm, '--output', cls.path('map.ply'), '--include', 'occupied,free')
+        cls.voxels = vertices(cls.path('map.ply'))
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        for switch in (*SWITCHES, '--user-data-dir=' + cls.path('profile'), '--window-size=900,700'):
+            options.add_argument(switch)
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+        cls.browser = webdriver.Chrome(options=options, service=webdriver.chrome.service.Service(DRIVER))
+        cls.browser.set_script_timeout(120)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.quit()
+        shutil.rmtree(cls.folder)
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder, name)
+
+    def setUp(self):
+        self.open_page()
+
+    def open_page(self, width=900, height=700, mobile=False, before=''):
+        self.command('Emulation.setDeviceMetricsOverride', width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+        self.command('Emulation.setTouchEmulationEnabled', enabled=mobile)
+        script = self.command('Page.addScriptToEvaluateOnNewDocument', source=before)['identifier']
+        self.browser.get_log('browser')  # forgets those of the page before
+        self.browser.get('file://' + self.path('map.html'))
+        self.command('Page.removeScriptToEvaluateOnNewDocument', identifier=script)
+        end = time.monotonic() + 120
+        while self.js('return document.documentElement.dataset.ready') is None:
+            self.assertLess(time.monotonic(), end, 'the page does not become ready')
+            time.sleep(0.05)
+        self.assertEqual(self.js('return document.documentElement.dataset.ready'), 'yes', self.text('loading-text'))
+
+    def command(self, name, **parameters):
+        return self.browser.execute_cdp_cmd(name, parameters)
+
+    def js(self, script, *arguments):
+        return self.browser.execute_script(script, *arguments)
+
+    def wait(self, promise):
+        """The value of a promise, given as an expression."""
+        found = self.browser.execute_async_script(
+            f'const done = arguments[0]; ({promise}).then((value) => done([value]), (error) => done(String(error)))')
+        self.assertIsInstance(found, list, found)
+        return found[0]
+
+    def text(self, name):
+        return self.js('return document.getElementById(arguments[0]).innerText', name)
+
+    def click(self, name):
+        self.browser.find_element('id', name).click()
+
+    def key(self, key, code=0, modifiers=0):
+        for kind in ('rawKeyDown', 'keyUp'):
+            self.command('Input.dispatchKeyEvent', type=kind, key=key, windowsVirtualKeyCode=code, modifiers=modifiers)
+
+    def slide(self, name, value):
+        self.js('const input = document.getElementById(arguments[0]); input.value = arguments[1];'
+                'input.dispatchEvent(new Event("input"))', name, value)
+
+    def camera(self):
+        return self.js('const o = viewer.orbit; return [o.azimuth, o.elevation, o.distance, ...o.target.toArray()]')
+
+    def disagreements(self):
+        """Pixels where the picture has a voxel and picking finds none, or the other way round. Pixels at an edge do not count.
+
+        @return (disagreements, pixels with a voxel, pixels without)."""
+        return self.js('''
+          viewer.drawNow();
+          const gl = viewer.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+          const pixels = new Uint8Array(4 * w * h);
+          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          const sky = pixels.slice(0, 3), isSky = (x, y) => [0, 1, 2].every((c) => pixels[4 * (x + w * y) + c] === sky[c]);
+          let wrong = 0, voxels = 0, none = 0;
+          for (let y = 3; y < h - 3; y += 5) {
+            for (let x = 3; x < w - 3; x += 5) {
+              const empty = isSky(x, y);
+              let same = true;
+              for (let dy = -2; dy <= 2; ++dy) for (let dx = -2; dx <= 2; ++dx) same = same && isSky(x + dx, y + dy) === empty;
+              if (!same) continue;
+              const {origin, direction} = viewer.orbit.ray(x + 0.5, h - y - 0.5);
+              const found = viewer.voxels.pick(origin, direction);
+              if (!found !== empty) ++wrong;
+              if (empty) ++none; else ++voxels;
+            }
+          }
+          return [wrong, voxels, none]''')
+
+    def assert_drawn_as_picked(self, least=300):
+        wrong, voxels, none = self.disagreements()
+        self.assertGreater(voxels, least)
+        self.assertGreater(none, 500)
+        self.assertLessEqual(wrong, (voxels + none) // 1000, 'what is drawn is what can be picked')
+        return voxels
+
+    def test_opens_from_the_disk_and_loads_nothing_else(self):
+        self.assertEqual(self.browser.title, 'map')
+        self.assertEqual(self.js('return performance.getEntriesByType("resource").length'), 0)
+        self.assertEqual([entry for entry in self.browser.get_log('browser') if entry['level'] == 'SEVERE'], [])
+        occupied = sum(voxel['state'] == 2 for voxel in self.voxels)
+        self.assertIn(f'{occupied:,} occupied', self.text('summary'))
+
+    def test_text_of_the_map_stays_text(self):
+        self.assertIn(HOSTILE, self.text('classes'))
+        self.assertEqual(self.js('return document.scripts.length'),
+                         self.js('return 7 + document.querySelectorAll("script.evidence").length'), 'none was added')
+        road = next(voxel for voxel in self.voxels if voxel['label'] == 9)
+        self.show(road)
+        self.assertEqual(self.text('voxel-title'), HOSTILE)
+        facts = self.text('voxel-facts')
+        self.assertEqual(facts.count(HOSTILE), 2, 'the class and the drive: ' + facts)
+
+    def show(self, voxel):
+        index = [int(voxel[axis] // 0.3) for axis in 'xyz']
+        self.wait(f'viewer.showVoxel({index[0]}, {index[1]}, {index[2]})')
+
+    def test_says_of_voxels_what_the_map_says(self):
+        step = len(self.voxels) // 400
+        sample = self.voxels[::step]
+        self.assertGreater(sum(voxel['state'] == 2 for voxel in sample), 30)
+        indices = [[int(voxel[axis] // 0.3) for axis in 'xyz'] for voxel in sample]
+        found = self.wait(f'Promise.all({json.dumps(indices)}.reduce((all, i) => [...all, all.length ? '
+                          'all[all.length - 1].then(() => describeVoxel(viewer.map, ...i)) : describeVoxel(viewer.map, ...i)], []))')
+        self.assertEqual(len(found), len(sample))
+        for voxel, said in zip(sample, found):
+            self.assertEqual((said['state'], said['label']), (voxel['state'], voxel['label']), voxel)
+            for axis in range(3):
+                self.assertAlmostEqual(said['centre'][axis], voxel['xyz'[axis]], places=3)
+            for name, error in (('occupancy', 0.0021), ('variance', 1e-6)):
+                self.assertAlmostEqual(said[name], voxel[name], delta=error, msg=voxel)
+            if voxel['state'] == 2:
+                self.assertAlmostEqual(said['class_probability'], voxel['class_probability'], delta=0.0021)
+            self.assertAlmostEqual(said['p'], voxel['probability'], delta=1e-6)
+            self.assertAlmostEqual(said['evidence'], voxel['evidence'], delta=1e-6 * (1 + voxel['evidence']))
+            self.assertAlmostEqual(sum(entry['p'] for entry in said['probabilities']), 1.0)
+            self.assertEqual(len(said['probabilities']), 6)
+
+    def test_a_click_reads_the_voxel_under_it(self):
+        self.browser.find_element('id', 'from-top').click()
+        x, y = self.js('return [(innerWidth + viewer.orbit.insets.left) / 2, innerHeight / 2]')
+        for kind in ('mousePressed', 'mouseReleased'):
+            self.command('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left', clickCount=1)
+        self.wait('new Promise((done) => setTimeout(done, 100)).then(() => viewer.evidence)')
+        facts = self.text('voxel-facts')
+        centre = [float(number) for number in re.search(r'Centre\s+(\S+), (\S+), (\S+) m', facts).groups()]
+        column = [voxel for voxel in self.voxels if voxel['state'] == 2 and abs(voxel['x'] - centre[0]) < 0.01 and
+                  abs(voxel['y'] - centre[1]) < 0.01]
+        highest = max(column, key=lambda voxel: voxel['z'])
+        self.assertAlmostEqual(centre[2], highest['z'], places=2, msg='seen from above')
+        self.assertIn('State\noccupied', facts)
+        self.assertIn(f"(id {highest['label']})", facts)
+        self.assertIn(f"Occupancy\n{round(255 * highest['occupancy']) / 255:.2f}", facts)
+        shown = self.text('voxel-classes')
+        self.assertIn(f"{highest['probability']:.3f}", shown)
+        self.key('Escape', 27)
+        self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
+
+    def test_what_is_drawn_is_what_is_there(self):
+        self.js('viewer.trajectories.visible = false')
+        all_of_it = self.assert_drawn_as_picked()
+        self.click('class-9')
+        without_road = self.assert_drawn_as_picked()
+        self.assertLess(without_road, all_of_it)
+        self.click('no-classes')
+        self.assertEqual(self.disagreements()[:2], [0, 0])
+        self.click('all-classes')
+        self.assertEqual(self.assert_drawn_as_picked(), all_of_it)
+        self.slide('top', -3)
+        self.assertLess(self.assert_drawn_as_picked(), all_of_it)
+        self.click('wall')
+        self.assert_drawn_as_picked(100)
+        self.wait('viewer.showState(1, true)')
+        self.assert_drawn_as_picked(100)
+        self.click('uncut')
+        self.wait('viewer.showState(1, false)')
+        self.js('viewer.orbit.zoom(0.5)')
+        self.assert_drawn_as_picked()
+
+    def test_colours(self):
+        def ramp(value):
+            return self.js('return [...viewer.voxels.ramp.image.data.slice(4 * arguments[0], 4 * arguments[0] + 3)]', value)
+        self.assertEqual(ramp(253), [255, 200, 0])
+        before = self.picture()
+        for mode in ('occupancy', 'class_probability', 'height'):
+            self.js('document.getElementById("mode-" + arguments[0]).click()', mode)
+            self.assertFalse(self.js('return document.getElementById("ramp").hidden'))
+            self.assertNotEqual(self.picture(), before, mode)
+        self.js('document.getElementById("mode-class").click()')
+        self.assertEqual(self.picture(), before)
+
+    def picture(self):
+        """A sum over the pixels."""
+        return self.js('''
+          viewer.drawNow();
+          const gl = viewer.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight, pixels = new Uint8Array(4 * w * h);
+          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          return pixels.reduce((sum, byte, i) => (31 * sum + byte * (i % 4 + 1)) % 1000000007, 0)''')
+
+    def test_keys(self):
+        self.js('document.getElementById("view").focus()')
+        first = self.camera()
+        self.key('ArrowLeft', 37)
+        self.assertNotEqual(self.camera()[0], first[0])
+        self.key('ArrowUp', 38, modifiers=8)
+        self.assertNotEqual(self.camera()[3:], first[3:], 'Shift moves')
+        self.key('+', 107)
+        self.assertLess(self.camera()[2], first[2])
+        self.key('r', 82)
+        self.assertEqual(self.camera(), first)
+        self.key('3', 51)
+        self.assertEqual(self.js('return viewer.mode'), 'class_probability')
+        self.key('PageDown', 34)
+        self.assertLess(self.js('return viewer.voxels.layers[1]'), 1e8)
+        self.key('a', 65)
+        self.assertGreater(self.js('return viewer.voxels.layers[1]'), 1e8)
+        self.key('Enter', 13)
+        self.wait('new Promise((done) => setTimeout(done, 200))')
+        self.key('h', 72)
+        self.assertTrue(self.js('return document.getElementById("help").open'))
+
+    def test_every_key_is_in_the_help(self):
+        with open(os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'web', 'viewer.js')) as file:
+            press = file.read().split('const ofView')[1].split('const in_view')[0]
+        keys = set(re.findall(r"(?:^|[\s{])'?(\S+?)'?: \(\)", press, re.MULTILINE)) - {'='}
+        self.assertGreater(len(keys), 14)
+        help_text = self.js('return [...document.querySelectorAll("#help td")].map((cell) => cell.textContent).join(" ")')
+        written = {'ArrowLeft': 'arrow keys', 'ArrowRight': 'arrow keys', 'ArrowUp': 'arrow keys', 'ArrowDown': 'arrow keys',
+                   'PageUp': 'Page Up', 'PageDown': 'Page Down', 'Escape': 'Esc', '-': '−'}
+        for key in keys:
+            words = written.get(key, key.upper() if len(key) == 1 else key)
+            self.assertRegex(help_text, r'(?<![A-Za-z])' + re.escape(words) + r'(?![A-Za-z])', key)
+
+    def touch(self, kind, *points):
+        self.command('Input.dispatchTouchEvent', type=kind, touchPoints=[{'x': x, 'y': y, 'id': n} for n, (x, y) in enumerate(points)])
+
+    def test_fingers_on_a_phone(self):
+        self.open_page(390, 844, mobile=True)
+        self.assertTrue(self.js('return document.body.classList.contains("closed")'), 'the map comes first')
+        self.assertLessEqual(self.js('return document.documentElement.scrollWidth'), 390)
+        first = self.camera()
+        self.touch('touchStart', (150, 400))
+        self.touch('touchMove', (200, 400))
+        self.touch('touchMove', (250, 400))
+        self.touch('touchEnd')
+        turned = self.camera()
+        self.assertNotEqual(turned[0], first[0])
+        self.assertEqual(turned[2:], first[2:])
+        self.touch('touchStart', (150, 400), (250, 400))
+        self.touch('touchMove', (120, 400), (280, 400))
+        self.touch('touchMove', (100, 400), (300, 400))
+        self.touch('touchEnd')
+        self.assertAlmostEqual(self.camera()[2], turned[2] / 2, delta=0.05 * turned[2], msg='pinched to half the distance')
+        self.click('reset')
+        x, y = 195, 390
+        self.touch('touchStart', (x, y))
+        self.touch('touchEnd')
+        self.wait('new Promise((done) => setTimeout(done, 300))')
+        self.assertFalse(self.js('return document.getElementById("voxel").hidden'), 'a tap reads a voxel')
+        self.click('menu')
+        self.assertLessEqual(self.js('return document.documentElement.scrollWidth'), 390)
+        small = self.js('return [...document.querySelectorAll("#bar button")].filter((b) => b.getBoundingClientRect().height < 40).length')
+        self.assertEqual(small, 0, 'buttons are large enough for fingers')
+
+    def test_text_is_readable_dark_and_light(self):
+        for _ in range(2):
+            ratios = self.js('''
+              const rgb = (text) => text.match(/[\\d.]+/g).slice(0, 3).map(Number);
+              const light = (c) => rgb(c).map((v) => v / 255).map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+                  .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+              const ratio = (a, b) => (Math.max(light(a), light(b)) + 0.05) / (Math.min(light(a), light(b)) + 0.05);
+              const panel = getComputedStyle(document.getElementById('panel')).backgroundColor;
+              return ['summary', 'title', 'classes'].map((id) => ratio(getComputedStyle(document.getElementById(id)).color, panel))''')
+            self.assertGreater(min(ratios), 4.5, 'the contrast that WCAG asks for')
+            self.click('theme')
+
+    def test_every_control_has_a_name(self):
+        unnamed = self.js('''return [...document.querySelectorAll('button, input')].filter((e) =>
+          !(e.textContent.trim() || e.getAttribute('aria-label') || (e.labels && e.labels.length && e.labels[0].textContent.trim()))).map((e) => e.id)''')
+        self.assertEqual(unnamed, [])
+
+    def test_a_browser_without_decompression_stream(self):
+        road = next(voxel for voxel in self.voxels if voxel['label'] == 9)
+        self.show(road)
+        expected, picture = self.text('voxel-facts'), self.picture()
+        self.open_page(before='delete window.DecompressionStream')
+        self.assertEqual(self.js('return typeof DecompressionStream'), 'undefined')
+        self.show(road)
+        self.assertEqual(self.text('voxel-facts'), expected)
+        self.assertEqual(self.picture(), picture)
+
+    def test_a_browser_without_webgl_says_so(self):
+        with self.assertRaises(AssertionError) as failed:
+            self.open_page(before='HTMLCanvasElement.prototype.getContext = () => null')
+        self.assertIn('has no WebGL 2', str(failed.exception))
+
+
+if __name__ == '__main__':
+    unittest.main()
