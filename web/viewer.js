@@ -71,7 +71,7 @@ class Viewer {
     this.mode = 'class';
     this.frames = 0;  // drawn so far
     this.times = {};  // [ms]
-    this.canvas.addEventListener('webglcontextrestored', () => this.draw());
+    this.canvas.addEventListener('webglcontextrestored', () => location.reload());
   }
 
   async open() {
@@ -100,7 +100,9 @@ class Viewer {
   }
 
   drawNow() {
-    this.voxels.common.u_eye.value.copy(this.orbit.camera.position);
+    const {common} = this.voxels, {camera} = this.orbit;
+    common.u_eye.value.copy(camera.position);
+    common.u_size.value = kPointEdge * camera.projectionMatrix.elements[5] * this.canvas.height / 2;
     this.renderer.render(this.scene, this.orbit.camera);
     ++this.frames;
   }
@@ -339,7 +341,7 @@ class Viewer {
   // A voxel.
 
   async pickAt(x, y) {
-    const {origin, direction} = this.orbit.ray(x, y), voxel = this.voxels.pick(origin, direction);
+    const voxel = this.voxels.pick(this.orbit.ray(x, y), this.orbit.camera);
     if (voxel) await this.showVoxel(...voxel);
     else this.closeVoxel();
   }

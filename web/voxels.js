@@ -1,63 +1,74 @@
 // Draws voxels, and finds those under the pointer. Scene units are voxels; `middle` of the map is the origin.
 //
-// Each tile is one draw call a state, with an instance of eight bytes for each voxel. Of a cube, only the three faces
-// that look to the eye are drawn: seven corners, six triangles. Faces between occupied voxels are dropped, and so are voxels
-// without a free face, unless a section or a hidden class can lay them open. What is shown, how it is coloured and where it is
-// cut are uniforms and textures of 256 colours: changing them builds nothing.
+// Each tile is one draw call a state. Occupied voxels are cubes, of which only the three faces that look to the eye are drawn:
+// seven corners, each with the voxel's eight bytes, and six triangles. Instances would need less memory, but take ten times as
+// long where the processor draws, and waste the small ones of many graphics cards. Faces between occupied voxels are dropped, and
+// so are voxels without a free face, unless a section or a hidden class can lay them open. Free and occluded voxels are points:
+// between them one sees what lies behind. What is shown, how it is coloured and where it is cut are uniforms and textures of 256
+// colours: changing them builds nothing.
 'use strict';
 
-const kVertexShader = `#version 300 es
+const kCommonShader = `#version 300 es
 precision highp float;
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform vec3 u_origin;      // of the tile
-uniform vec3 u_eye;
-uniform float u_edge;       // of a drawn cube
-uniform bool u_whole;       // nothing is cut or hidden: covered faces cannot be seen
 uniform int u_mode;         // what is coloured, see kModes
 uniform vec2 u_heights;     // of the ramp of heights
 uniform vec2 u_layers;      // lowest and highest that are shown
 uniform vec3 u_wall;        // the vertical plane: shown is where dot(u_wall.xy, centre.xy) <= u_wall.z
 uniform sampler2D u_shown;  // by label
 uniform sampler2D u_ramp;   // by value
-in vec3 position;           // corner of a cube; (1, 1, 1) is the nearest to the eye
-in vec4 a_cell;             // place in the tile, and the covered faces
+in vec4 position;           // place in the tile, and the covered faces
 in vec4 a_value;            // label, occupancy, class probability, drive
+
+const vec4 kNowhere = vec4(2.0, 2.0, 2.0, 1.0);
+
+bool isShown(vec3 at) {
+  return texelFetch(u_shown, ivec2(int(a_value.x + 0.5), 0), 0).r > 0.5 && at.z > u_layers.x && at.z < u_layers.y &&
+         dot(u_wall.xy, at.xy) <= u_wall.z;
+}
+
+vec3 colorAt(vec3 at) {
+  float value = a_value.x;
+  if (u_mode == 1) value = a_value.y;
+  if (u_mode == 2) value = a_value.z;
+  if (u_mode == 3) value = 255.0 * clamp((at.z - u_heights.x) / (u_heights.y - u_heights.x), 0.0, 1.0);
+  if (u_mode == 4) value = a_value.w;
+  return texelFetch(u_ramp, ivec2(int(value + 0.5), 0), 0).rgb;
+}
+`;
+
+const kCubeShader = `${kCommonShader}
+uniform vec3 u_eye;
+uniform bool u_whole;  // nothing is cut or hidden: covered faces cannot be seen
 flat out vec3 v_color;
 flat out vec3 v_axis;
 out vec3 v_corner;
 
+// Of a cube whose corner (1, 1, 1) is the nearest to the eye. Those with a single 1 belong to one face each, and colour it.
+const vec3 kCorners[7] = vec3[7](vec3(1, 1, 1), vec3(0, 1, 1), vec3(1, 0, 1), vec3(1, 1, 0), vec3(1, 0, 0), vec3(0, 1, 0), vec3(0, 0, 1));
+
 void main() {
-  vec3 centre = a_cell.xyz + 0.5, at = centre + u_origin;
-  int label = int(a_value.x + 0.5);
-  bool shown = texelFetch(u_shown, ivec2(label, 0), 0).r > 0.5 && at.z > u_layers.x && at.z < u_layers.y && dot(u_wall.xy, at.xy) <= u_wall.z;
-  if (!shown) {
-    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  vec3 centre = position.xyz + 0.5, at = centre + u_origin;
+  if (!isShown(at)) {
+    gl_Position = kNowhere;
     return;
   }
-  vec3 side = mix(vec3(-1.0), vec3(1.0), greaterThan(u_eye, at));
-  // The corners with a single 1 belong to one face each, and colour it.
-  v_axis = position;
-  vec3 corner = position;
-  if (position.x + position.y + position.z == 1.0) {
+  vec3 side = mix(vec3(-1.0), vec3(1.0), greaterThan(u_eye, at)), corner = kCorners[gl_VertexID % 7];
+  v_axis = corner;
+  if (corner.x + corner.y + corner.z == 1.0) {
     vec3 bits = mix(vec3(2.0, 8.0, 32.0), vec3(1.0, 4.0, 16.0), greaterThan(side, vec3(0.0)));
-    int bit = int(dot(position, bits) + 0.5);
-    if (u_whole && (int(a_cell.w + 0.5) & bit) != 0) corner = vec3(1.0);  // a face without area
-    float value = a_value.x;
-    if (u_mode == 1) value = a_value.y;
-    if (u_mode == 2) value = a_value.z;
-    if (u_mode == 3) value = 255.0 * clamp((at.z - u_heights.x) / (u_heights.y - u_heights.x), 0.0, 1.0);
-    if (u_mode == 4) value = a_value.w;
-    vec3 color = texelFetch(u_ramp, ivec2(int(value + 0.5), 0), 0).rgb;
-    float light = dot(position, mix(vec3(0.62, 0.74, 0.50), vec3(0.82, 0.68, 1.0), greaterThan(side, vec3(0.0))));
+    float light = dot(corner, mix(vec3(0.62, 0.74, 0.50), vec3(0.82, 0.68, 1.0), greaterThan(side, vec3(0.0))));
     // Neighbours of one class differ a little, and black is not so dark that its faces look alike.
-    float grain = fract(sin(dot(mod(a_cell.xyz, 32.0), vec3(12.99, 78.23, 37.72))) * 43758.5);
-    v_color = (0.07 + 0.93 * color) * (light - 0.07 * grain);
+    float grain = fract(sin(dot(mod(position.xyz, 32.0), vec3(12.99, 78.23, 37.72))) * 43758.5);
+    v_color = (0.07 + 0.93 * colorAt(at)) * (light - 0.07 * grain);
+    if (u_whole && (int(position.w + 0.5) & int(dot(corner, bits) + 0.5)) != 0) corner = vec3(1.0);  // a face without area
   }
   v_corner = corner;
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(centre + u_edge * side * (corner - 0.5), 1.0);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(centre + side * (corner - 0.5), 1.0);
 }`;
 
-const kFragmentShader = `#version 300 es
+const kFaceShader = `#version 300 es
 precision highp float;
 flat in vec3 v_color;
 flat in vec3 v_axis;
@@ -72,9 +83,31 @@ void main() {
   color = vec4(v_color * (1.0 - 0.3 * line), 1.0);
 }`;
 
+const kPointShader = `${kCommonShader}
+uniform float u_size;  // of a point at distance 1 [pixels]
+out vec3 v_color;
+
+void main() {
+  vec3 centre = position.xyz + 0.5, at = centre + u_origin;
+  gl_Position = isShown(at) ? projectionMatrix * modelViewMatrix * vec4(centre, 1.0) : kNowhere;
+  gl_PointSize = max(1.0, u_size / gl_Position.w);
+  v_color = colorAt(at);
+}`;
+
+const kSquareShader = `#version 300 es
+precision highp float;
+in vec3 v_color;
+out vec4 color;
+
+void main() {
+  vec2 inside = min(gl_PointCoord, 1.0 - gl_PointCoord);
+  color = vec4(v_color * (min(inside.x, inside.y) < 0.1 ? 0.8 : 1.0), 1.0);
+}`;
+
 const kModes = ['class', 'occupancy', 'class_probability', 'height', 'drive'];
-/// The edge at which voxels of a state are drawn: through free space one sees what is behind.
-const kEdges = {[kFree]: 0.4, [kOccupied]: 1, [kOccluded]: 0.4};
+/// The edge of the squares that stand for free and occluded voxels [voxels].
+const kPointEdge = 0.4;
+const kCornersOfCube = 7;
 
 /// A texture of 256 colours.
 function palette() {
@@ -83,11 +116,17 @@ function palette() {
   return texture;
 }
 
-/// The three faces of a cube that look to the eye.
-function nearCorner() {
-  const corners = [1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1];
+/// The triangles of a number of cubes: of each, the three faces that look to the eye.
+function cubeTriangles(count) {
   const faces = [0, 2, 4, 3, 0, 4, 0, 1, 5, 3, 0, 5, 0, 1, 6, 2, 0, 6];  // the last corner of each triangle colours it
-  return [new THREE.BufferAttribute(new Float32Array(corners), 3), new THREE.BufferAttribute(new Uint16Array(faces), 1)];
+  const index = new Uint32Array(faces.length * count);
+  for (let i = 0; i < index.length; ++i) index[i] = kCornersOfCube * Math.floor(i / faces.length) + faces[i % faces.length];
+  return new THREE.BufferAttribute(index, 1);
+}
+
+/// Four bytes of each vertex. They are in the graphics card once they have been drawn, and not in two places.
+function byteAttribute(bytes) {
+  return new THREE.BufferAttribute(bytes, 4).onUpload(function() { this.array = null; });
 }
 
 const kAround = kTileEdge + 2, kAroundLayer = kAround * kAround;
@@ -125,12 +164,12 @@ function readStatesAround(map, tile, states) {
   }
 }
 
-/// The voxels of a tile and a state: eight bytes each, those with a free face first. A face is covered beside a voxel of the
-/// same state. @param states memory for readStatesAround().
-function instancesOf(map, tile, state, states) {
+/// The vertices of the voxels of a tile and a state: eight bytes each, voxels with a free face first. A face is covered beside a
+/// voxel of the same state. @param copies number of vertices of a voxel. @param states memory for readStatesAround().
+function verticesOf(map, tile, state, copies, states) {
   let count = 0;
   for (const s of tile.state) count += s === state;
-  const cells = new Uint8Array(4 * count), values = new Uint8Array(4 * count);
+  const cells = new Uint8Array(4 * copies * count), values = new Uint8Array(4 * copies * count);
   if (count === 0) return {cells, values, count, outside: 0};
   readStatesAround(map, tile, states);
   let front = 0, back = count;
@@ -143,15 +182,17 @@ function instancesOf(map, tile, state, states) {
       const mask = (states[n + 1] === state) | (states[n - 1] === state) << 1 | (states[n + kAround] === state) << 2 |
                    (states[n - kAround] === state) << 3 | (states[n + kAroundLayer] === state) << 4 |
                    (states[n - kAroundLayer] === state) << 5;
-      const i = 4 * (mask === 63 ? --back : front++);
-      cells[i] = x;
-      cells[i + 1] = y;
-      cells[i + 2] = z;
-      cells[i + 3] = mask;
-      values[i] = state === kOccluded ? kOccludedLabel : tile.label[offset];
-      values[i + 1] = tile.occupancy[offset];
-      values[i + 2] = tile.class_probability[offset];
-      values[i + 3] = tile.drive ? tile.drive[offset] : 0;
+      const begin = 4 * copies * (mask === 63 ? --back : front++);
+      for (let i = begin; i < begin + 4 * copies; i += 4) {
+        cells[i] = x;
+        cells[i + 1] = y;
+        cells[i + 2] = z;
+        cells[i + 3] = mask;
+        values[i] = state === kOccluded ? kOccludedLabel : tile.label[offset];
+        values[i + 1] = tile.occupancy[offset];
+        values[i + 2] = tile.class_probability[offset];
+        values[i + 3] = tile.drive ? tile.drive[offset] : 0;
+      }
     }
   }
   return {cells, values, count, outside: front};
@@ -164,7 +205,6 @@ class VoxelScene {
     const {min, max} = map.header.bounds;  // [voxels], both included
     this.middle = [0, 1, 2].map((a) => Math.round((min[a] + max[a] + 1) / 2));
     this.group = new THREE.Group();
-    this.corner = nearCorner();
     this.meshes = [];
     this.states = {};  // of those that have been built: {visible}
     this.shown = palette();
@@ -173,7 +213,7 @@ class VoxelScene {
     this.wall = {on: false, angle: 0, distance: 0};
     this.all_shown = true;
     this.common = {
-      u_eye: {value: new THREE.Vector3()}, u_mode: {value: 0}, u_heights: {value: new THREE.Vector2(0, 1)},
+      u_eye: {value: new THREE.Vector3()}, u_size: {value: 1}, u_mode: {value: 0}, u_heights: {value: new THREE.Vector2(0, 1)},
       u_layers: {value: new THREE.Vector2()}, u_wall: {value: new THREE.Vector3()}, u_shown: {value: this.shown}, u_ramp: {value: this.ramp},
       u_whole: {value: true},
     };
@@ -188,29 +228,35 @@ class VoxelScene {
       this.addTile(this.map.tiles[t], state, around);
       await progress((t + 1) / this.map.tiles.length);
     }
+    if (state === kOccupied) this.shareTriangles();
     this.apply();
   }
 
   addTile(tile, state, around) {
-    const {cells, values, count, outside} = instancesOf(this.map, tile, state, around);
+    const cubes = state === kOccupied, {cells, values, count, outside} = verticesOf(this.map, tile, state, cubes ? kCornersOfCube : 1, around);
     if (count === 0) return;
-    const geometry = new THREE.InstancedBufferGeometry(), origin = tile.index.map((i, a) => kTileEdge * i - this.middle[a]);
-    geometry.setAttribute('position', this.corner[0]);
-    geometry.setIndex(this.corner[1]);
-    geometry.setAttribute('a_cell', new THREE.InstancedBufferAttribute(cells, 4));
-    geometry.setAttribute('a_value', new THREE.InstancedBufferAttribute(values, 4));
+    const geometry = new THREE.BufferGeometry(), origin = tile.index.map((i, a) => kTileEdge * i - this.middle[a]);
+    geometry.setAttribute('position', byteAttribute(cells));  // three.js draws nothing without this name
+    geometry.setAttribute('a_value', byteAttribute(values));
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(32, 32, 32), 56);
     const material = new THREE.RawShaderMaterial({
-      uniforms: {...this.common, u_origin: {value: new THREE.Vector3(...origin)}, u_edge: {value: kEdges[state]}},
-      vertexShader: kVertexShader, fragmentShader: kFragmentShader, side: THREE.DoubleSide,
+      uniforms: {...this.common, u_origin: {value: new THREE.Vector3(...origin)}}, side: THREE.DoubleSide,
+      vertexShader: cubes ? kCubeShader : kPointShader, fragmentShader: cubes ? kFaceShader : kSquareShader,
     });
-    const mesh = new THREE.Mesh(geometry, material);
+    const mesh = cubes ? new THREE.Mesh(geometry, material) : new THREE.Points(geometry, material);
     mesh.position.set(...origin);
     mesh.updateMatrixWorld();
     mesh.matrixAutoUpdate = false;
     mesh.userData = {state, count, outside};
     this.meshes.push(mesh);
     this.group.add(mesh);
+  }
+
+  /// Gives all cubes the same list of triangles, as long as the longest needs it.
+  shareTriangles() {
+    const cubes = this.meshes.filter((mesh) => mesh.userData.state === kOccupied);
+    const triangles = cubeTriangles(Math.max(0, ...cubes.map((mesh) => mesh.userData.count)));
+    for (const mesh of cubes) mesh.geometry.setIndex(triangles);
   }
 
   /// Whether voxels of a state are shown.
@@ -228,8 +274,7 @@ class VoxelScene {
     for (const mesh of this.meshes) {
       const {state, count, outside} = mesh.userData, drawn = common.u_whole.value ? outside : count;
       mesh.visible = this.isVisible(state) && drawn > 0;
-      mesh.geometry.maxInstancedCount = drawn;
-      mesh.geometry.instanceCount = drawn;  // its name in later versions of three.js
+      mesh.geometry.setDrawRange(0, state === kOccupied ? 18 * drawn : drawn);
     }
   }
 
@@ -245,7 +290,8 @@ class VoxelScene {
   }
 
   /// The first drawn voxel on a ray, as [x, y, z]; undefined if there is none.
-  pick(origin, direction) {
+  /// @param camera that looks: points are squares that face it.
+  pick({origin, direction}, camera) {
     const {min, max} = this.map.header.bounds, start = origin.toArray(), step = direction.toArray();
     let near = 0, far = Infinity;
     for (let a = 0; a < 3; ++a) {  // where the ray enters and leaves the map
@@ -269,7 +315,9 @@ class VoxelScene {
         tile = this.map.by_index.get(key);
       }
       const offset = tile ? tile.offset(x & 63, y & 63, z & 63) : -1;
-      if (offset >= 0 && this.shows(tile, offset, x, y, z) && this.meets(start, step, voxel, kEdges[tile.state[offset]])) return voxel;
+      if (offset >= 0 && this.shows(tile, offset, x, y, z) && (tile.state[offset] === kOccupied || this.meetsPoint(start, step, voxel, camera))) {
+        return voxel;
+      }
       const axis = next[0] <= next[1] && next[0] <= next[2] ? 0 : next[1] <= next[2] ? 1 : 2;
       if (next[axis] > far) return undefined;
       voxel[axis] += Math.sign(step[axis]);
@@ -277,14 +325,11 @@ class VoxelScene {
     }
   }
 
-  /// Whether a ray meets the cube that is drawn for a voxel.
-  meets(start, step, voxel, edge) {
-    let near = 0, far = Infinity;
-    for (let a = 0; a < 3; ++a) {
-      const one = (voxel[a] + 0.5 - edge / 2 - start[a]) / step[a], other = (voxel[a] + 0.5 + edge / 2 - start[a]) / step[a];
-      near = Math.max(near, Math.min(one, other));
-      far = Math.min(far, Math.max(one, other));
-    }
-    return edge === 1 || near <= far;
+  /// Whether a ray meets the square of a point.
+  meetsPoint(start, step, voxel, camera) {
+    const [right, up, back] = [0, 4, 8].map((i) => camera.matrixWorld.elements.slice(i, i + 3));
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2], to = voxel.map((v, a) => v + 0.5 - start[a]);
+    const t = dot(to, back) / dot(step, back), off = to.map((v, a) => t * step[a] - v);
+    return Math.max(Math.abs(dot(off, right)), Math.abs(dot(off, up))) <= kPointEdge / 2;
   }
 }

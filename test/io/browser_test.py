@@ -144,19 +144,18 @@ class Browser(unittest.TestCase):
               let same = true;
               for (let dy = -2; dy <= 2; ++dy) for (let dx = -2; dx <= 2; ++dx) same = same && isSky(x + dx, y + dy) === empty;
               if (!same) continue;
-              const {origin, direction} = viewer.orbit.ray(x + 0.5, h - y - 0.5);
-              const found = viewer.voxels.pick(origin, direction);
+              const found = viewer.voxels.pick(viewer.orbit.ray(x + 0.5, h - y - 0.5), viewer.orbit.camera);
               if (!found !== empty) ++wrong;
               if (empty) ++none; else ++voxels;
             }
           }
           return [wrong, voxels, none]''')
 
-    def assert_drawn_as_picked(self, least=300):
+    def assert_drawn_as_picked(self, least=300, wrong_in=1000):
         wrong, voxels, none = self.disagreements()
         self.assertGreater(voxels, least)
         self.assertGreater(none, 500)
-        self.assertLessEqual(wrong, (voxels + none) // 1000, 'what is drawn is what can be picked')
+        self.assertLessEqual(wrong, (voxels + none) // wrong_in, 'what is drawn is what can be picked')
         return voxels
 
     def test_opens_from_the_disk_and_loads_nothing_else(self):
@@ -236,7 +235,7 @@ class Browser(unittest.TestCase):
         self.click('wall')
         self.assert_drawn_as_picked(100)
         self.wait('viewer.showState(1, true)')
-        self.assert_drawn_as_picked(100)
+        self.assert_drawn_as_picked(100, 200)  # the sizes of points are rounded to pixels
         self.click('uncut')
         self.wait('viewer.showState(1, false)')
         self.js('viewer.orbit.zoom(0.5)')
