@@ -49,7 +49,7 @@ def summary(follower):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--scans', type=int, required=True, help='number of clouds to wait for')
-    parser.add_argument('--map', required=True, help='map file, .ply or .pcd')
+    parser.add_argument('--map', required=True, action='append', help='file for the map, .bkm, .ply or .pcd; repeatable')
     parser.add_argument('--summary', required=True, help='text file for the summary')
     parser.add_argument('--timeout', type=float, default=600.0, help='maximum time to wait [s]')
     arguments = parser.parse_args()
@@ -63,9 +63,10 @@ def main():
     if not follower.done.wait(end - time.monotonic()):
         received = follower.last.received if follower.last else 0
         sys.exit(f'only {received} of {arguments.scans} clouds came within {arguments.timeout:.0f} s; see ros.log')
-    saved = rospy.ServiceProxy('mapping/save_map', SaveMap)(os.path.abspath(arguments.map), '')
-    if not saved.success:
-        sys.exit(saved.message)
+    for path in arguments.map:
+        saved = rospy.ServiceProxy('mapping/save_map', SaveMap)(os.path.abspath(path), '')
+        if not saved.success:
+            sys.exit(saved.message)
     with open(arguments.summary, 'w') as file:
         file.write(summary(follower))
 
