@@ -29,7 +29,8 @@ struct HtmlOptions {
   std::string three_js;  ///< path of three.js; "": where libjs-three installs it
 };
 
-/// Most voxels in a page. A browser takes about a minute and 3 GB for them.
+/// Most voxels in a page. Chromium takes a few seconds and 0.6 GB for a page near this limit, most of it free
+/// space; if all were occupied, they would need 1.1 GB of the graphics card.
 constexpr std::size_t kMostHtmlVoxels = 20'000'000;
 /// Greatest extent of the map in a page, along each axis [voxels].
 constexpr int kMostHtmlExtent = 1 << 20;

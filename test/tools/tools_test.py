@@ -615,6 +615,47 @@ class Tools(unittest.TestCase):
         self.fails('--min-z must not be above', 'export_map', a, '--output', self.path('map.yaml'), '--min-z', '1', '--max-z', '0')
         self.fails("state 'busy' is unknown", 'export_map', a, '--output', exported, '--include', 'busy')
 
+    def test_exporting_a_box(self):
+        a, whole, part = self.path('boxed.bkm'), self.path('whole.ply'), self.path('part.ply')
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', a)
+        self.succeeds('export_map', a, '--output', whole)
+        self.succeeds('export_map', a, '--output', part, '--box', '4 inf -inf -5 -inf -1')
+
+        def records(path):
+            with open(path, 'rb') as file:
+                # Without the probabilities, whose last bit depends on the classes of the block.
+                return list(struct.iter_unpack('<fff6s24x', file.read().split(b'end_header\n', 1)[1]))
+        inside = [record for record in records(whole) if -5 <= record[0] <= 4 and record[2] <= -1]
+        self.assertGreater(len(inside), 100)
+        self.assertEqual(records(part), inside)
+        self.fails('--box has 2 numbers', 'export_map', a, '--output', part, '--box', '1 2')
+
+    def test_exporting_a_page(self):
+        a, page, library = self.path('paged.bkm'), self.path('page.html'), self.path('three.js')
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', a)
+        with open(library, 'w') as file:
+            file.write('var THREE = {};\n')
+        three = ('--three-js', library)
+        self.succeeds('export_map', a, '--html', page, '--trajectory', self.drive, *three)
+        with open(page) as file:
+            text = file.read()
+        self.assertIn('var THREE = {};', text)
+        header = json.loads(re.search(r'<script type="application/json" id="map">(.*?)</script>', text)[1])
+        self.assertEqual((header['name'], header['frame']), ('paged', 'map'))
+        self.assertEqual([drive['id'] for drive in header['drives']], ['drive/000000-000003'])
+        self.assertEqual([len(trajectory['points']) for trajectory in header['trajectories']], [4])
+        self.assertGreater(header['voxels']['free'], header['voxels']['occupied'])
+        self.succeeds('export_map', a, '--output', page, '--include', 'occupied', '--box', '-5 -inf -inf 5 inf inf', *three)
+        with open(page) as file:
+            part = json.loads(re.search(r'<script type="application/json" id="map">(.*?)</script>', file.read())[1])
+        self.assertEqual(part['voxels']['free'], 0)
+        self.assertLess(part['voxels']['occupied'], header['voxels']['occupied'])
+        self.fails('keep one', 'export_map', a, '--html', page, '--output', page, *three)
+        self.fails('must end in .html', 'export_map', a, '--html', self.path('page.ply'), *three)
+        self.fails('three.js is not in /no/such', 'export_map', a, '--html', page, '--three-js', '/no/such')
+        self.fails('there is no voxel to show', 'export_map', a, '--html', page, '--box', '900 900 900 901 901 901', *three)
+        self.fails('the trajectory /no/such cannot be read', 'export_map', a, '--html', page, '--trajectory', '/no/such', *three)
+
     def test_cleaned_points(self):
         kept = {}
         for mode in ('none', 'line'):
