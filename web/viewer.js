@@ -373,7 +373,7 @@ class Viewer {
     ];
     byId('voxel-facts').replaceChildren(...facts.flatMap(([name, value]) => [make('dt', {}, name), make('dd', {}, value)]));
     // The likeliest, and what is left for the others.
-    const listed = voxel.probabilities.filter((entry, n) => n < 6 && (n < 2 || entry.p >= 0.005));
+    const listed = voxel.probabilities.filter((entry, n) => n < 6 && (n < 1 || entry.p >= 0.005));
     const rest = 1 - listed.reduce((sum, entry) => sum + entry.p, 0), others = voxel.probabilities.length - listed.length;
     const row = (name, p, color) => {
       const bar = make('span', {className: 'bar'});
