@@ -7,8 +7,9 @@ find_package(pcl_conversions REQUIRED)  # headers only: its libraries are all of
 
 add_message_files(FILES BlockCoordinates.msg ClassInfo.msg ElevationMap.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg
   OccupancyUpdate.msg VoxelCloudUpdate.msg)
-add_service_files(FILES BoundingBoxQuery.srv LoadMap.srv SaveMap.srv)
-generate_messages(DEPENDENCIES sensor_msgs std_msgs)
+add_service_files(FILES BoundingBoxQuery.srv CastRays.srv CheckSpace.srv GetDistances.srv GetFrontiers.srv GetNearestObstacles.srv
+  GetSection.srv LoadMap.srv QueryPoints.srv SaveMap.srv)
+generate_messages(DEPENDENCIES geometry_msgs nav_msgs sensor_msgs std_msgs)
 generate_dynamic_reconfigure_options(cfg/Mapping.cfg)
 
 catkin_package(

@@ -23,12 +23,22 @@ bki_mapping_room(ros SOURCES
     publishers/registry.cpp
     publishers/trajectory.cpp
     publishers/voxel_cloud.cpp
+    queries/distances.cpp
+    queries/frontiers.cpp
+    queries/obstacles.cpp
+    queries/points.cpp
+    queries/rays.cpp
+    queries/requests.cpp
+    queries/section.cpp
+    queries/space.cpp
+    query_services.cpp
+    recent_map.cpp
     scan_ledger.cpp
     scan_reader.cpp
     sensor_trajectory.cpp
     score_reader.cpp
     server_config.cpp
-  LINK bki_mapping_io pcl_common ${catkin_LIBRARIES})
+  LINK bki_mapping_io bki_mapping_query pcl_common ${catkin_LIBRARIES})
 bki_mapping_precompile(bki_mapping_ros
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)

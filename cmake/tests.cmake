@@ -191,7 +191,7 @@ if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/filters_rostest.py test/ros/killed_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
-    test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
+    test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py test/ros/queries_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_tests(ros cloud_conversion scan_account scan_reader sensor_trajectory server_config)
@@ -214,6 +214,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/mapping_nodelet.test)
   add_rostest(test/ros/navigation.test)
   add_rostest(test/ros/publishing.test)
+  add_rostest(test/ros/queries.test)
   add_rostest(test/ros/replay.test)
   # rostest does not report skipped tests, so a wrapper tells ctest beforehand.
   add_test(NAME real_bag_rostest

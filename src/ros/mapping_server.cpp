@@ -37,6 +37,9 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   });
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
+  queries_ = std::make_unique<QueryServices>(private_node_, queue_, [this] {
+    return std::make_shared<const QueriedMap>(mapHeader(), mapper_->snapshot(), mapper_->classes());
+  });
   offerServices();
   if (!kept_->readOnly()) subscribe();
   live_settings_ = std::make_unique<LiveSettings>(
@@ -47,12 +50,14 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   thread_ = std::thread(&MappingServer::work, this);
   publishing_->start();
   saving_.start();
+  queries_->start();
   if (mapper_->map().size() > 0) publishing_->startOver();
 }
 
 MappingServer::~MappingServer() {
   // First the threads that request snapshots, while the mapping thread still answers.
   saving_.stop();
+  queries_->stop();
   publishing_->stop();
   running_ = false;
   thread_.join();
@@ -96,7 +101,7 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
   for (const InputConfig& input : inputs) {
     readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
   }
-  publishing_->startOver();
+  wholeMapChanged();
 }
 
 void MappingServer::work() {
@@ -107,7 +112,9 @@ void MappingServer::work() {
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
     checkClock();
     processQueue();
-    publishing_->changed(kept_->update(config_, Clock::now()));
+    const std::vector<GridIndex> moved = kept_->update(config_, Clock::now());
+    if (!moved.empty()) mapChanged(moved);
+    queries_->map().releaseIfIdle();
     reportFault();
     diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
   }
@@ -200,7 +207,7 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
     trajectory_.keepWithin(sensor_, config_.window + mapper_->map().geometry().blockSize());
   }
   publishing_->changed(mapper_->touchedBlocks());
-  publishing_->changed(kept_->addScan(placed.scan.stamp, sensor_, config_));
+  mapChanged(kept_->addScan(placed.scan.stamp, sensor_, config_));
   status_publisher_.publish(status());
 }
 
@@ -293,12 +300,26 @@ MappingStatus MappingServer::status() {
   return status;
 }
 
+void MappingServer::mapChanged(const std::vector<GridIndex>& blocks) {
+  publishing_->changed(blocks);
+  queries_->map().changed();
+}
+
+void MappingServer::wholeMapChanged() {
+  publishing_->startOver();
+  queries_->map().changed();
+}
+
+std_msgs::Header MappingServer::mapHeader() const {
+  std_msgs::Header header;
+  header.frame_id = config_.frame_id;
+  header.stamp = map_stamp_;
+  return header;
+}
+
 MapSnapshot MappingServer::snapshot() {
-  MapSnapshot snapshot{{},      mapper_->snapshot(),      mapper_->classes(), trajectory_.poses(), config_,
-                       sensor_, mapper_->config().threads};
-  snapshot.header.frame_id = config_.frame_id;
-  snapshot.header.stamp = map_stamp_;
-  return snapshot;
+  return {mapHeader(), mapper_->snapshot(),      mapper_->classes(), trajectory_.poses(), config_,
+          sensor_,     mapper_->config().threads};
 }
 
 std::shared_ptr<const MapSnapshot> MappingServer::askForSnapshot() {

@@ -22,6 +22,7 @@
 #include "ros/point_account.h"
 #include "ros/pose_source.h"
 #include "ros/publisher_set.h"
+#include "ros/query_services.h"
 #include "ros/scan_ledger.h"
 #include "ros/scan_queue.h"
 #include "ros/scan_reader.h"
@@ -31,10 +32,11 @@
 
 namespace bki_mapping::ros_interface {
 
-/// Owns a mapper and three threads, each with a callback queue of its own, so that mapping never blocks the
+/// Owns a mapper and threads, each with a callback queue of its own, so that mapping never blocks the
 /// threads of a nodelet manager. The mapping thread takes clouds and adds them to the map; only this thread
-/// uses the mapper. One more thread publishes the map topics, and one serves ~save_map and ~load_map. Both
-/// work on snapshots, which the mapping thread makes between two scans.
+/// uses the mapper. One more thread publishes the map topics, one serves ~save_map and ~load_map, and
+/// QueryServices has threads for queries. All of them work on snapshots, which the mapping thread makes
+/// between two scans.
 class MappingServer {
  public:
   /// @param node resolves topics. @param private_node holds parameters and services.
@@ -79,6 +81,11 @@ class MappingServer {
   /// Assesses the points of each input since the last call, and logs warnings.
   Health judgeAllPoints();
   MappingStatus status();
+  /// Reports a change of the map to publishers and queries: of some blocks, or of all that is known of it.
+  void mapChanged(const std::vector<GridIndex>& blocks);
+  void wholeMapChanged();
+  /// The map frame, and the stamp of the last scan.
+  std_msgs::Header mapHeader() const;
   /// The state of the server. For the mapping thread.
   MapSnapshot snapshot();
   /// The same for all other threads: waits until the mapping thread has no scan in work.
@@ -110,6 +117,7 @@ class MappingServer {
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_publisher_;
   std::unique_ptr<PublisherSet> publishing_;
+  std::unique_ptr<QueryServices> queries_;
   std::unique_ptr<MappingDiagnostics> diagnostics_;
   std::unique_ptr<LiveSettings> live_settings_;
 

@@ -1,17 +1,14 @@
 // The services of the mapping server.
 #include <chrono>
-#include <new>
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "ros/mapping_server.h"
 #include "ros/queued_call.h"
+#include "ros/service_answer.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
-
-/// Maximum length of an answer, which contains a path given by the client [bytes].
-constexpr std::size_t kLongestAnswer = 1000;
 
 /// Interval at which a service that waits for the map file checks whether the file can be written.
 constexpr std::chrono::milliseconds kFaultPoll(200);
@@ -24,23 +21,6 @@ void checkPath(const std::string& path) {
   if (path.find('\0') != std::string::npos) {  // the file system would cut the path there
     throw std::invalid_argument("path '" + path + "' must not hold a zero byte");
   }
-}
-
-/// Answers what `make` returns, or the sentence that it throws.
-template <typename Response, typename Make>
-void answer(const char* service, Response& response, Make&& make) {
-  try {
-    response.message = make();
-    response.success = true;
-  } catch (const std::bad_alloc&) {
-    response.success = false;
-    response.message = "the computer's memory does not suffice; free some, or use a smaller map";
-  } catch (const std::exception& fault) {
-    response.success = false;
-    response.message = fault.what();
-  }
-  response.message = shortText(response.message, kLongestAnswer);
-  ROS_INFO("%s: %s", service, response.message.c_str());
 }
 
 }  // namespace
@@ -64,7 +44,7 @@ void MappingServer::reset() {
   }
   kept_->reset();
   trajectory_.clear();
-  publishing_->startOver();
+  wholeMapChanged();
   ROS_INFO("The map was reset");
 }
 
@@ -106,7 +86,7 @@ bool MappingServer::onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQu
       throw std::invalid_argument("a coordinate of min is above that of max; exchange them");
     }
     const std::vector<GridIndex> changed = kept_->clearBox({a, b});
-    publishing_->changed(changed);
+    mapChanged(changed);
     ROS_INFO("clear_bbx: cleared in %lu blocks", changed.size());
     return true;
   } catch (const std::exception& fault) {
@@ -135,7 +115,7 @@ void MappingServer::saveMapFile(const std::string& path) {
 }
 
 bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& response) {
-  answer("save_map", response, [&] {
+  answer(response, [&] {
     checkPath(request.path);
     if (isMapFileName(request.path)) {
       saveMapFile(request.path);
@@ -147,11 +127,12 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     exportMap(request.path, snapshot->map, snapshot->classes, states);
     return "wrote " + request.path + " (" + include + (kept_->hasFile() ? ", of what is in memory)" : ")");
   });
+  ROS_INFO("save_map: %s", response.message.c_str());
   return true;
 }
 
 bool MappingServer::onLoadMap(LoadMap::Request& request, LoadMap::Response& response) {
-  answer("load_map", response, [&] {
+  answer(response, [&] {
     checkPath(request.path);
     struct Needed {
       MapInfo info;
@@ -169,11 +150,12 @@ bool MappingServer::onLoadMap(LoadMap::Request& request, LoadMap::Response& resp
     QueuedCall<bool>::ask(queue_, [&] {
       kept_->addMap(std::move(*stored), !request.add);
       if (!request.add) trajectory_.clear();
-      publishing_->startOver();
+      wholeMapChanged();
       return true;
     });
     return (request.add ? "added " : "loaded ") + what;
   });
+  ROS_INFO("load_map: %s", response.message.c_str());
   return true;
 }
 

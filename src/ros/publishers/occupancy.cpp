@@ -1,3 +1,4 @@
+#include "ros/class_info.h"
 #include "streamed_blocks.h"
 #include "updates.h"
 
@@ -7,16 +8,7 @@ namespace {
 /// Fills in a whole map: a StreamedMap or a StreamedUpdate.
 template <typename Message>
 void fillMap(const MapSnapshot& snapshot, Message& message) {
-  for (const SemanticClass& c : snapshot.classes.classes()) {
-    ClassInfo info;
-    info.id = c.id;
-    info.name = c.name;
-    info.red = c.color[0];
-    info.green = c.color[1];
-    info.blue = c.color[2];
-    info.dynamic = c.dynamic;
-    message.classes.push_back(info);
-  }
+  for (const SemanticClass& c : snapshot.classes.classes()) message.classes.push_back(toMessage(c));
   message.blocks = {&snapshot.map, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
 }
 

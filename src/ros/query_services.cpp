@@ -1,0 +1,39 @@
+#include "ros/query_services.h"
+
+#include <utility>
+
+#include "ros/queries/queries.h"
+#include "ros/service_answer.h"
+
+namespace bki_mapping::ros_interface {
+
+QueryServices::QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping,
+                             std::function<RecentMap::Shared()> take)
+    : node_(node), map_(std::move(take), mapping, queue_) {
+  node_.setCallbackQueue(&queue_);
+  offer<QueryPoints>("query_points");
+  offer<CastRays>("cast_rays");
+  offer<CheckSpace>("check_space");
+  offer<GetNearestObstacles>("get_nearest_obstacles");
+  offer<GetSection>("get_section");
+  offer<GetFrontiers>("get_frontiers");
+  offer<GetDistances>("get_distances");
+}
+
+template <typename Service>
+void QueryServices::offer(const std::string& name) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  const boost::function<bool(Request&, Response&)> serve = [this](Request& asked, Response& response) {
+    answer(response, [&] {
+      Response made;  // so that a query that fails leaves the answer empty
+      query(*map_.get(), asked, made);
+      response = std::move(made);
+      return std::string();
+    });
+    return true;
+  };
+  services_.push_back(node_.advertiseService(name, serve));
+}
+
+}  // namespace bki_mapping::ros_interface

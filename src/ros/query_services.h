@@ -1,0 +1,42 @@
+/// @file The services that answer queries of the map.
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+
+#include <string>
+#include <vector>
+
+#include "ros/recent_map.h"
+
+namespace bki_mapping::ros_interface {
+
+/// Answers queries on snapshots, in threads of its own: neither does mapping wait for queries, nor do
+/// queries wait for a scan (RecentMap).
+class QueryServices {
+ public:
+  /// @param node holds the services. @param mapping the queue that the mapping thread serves.
+  /// @param take takes a snapshot; called in the mapping thread.
+  QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping,
+                std::function<RecentMap::Shared()> take);
+
+  /// Starts the threads.
+  void start() { threads_.start(); }
+  /// Ends the threads. Until then the mapping queue must be served.
+  void stop() { threads_.stop(); }
+  /// For the mapping thread, which reports changes.
+  RecentMap& map() { return map_; }
+
+ private:
+  template <typename Service>
+  void offer(const std::string& name);
+
+  ros::CallbackQueue queue_;
+  ros::NodeHandle node_;
+  RecentMap map_;
+  std::vector<ros::ServiceServer> services_;
+  // More than one, so that a small query need not wait for a large one.
+  ros::AsyncSpinner threads_{2, &queue_};
+};
+
+}  // namespace bki_mapping::ros_interface

@@ -1,0 +1,67 @@
+/// @file The map that queries are answered from.
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <std_msgs/Header.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/query/state_map.h"
+
+namespace bki_mapping::ros_interface {
+
+/// A snapshot of the map, prepared for queries. All functions may be called from several threads at once.
+struct QueriedMap {
+  QueriedMap(std_msgs::Header of_map, SemanticMap snapshot, const ClassTable& table)
+      : header(std::move(of_map)), map(std::move(snapshot)), classes(table) {}
+
+  std_msgs::Header header;  ///< map frame, stamp of the last scan
+  SemanticMap map;
+  const ClassTable& classes;  ///< the server's; never changes
+  /// With a single thread: the others belong to mapping.
+  StateMap states{map, 1};
+};
+
+/// Keeps a snapshot of the map as it was after its last change, so that queries need not wait until the
+/// mapping thread has finished a scan. While the map has a snapshot, each scan copies the blocks that it
+/// writes to. Therefore snapshots are taken only while queries are asked: from the first one, which waits for
+/// the mapping thread, until 10 s after the last one.
+class RecentMap {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Shared = std::shared_ptr<const QueriedMap>;
+
+  /// @param take takes a snapshot; for the mapping thread. @param mapping the queue that this thread serves.
+  /// @param asking the queue that the threads of the queries serve; they also free snapshots.
+  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& asking)
+      : take_(std::move(take)), mapping_(mapping), asking_(asking) {}
+
+  /// The map as it was after its last change. For the threads of queries.
+  /// @throws std::bad_alloc, and std::future_error when the server shuts down.
+  Shared get();
+  /// Takes a snapshot of the changed map if queries are asked. For the mapping thread, after each change.
+  void changed() noexcept;
+  /// Gives the snapshot up if no queries are asked any more. For the mapping thread, now and then.
+  void releaseIfIdle() noexcept;
+
+ private:
+  /// Replaces the snapshot.
+  void keep(Shared snapshot) noexcept;
+  bool idle() const { return Clock::now() - last_asked_.load() > kInterest; }
+
+  static constexpr std::chrono::seconds kInterest{10};
+
+  std::function<Shared()> take_;
+  ros::CallbackQueue& mapping_;
+  ros::CallbackQueue& asking_;
+  std::atomic<Clock::time_point> last_asked_{Clock::time_point()};
+  std::mutex mutex_;
+  Shared kept_;  ///< nullptr while no queries are asked
+};
+
+}  // namespace bki_mapping::ros_interface
