@@ -3,6 +3,7 @@ include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS
 bki_mapping_room(ros SOURCES
     cloud_conversion.cpp
     color_reader.cpp
+    distance_section_config.cpp
     input_config.cpp
     kept_map.cpp
     label_reader.cpp
@@ -17,6 +18,7 @@ bki_mapping_room(ros SOURCES
     point_field.cpp
     pose_source.cpp
     publishers/cell_markers.cpp
+    publishers/distance_section.cpp
     publishers/elevation_map.cpp
     publishers/occupancy.cpp
     publishers/projected_map.cpp

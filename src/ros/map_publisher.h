@@ -138,5 +138,6 @@ std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
 std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeDistanceSection(const PublisherContext& context);
 
 }  // namespace bki_mapping::ros_interface

@@ -25,6 +25,7 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   readParameters(private_node_, config_, mapper_config);
   mapper_ = std::make_unique<SemanticMapper>(
       mapper_config, std::make_shared<const ClassTable>(loadClassTable(config_.classes)));
+  obstaclesOf(config_.distance_section, mapper_->classes());  // refuses names that the table lacks
   for (const std::string& warning : settingWarnings(mapper_config)) ROS_WARN("%s", warning.c_str());
   kept_ = std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace());
 

@@ -63,7 +63,7 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
   using C = ServerConfig;
   const NumberRange height = NumberRange::any().slider(-1e6, 1e6);
   const NumberRange length = NumberRange::atLeast(0.0).slider(0.0, 1e4);
-  return {
+  std::vector<NamedParameter<C>> parameters = {
       textParameter("frame_id", &C::frame_id, "a frame of tf", Changes::kAtStart,
                     "Name of the map frame. Set it to a frame that does not move with the robot."),
       textParameter("classes", &C::classes, "a name of config/classes, or a YAML file", Changes::kAtStart,
@@ -136,6 +136,8 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
                      "Publish projected_map whole each time instead of its changes on projected_map_updates. "
                      "Set true for listeners that do not read the updates."),
   };
+  appendParameters(parameters, "distance_section/", &C::distance_section, distanceSectionParameters());
+  return parameters;
 }
 
 void readParameters(const ros::NodeHandle& private_node, ServerConfig& server, MapperConfig& mapper) {

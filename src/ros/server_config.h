@@ -11,6 +11,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/map/column_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "ros/distance_section_config.h"
 #include "ros/input_config.h"
 #include "ros/scan_queue.h"
 #include "ros/time_watch.h"
@@ -41,6 +42,7 @@ struct ServerConfig {
   double occupancy_max_z = 1e6;   ///< of projected_map [m]
   HeightReference occupancy_height = HeightReference::kMap;
   bool full_projected_map = false;  ///< whether projected_map is sent whole each time
+  DistanceSectionConfig distance_section;
   /// What inputs do not set for themselves; the only input where `inputs` names none.
   InputConfig input;
   /// Settings of each named input, by name: parameter and value. See allInputs.

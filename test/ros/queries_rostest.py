@@ -13,6 +13,7 @@ import rostest
 from bki_mapping import srv
 from bki_mapping.msg import OccupancyMap
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -235,6 +236,29 @@ class Queries(MapperTest):
         middle = [truth.centre((0, 0, 0)), truth.centre((1, 0, 0))]
         values = self.answer('get_distances', points=[Point(*p) for p in (*middle, (1.0, 0.5, 0.5))], max_distance=10.0).distance
         self.assertAlmostEqual(values[2], 0.5 * (values[0] + values[1]), places=5, msg='interpolated')
+
+    def test_distance_section(self):
+        sections = Listener('distance_section', OccupancyGrid)
+        self.addCleanup(sections.close)
+        truth = self.map_some()  # three further scans: the field is updated, and moves
+        grid = sections.wait_for(lambda m: m.header.stamp == self.stamp, 'the section of the last scan')
+        # The sensor is at (12, 0, 0.5), and the section 1 m below it: it has the voxels with z = -0.5.
+        origin, edge = grid.info.origin.position, 8 * (2 * 2 + 1)
+        self.assertEqual((xyz(origin), grid.info.width, grid.info.height), ((-8.0, -16.0, -0.5), edge, edge))
+        obstacles, seen = truth.occupied({'car'}), set()
+        for i, value in enumerate(grid.data):
+            voxel = (-8 + i % edge, -16 + i // edge, -1)
+            distance = truth.nearest(truth.centre(voxel), obstacles)[0][0]
+            if voxel in obstacles:
+                expected = 100
+            elif truth.is_known(voxel):
+                expected = round(99 * max(0.0, 1 - distance / 4.0))
+            else:
+                expected = -1
+            self.assertLessEqual(abs(value - expected), 0 if expected in (-1, 100) else 1, (voxel, distance))
+            seen.add(value)
+        self.assertLessEqual({-1, 0, 100}, seen)
+        self.assertGreater(len(seen), 10)
 
     def test_changes_are_seen_at_once(self):
         self.map_some()

@@ -13,6 +13,7 @@ std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext
   publishers.push_back(makeOccupancyUpdates(context));
   publishers.push_back(makeElevationMap(context));
   publishers.push_back(makeTrajectory(context));  // trajectory
+  publishers.push_back(makeDistanceSection(context));
   return publishers;
 }
 
