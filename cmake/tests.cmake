@@ -191,10 +191,10 @@ if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/filters_rostest.py test/ros/killed_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
-    test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py test/ros/queries_rostest.py
+    test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py test/ros/queries_rostest.py test/ros/query_latency_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-  bki_mapping_unit_tests(ros cloud_conversion scan_account scan_reader sensor_trajectory server_config)
+  bki_mapping_unit_tests(ros cloud_conversion recent_map scan_account scan_reader sensor_trajectory server_config)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
   foreach(name body_box filters)
@@ -215,6 +215,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/navigation.test)
   add_rostest(test/ros/publishing.test)
   add_rostest(test/ros/queries.test)
+  add_rostest(test/ros/query_latency.test)
   add_rostest(test/ros/replay.test)
   # rostest does not report skipped tests, so a wrapper tells ctest beforehand.
   add_test(NAME real_bag_rostest
@@ -243,7 +244,7 @@ if(CATKIN_ENABLE_TESTING)
   set_tests_properties(commands_test PROPERTIES TIMEOUT 900)
   set_tests_properties(real_bag_rostest PROPERTIES COST 20)
   # They limit times, which another test at the same time would change.
-  foreach(name soak hostile publishing)
+  foreach(name soak hostile publishing query_latency)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)
   endforeach()
 endif()

@@ -30,7 +30,7 @@ struct QueriedMap {
 /// Keeps a snapshot of the map as it was after its last change, so that queries need not wait until the
 /// mapping thread has finished a scan. While the map has a snapshot, each scan copies the blocks that it
 /// writes to. Therefore snapshots are taken only while queries are asked: from the first one, which waits for
-/// the mapping thread, until 10 s after the last one.
+/// the mapping thread, until some time after the last one.
 class RecentMap {
  public:
   using Clock = std::chrono::steady_clock;
@@ -38,8 +38,10 @@ class RecentMap {
 
   /// @param take takes a snapshot; for the mapping thread. @param mapping the queue that this thread serves.
   /// @param asking the queue that the threads of the queries serve; they also free snapshots.
-  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& asking)
-      : take_(std::move(take)), mapping_(mapping), asking_(asking) {}
+  /// @param interest how long snapshots are taken after a query.
+  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& asking,
+            Clock::duration interest = std::chrono::seconds(10))
+      : take_(std::move(take)), mapping_(mapping), asking_(asking), interest_(interest) {}
 
   /// The map as it was after its last change. For the threads of queries.
   /// @throws std::bad_alloc, and std::future_error when the server shuts down.
@@ -52,13 +54,12 @@ class RecentMap {
  private:
   /// Replaces the snapshot.
   void keep(Shared snapshot) noexcept;
-  bool idle() const { return Clock::now() - last_asked_.load() > kInterest; }
-
-  static constexpr std::chrono::seconds kInterest{10};
+  bool idle() const { return Clock::now() - last_asked_.load() > interest_; }
 
   std::function<Shared()> take_;
   ros::CallbackQueue& mapping_;
   ros::CallbackQueue& asking_;
+  Clock::duration interest_;
   std::atomic<Clock::time_point> last_asked_{Clock::time_point()};
   std::mutex mutex_;
   Shared kept_;  ///< nullptr while no queries are asked

@@ -1,0 +1,82 @@
+#include "ros/recent_map.h"
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <new>
+
+namespace bki_mapping::ros_interface {
+namespace {
+
+/// A mapper whose map has as many blocks as it has mapped scans, with a mapping thread that the test plays.
+class RecentMapTest : public testing::Test {
+ protected:
+  RecentMap::Shared take() {
+    if (no_memory_) throw std::bad_alloc();
+    ++taken_;
+    return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_);
+  }
+  void mapScan(RecentMap& recent) {
+    map_.getOrAllocate({{scans_++, 0, 0}});
+    recent.changed();
+  }
+  /// Asks in another thread, while this one serves the mapping queue.
+  RecentMap::Shared askAndServe(RecentMap& recent) {
+    auto asked = std::async(std::launch::async, [&] { return recent.get(); });
+    while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready)
+      mapping_.callAvailable();
+    return asked.get();
+  }
+  RecentMap make(RecentMap::Clock::duration interest) {
+    return RecentMap([this] { return take(); }, mapping_, asking_, interest);
+  }
+
+  const ClassTable classes_{"one", {SemanticClass()}};
+  SemanticMap map_{GridGeometry(1.0), 0.001, 1};
+  ros::CallbackQueue mapping_, asking_;
+  int scans_ = 0, taken_ = 0;
+  bool no_memory_ = false;
+};
+
+TEST_F(RecentMapTest, IsTakenOnlyWhileQueriesAreAsked) {
+  RecentMap recent = make(std::chrono::hours(1));
+  for (int n = 0; n < 3; ++n) mapScan(recent);
+  EXPECT_EQ(taken_, 0);
+  EXPECT_EQ(askAndServe(recent)->map.size(), 3u);
+  EXPECT_EQ(taken_, 1);
+  mapScan(recent);
+  recent.releaseIfIdle();
+  EXPECT_EQ(taken_, 2);
+  // Nobody serves the mapping queue: it maps a scan.
+  EXPECT_EQ(recent.get()->map.size(), 4u);
+  EXPECT_EQ(recent.get().get(), recent.get().get());
+}
+
+TEST_F(RecentMapTest, IsGivenUpAndFreedByTheThreadsOfQueries) {
+  RecentMap recent = make(std::chrono::seconds(-1));  // idle at once
+  std::weak_ptr<const QueriedMap> kept = askAndServe(recent);
+  EXPECT_FALSE(kept.expired());
+  mapScan(recent);
+  EXPECT_EQ(taken_, 1);
+  EXPECT_FALSE(kept.expired());
+  asking_.callAvailable();
+  EXPECT_TRUE(kept.expired());
+  kept = askAndServe(recent);
+  EXPECT_EQ(taken_, 2);
+  recent.releaseIfIdle();
+  asking_.callAvailable();
+  EXPECT_TRUE(kept.expired());
+}
+
+TEST_F(RecentMapTest, IsNeverOlderThanTheLastChange) {
+  RecentMap recent = make(std::chrono::hours(1));
+  askAndServe(recent);
+  no_memory_ = true;
+  mapScan(recent);  // must not throw: the scan is in the map
+  EXPECT_THROW(askAndServe(recent), std::bad_alloc);
+  no_memory_ = false;
+  EXPECT_EQ(askAndServe(recent)->map.size(), 1u);
+}
+
+}  // namespace
+}  // namespace bki_mapping::ros_interface
