@@ -232,7 +232,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/soak.test)
   # Likewise: a hostile publisher.
   add_executable(hostile_test test/ros/hostile_test.cpp test/ros/hostile/calls.cpp test/ros/hostile/clouds.cpp
-    test/ros/hostile/transforms.cpp)
+    test/ros/hostile/queries.cpp test/ros/hostile/transforms.cpp)
   target_include_directories(hostile_test PRIVATE test)
   target_link_libraries(hostile_test PRIVATE bki_mapping_ros GTest::gtest ${catkin_LIBRARIES})
   target_compile_definitions(hostile_test PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")

@@ -12,8 +12,8 @@ namespace bki_mapping::ros_interface {
 
 struct DistanceSectionConfig {
   double height = 0.0;        ///< of the section above the sensor [m]
-  double range = 20.0;        ///< from the sensor to the nearest edge of the section, at least [m]
-  double max_distance = 5.0;  ///< up to which distances are told apart [m]
+  double range = 15.0;        ///< from the sensor to the nearest edge of the section, at least [m]
+  double max_distance = 3.0;  ///< up to which distances are told apart [m]
   std::string classes;        ///< names of the classes that are obstacles, with commas between them
   bool unknown = false;       ///< whether unknown space is an obstacle
 };

@@ -289,6 +289,21 @@ class Attack {
     ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", back)) << where();
   }
 
+  void send(const QueryKind& kind) {
+    begin(kind.name);
+    const QueryKind::Answer answer = kind.ask(kName, dice_);
+    ASSERT_TRUE(answer.called) << where();
+    ++results_.answers[kind.name][answer.success ? "answered" : "refused"];
+    EXPECT_EQ(answer.success, kind.answered) << where() << ": " << answer.message;
+    if (answer.success) {
+      EXPECT_EQ(answer.message, "") << where();
+      return;
+    }
+    EXPECT_EQ(answer.entries, 0u) << where();
+    EXPECT_GE(answer.message.size(), kShortestText) << where() << ": " << answer.message;
+    EXPECT_LE(answer.message.size(), kLongestText) << where();
+  }
+
   void send(const DeedKind& kind) {
     begin(kind.name);
     if (kind.name == "deed/two_wrongs") return twoWrongs();
@@ -376,6 +391,7 @@ class Attack {
     append(transformKinds());
     append(pathKinds());
     append(settingsKinds());
+    append(queryKinds());
     append(deedKinds());
     for (std::size_t n = all.size(); n > 1; --n) std::swap(all[n - 1], all[dice_.below(n)]);
     return all;
@@ -482,6 +498,8 @@ std::vector<std::pair<std::string, std::string>> allRows() {
   for (const TransformKind& kind : transformKinds()) add(kind.name, kind.sent, join(kind.answers));
   for (const PathKind& kind : pathKinds()) add(kind.name, kind.sent, kind.written ? "written" : "refused");
   for (const SettingsKind& kind : settingsKinds()) add(kind.name, kind.sent, "applied or refused as a whole");
+  for (const QueryKind& kind : queryKinds())
+    add(kind.name, kind.sent, kind.answered ? "answered" : "refused");
   for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud by itself");
   return rows;
 }

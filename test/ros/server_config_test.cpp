@@ -169,12 +169,35 @@ TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
   EXPECT_EQ(server.view_range, 0.0);
 }
 
-/// The names of topics and services in the code: the first string in advertise, advertiseService and
+TEST(ServerConfig, ObstaclesOfDistanceSectionAreClassesOfTheTable) {
+  SemanticClass car, road, sky;
+  car.id = 4, road.id = 7, sky.id = 9;
+  car.name = "car", road.name = "road", sky.name = "sky";
+  road.ground = sky.ignored = true;
+  const ClassTable table("three", {car, road, sky});
+  DistanceSectionConfig config;
+  EXPECT_EQ(obstaclesOf(config, table).classes, ClassFilter::allBut({7, 9}));
+  config.classes = " road , car,";
+  config.unknown = true;
+  EXPECT_TRUE(obstaclesOf(config, table) == (ObstacleRules{{4, 7}, true}));
+  config.classes = "car, trolley";
+  try {
+    obstaclesOf(config, table);
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_NE(std::string(fault.what())
+                  .find("distance_section/classes: class table 'three' has no class 'trolley'"),
+              std::string::npos)
+        << fault.what();
+  }
+}
+
+/// The names of topics and services in the code: the first string in advertise, advertiseService, offer and
 /// subscribe.
 std::set<std::string> namesInCode() {
   std::set<std::string> names;
   const std::regex call(
-      R"re((?:advertise\w*(?:<[^>]*>+)?|subscribe|CellMarkers>|UpdatePublisher)\( ?(?:context, )?"([\w/]+)")re");
+      R"re((?:(?:advertise|offer)\w*(?:<[^>]*>+)?|subscribe|CellMarkers>|UpdatePublisher)\( ?(?:context, )?"([\w/]+)")re");
   for (const auto& entry : fs::recursive_directory_iterator(kRoot / "src/ros")) {
     if (!entry.is_regular_file()) continue;
     const std::string text = std::regex_replace(textOf(entry.path()), std::regex("\\s+"), " ");
@@ -186,11 +209,32 @@ std::set<std::string> namesInCode() {
 TEST(Documents, NameEveryTopicAndService) {
   const std::string document = textOf(kRoot / "docs/ros.md");
   std::set<std::string> names = namesInCode();
-  EXPECT_EQ(names, (std::set<std::string>{"clear_bbx", "elevation_map", "free_cells_vis_array", "load_map",
-                                          "occupancy", "occupancy_updates", "occupied_cells_vis_array",
-                                          "pause", "projected_map", "projected_map_updates", "publish_map",
-                                          "reset", "resume", "save_map", "status", "trajectory",
-                                          "voxel_cloud", "voxel_cloud_updates"}));
+  EXPECT_EQ(names, (std::set<std::string>{"cast_rays",
+                                          "check_space",
+                                          "clear_bbx",
+                                          "distance_section",
+                                          "elevation_map",
+                                          "free_cells_vis_array",
+                                          "get_distances",
+                                          "get_frontiers",
+                                          "get_nearest_obstacles",
+                                          "get_section",
+                                          "load_map",
+                                          "occupancy",
+                                          "occupancy_updates",
+                                          "occupied_cells_vis_array",
+                                          "pause",
+                                          "projected_map",
+                                          "projected_map_updates",
+                                          "publish_map",
+                                          "query_points",
+                                          "reset",
+                                          "resume",
+                                          "save_map",
+                                          "status",
+                                          "trajectory",
+                                          "voxel_cloud",
+                                          "voxel_cloud_updates"}));
   names.insert(InputConfig().topic);
   for (const std::string& name : names) {
     const bool known = document.find("| `" + name + "` |") != std::string::npos ||

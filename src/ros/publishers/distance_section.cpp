@@ -141,8 +141,8 @@ class DistanceSection : public MapPublisher {
   }
 
   static constexpr std::int8_t kUnknown = -1;
-  /// A field takes 12 bytes a voxel: 0.25 GB.
-  static constexpr double kMostVoxels = 2e7;
+  /// Of a field, which takes 12 bytes a voxel.
+  static constexpr double kMostVoxels = 1e7;
 
   std::optional<DistanceField> field_;
   Eigen::AlignedBox3d region_;  ///< of field_

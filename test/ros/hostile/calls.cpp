@@ -54,7 +54,10 @@ const std::vector<std::string> kNumbers = {"free_space_gap",
                                            "view_min_z",
                                            "view_max_z",
                                            "occupancy_min_z",
-                                           "occupancy_max_z"};
+                                           "occupancy_max_z",
+                                           "distance_section_height",
+                                           "distance_section_range",
+                                           "distance_section_max_distance"};
 const std::vector<std::string> kWords = {"free_space_mode", "free_space_weight", "free_space_extent",
                                          "occlusion",       "unlabelled_points", "queue_policy",
                                          "on_time_jump",    "color_mode"};
@@ -95,6 +98,10 @@ void setAllowed(Config& config, Dice& dice) {
     set(config, "color_mode",
         dice.oneOf<std::string>(Words{"semantics", "probability", "variance", "height"}));
   if (sometimes()) set(config, "occupancy_max_z", dice.between(-5.0, 5.0));
+  if (sometimes()) set(config, "distance_section_height", dice.between(-3.0, 3.0));
+  if (sometimes()) set(config, "distance_section_range", dice.between(0.1, 100.0));
+  if (sometimes()) set(config, "distance_section_max_distance", dice.between(0.1, 20.0));
+  if (sometimes()) set(config, "distance_section_unknown", dice.oneIn(2));
 }
 
 /// Creates something other than a regular file: a pipe, because devices need rights that tests may lack.

@@ -79,6 +79,21 @@ struct SettingsKind {
 };
 const std::vector<SettingsKind>& settingsKinds();
 
+/// A query of the map, honest or wrong.
+struct QueryKind {
+  struct Answer {
+    bool called, success;
+    std::string message;
+    std::size_t entries;  ///< of the arrays of the answer
+  };
+  std::string name;
+  std::string sent;  ///< description
+  bool answered;     ///< whether it is answered, not refused
+  /// Calls one of the services for queries. @param space of the services.
+  std::function<Answer(const std::string& space, Dice&)> ask;
+};
+const std::vector<QueryKind>& queryKinds();
+
 /// A valid cloud of class table `toy` with the fields that every set of settings reads: x, y, z, label,
 /// rgb, scores (one per class), labels and label_scores (the most probable three), ns and seconds (times).
 sensor_msgs::PointCloud2 honestCloud(const std::string& frame, const ros::Time& stamp, Dice& dice);

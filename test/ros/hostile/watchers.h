@@ -238,6 +238,7 @@ class Listeners {
     toggle<OccupancyMap>(dice, "occupancy");
     toggle<OccupancyUpdate>(dice, "occupancy_updates");
     toggle<nav_msgs::Path>(dice, "trajectory");
+    toggle<nav_msgs::OccupancyGrid>(dice, "distance_section");
   }
   void leave() { subscribers_.clear(); }
   std::size_t received() const { return received_; }
