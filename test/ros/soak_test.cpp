@@ -1,10 +1,13 @@
 // Drives in real time with random faults, through the nodelet in this process: nothing crashes, and every
-// cloud is accounted for. BKI_MAPPING_SOAK_SECONDS sets the duration (default 15), BKI_MAPPING_SOAK_SEED the
-// faults (default 1). Under a sanitizer it tests threads and life cycles.
+// cloud is accounted for, while queries are asked without a pause. BKI_MAPPING_SOAK_SECONDS sets the duration
+// (default 15), BKI_MAPPING_SOAK_SEED the faults (default 1). Under a sanitizer it tests threads and life
+// cycles.
 //
 // Memory is tested twice. One mapper maps the same drive again and again without faults, which shows leaks of
 // a fraction of a scan per scan within seconds. The drive with faults, bursts and reloads needs 300 s to show
 // one.
+#include <bki_mapping/CastRays.h>
+#include <bki_mapping/GetFrontiers.h>
 #include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/OccupancyUpdate.h>
 #include <gtest/gtest.h>
@@ -129,6 +132,45 @@ class Listeners {
   ros::NodeHandle& node_;
   ros::Subscriber updates_, markers_, grid_, cloud_;
   std::atomic<std::size_t> received_{0};
+};
+
+/// Asks the map in threads of its own, without a pause, also while there is no mapper.
+class Askers {
+ public:
+  Askers() {
+    CastRays rays;
+    rays.request.origins.resize(1);
+    rays.request.lengths = {40.0};
+    rays.request.directions.resize(50);
+    for (std::size_t n = 0; n < rays.request.directions.size(); ++n) {
+      rays.request.directions[n].x = 1.0;
+      rays.request.directions[n].y = 0.1 * static_cast<double>(n);
+    }
+    threads_.emplace_back([this, rays] { ask("cast_rays", rays); });
+    threads_.emplace_back([this] { ask("get_frontiers", GetFrontiers()); });
+  }
+  ~Askers() {
+    over_ = true;
+    for (std::thread& thread : threads_) thread.join();
+  }
+  std::size_t answers() const { return answers_; }
+
+ private:
+  template <typename Service>
+  void ask(const std::string& name, Service service) {
+    while (!over_) {
+      const std::string full = "/soak_mapping/" + name;
+      if (ros::service::exists(full, false) && ros::service::call(full, service)) {
+        ++answers_;
+        if (!service.response.success) ADD_FAILURE() << service.response.message;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+
+  std::atomic<bool> over_{false};
+  std::atomic<std::size_t> answers_{0};
+  std::vector<std::thread> threads_;
 };
 
 /// Publishes clouds and poses, some of them with faults.
@@ -269,6 +311,7 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
   setParameters(node);
   Robot robot(node, static_cast<std::uint64_t>(environment("BKI_MAPPING_SOAK_SEED", 1.0)));
   Listeners listeners(node);
+  Askers askers;
   Mapper mapper(node);
   mapper.load();
   ASSERT_TRUE(waitFor([&] { return robot.connected(); }, 60.0));
@@ -314,14 +357,15 @@ TEST(Soak, FaultsAtRandomDoNoHarm) {
   std::printf(
       "[soak] %.0f s, %zu loads, %zu clouds sent, %lu received, %lu integrated, %lu dropped, %zu status and "
       "%zu map "
-      "messages, memory %.0f MB in the middle third, %.0f MB in the last\n",
-      elapsed(), loads, sent, received, integrated, dropped, mapper.messages(), listeners.received(), middle,
-      late);
+      "messages, %zu answers, memory %.0f MB in the middle third, %.0f MB in the last\n",
+      elapsed(), loads, sent, received, integrated, dropped, mapper.messages(), listeners.received(),
+      askers.answers(), middle, late);
   EXPECT_EQ(mapper.faults(), 0u);
   EXPECT_GT(integrated, 20u);
   EXPECT_GT(dropped, 5u);
   EXPECT_GT(mapper.messages(), integrated);
   EXPECT_GT(loads, 1u);
+  EXPECT_GT(askers.answers(), 20u);
   if (seconds >= 300.0) {  // before, this test's own frames and bursts of clouds hide a leak
     EXPECT_LT(late, 1.05 * middle + 5.0) << "memory grows";
   }
