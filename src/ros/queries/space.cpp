@@ -9,8 +9,8 @@
 namespace bki_mapping::ros_interface {
 namespace {
 
-/// Class ids by how bad it is to hit them: those that live, those that can move, other obstacles, classes
-/// without a meaning for navigation, ground.
+/// Class ids by how bad it is to hit them: those that live, those that can move, other obstacles, ground, and
+/// what navigation ignores.
 std::vector<ClassId> worstFirst(const ClassTable& table) {
   const auto rank = [](const SemanticClass& c) {
     return c.living ? 0 : c.dynamic ? 1 : c.ground ? 3 : c.ignored ? 4 : 2;
