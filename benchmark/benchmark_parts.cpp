@@ -279,7 +279,7 @@ void footprints(benchmark::State& state, int threads) {
       [&](const StateMap& states) { contentsAlong(states, car, poses, contents); });
 }
 
-void nearestObstacles(benchmark::State& state) {
+void findingNearest(benchmark::State& state) {
   const auto& points = queryFixture().points;
   constexpr std::size_t kPoints = 2000;
   ask(state, 1, kPoints, [&](const StateMap& states) {
@@ -369,7 +369,7 @@ int main(int argc, char** argv) {
     });
     addOn("DistanceUpdate", [=](auto& state) { updatingDistances(state, threads); });
   }
-  add("NearestObstacle", nearestObstacles);
+  add("NearestObstacle", findingNearest);
   add("VoxelCloud", voxelCloud);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;

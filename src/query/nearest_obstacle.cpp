@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
 namespace bki_mapping {
 namespace {
+
+constexpr std::size_t kPointsPerJob = 32;  ///< some 500 us
 
 /// Squared distance from a point to a cube of voxels [voxels].
 double squaredDistance(const Eigen::Vector3d& point, const GridIndex& cube, double edge) {
@@ -112,22 +115,53 @@ class Search {
   ClassId label_ = kFreeClass;
 };
 
-}  // namespace
+/// @param name called as name() for what the message calls the point.
+template <typename Name>
+void checkPoint(const GridGeometry& geometry, const Eigen::Vector3d& point, Name&& name) {
+  if (geometry.contains(point)) return;
+  throw std::invalid_argument(name() +
+                              " is not finite or lies beyond the map's grid; give one within the map");
+}
 
-std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
-                                               const ClassFilter& classes, double max_distance) {
-  if (!states.geometry().contains(point)) {
-    throw std::invalid_argument(
-        "the point is not finite or lies beyond the map's grid; give one within the map");
-  }
-  if (!(max_distance >= 0.0)) {
-    throw std::invalid_argument("the greatest distance is negative or not a number; give metres, 0 or more");
-  }
+void checkDistance(double max_distance) {
+  if (max_distance >= 0.0) return;
+  throw std::invalid_argument("the greatest distance is negative or not a number; give metres, 0 or more");
+}
+
+std::optional<NearestObstacle> search(const StateMap& states, const Eigen::Vector3d& point,
+                                      const ClassFilter& classes, double max_distance) {
   const double resolution = states.geometry().resolution();
   Search search(states, point / resolution, classes, max_distance / resolution);
   search.run();
   if (!search.found()) return std::nullopt;
   return NearestObstacle{search.voxel(), search.label(), search.distance() * resolution};
+}
+
+}  // namespace
+
+std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
+                                               const ClassFilter& classes, double max_distance) {
+  checkPoint(states.geometry(), point, [] { return std::string("the point"); });
+  checkDistance(max_distance);
+  return search(states, point, classes, max_distance);
+}
+
+void nearestObstacles(const StateMap& states, Span<const Eigen::Vector3d> points, const ClassFilter& classes,
+                      double max_distance, Span<std::optional<NearestObstacle>> found) {
+  if (found.size() != points.size()) {
+    throw std::invalid_argument("there are " + std::to_string(points.size()) + " points and room for " +
+                                std::to_string(found.size()) + " obstacles; give as much room as points");
+  }
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    checkPoint(states.geometry(), points[n], [&] { return "point " + std::to_string(n); });
+  }
+  checkDistance(max_distance);
+  states.parallelFor((points.size() + kPointsPerJob - 1) / kPointsPerJob, [&](std::size_t job) {
+    const std::size_t end = std::min(points.size(), (job + 1) * kPointsPerJob);
+    for (std::size_t n = job * kPointsPerJob; n < end; ++n) {
+      found[n] = search(states, points[n], classes, max_distance);
+    }
+  });
 }
 
 }  // namespace bki_mapping

@@ -10,7 +10,7 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::size_t kPosesPerJob = 64;
+constexpr std::size_t kShapesPerJob = 64;
 
 /// @param name called as name() for what the message calls the shape. @param low, high its corners [m].
 template <typename Name>
@@ -30,11 +30,14 @@ void check(const GridGeometry& geometry, const Eigen::Vector3d& low, const Eigen
   }
 }
 
-void checkSizes(const Eigen::Vector3d& half_extents, const char* name) {
-  if (!((half_extents.array() > 0.0).all() && half_extents.allFinite())) {
-    throw std::invalid_argument(std::string(name) +
-                                " has a half extent that is not a number > 0; give metres > 0");
-  }
+template <typename Name>
+void checkSizes(const Eigen::Vector3d& half_extents, Name&& name) {
+  if ((half_extents.array() > 0.0).all() && half_extents.allFinite()) return;
+  throw std::invalid_argument(name() + " has a half extent that is not a number > 0; give metres > 0");
+}
+
+std::string theBox() {
+  return "the box";
 }
 
 class ContentReader {
@@ -95,6 +98,56 @@ void read(const StateMap& states, const OrientedBox& box, ContentReader& reader,
   rows.forEach([&](std::int32_t y, std::int32_t z, VoxelRange row) { reader.add(y, z, row); });
 }
 
+template <typename Name>
+void read(const StateMap& states, const Eigen::AlignedBox3d& box, ContentReader& reader, Name&& name) {
+  check(states.geometry(), box.min(), box.max(), name);
+  const Eigen::Vector3d low = box.min() / states.geometry().resolution(),
+                        high = box.max() / states.geometry().resolution();
+  const VoxelRange x = overlapped(low.x(), high.x()), y = overlapped(low.y(), high.y()),
+                   z = overlapped(low.z(), high.z());
+  for (std::int32_t k = z.begin; k < z.end; ++k) {
+    for (std::int32_t j = y.begin; j < y.end; ++j) reader.add(j, k, x);
+  }
+}
+
+template <typename Name>
+void read(const StateMap& states, const Sphere& sphere, ContentReader& reader, Name&& name) {
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(sphere.radius);
+  checkSizes(reach, name);
+  check(states.geometry(), sphere.centre - reach, sphere.centre + reach, name);
+  const double resolution = states.geometry().resolution();
+  forEachRow(sphere.centre / resolution, sphere.radius / resolution,
+             [&](std::int32_t y, std::int32_t z, VoxelRange row) { reader.add(y, z, row); });
+}
+
+template <typename Shape>
+SpaceContent contentOfOne(const StateMap& states, const Shape& shape, std::string (*name)()) {
+  ContentReader reader(states);
+  read(states, shape, reader, name);
+  return reader.content();
+}
+
+/// @param shapes what messages call all of them. @param at returns a shape by its number.
+/// @param name called as name(n) for what messages call it.
+template <typename At, typename Name>
+void readMany(const StateMap& states, std::size_t count, const char* shapes, At&& at, Name&& name,
+              Span<SpaceContent> contents) {
+  if (contents.size() != count) {
+    throw std::invalid_argument("there are " + std::to_string(count) + " " + shapes + " and room for " +
+                                std::to_string(contents.size()) + " contents; give as many contents as " +
+                                shapes);
+  }
+  states.parallelFor((count + kShapesPerJob - 1) / kShapesPerJob, [&](std::size_t job) {
+    ContentReader reader(states);
+    const std::size_t end = std::min(count, (job + 1) * kShapesPerJob);
+    for (std::size_t n = job * kShapesPerJob; n < end; ++n) {
+      reader.clear();
+      read(states, at(n), reader, [&name, n] { return name(n); });
+      contents[n] = reader.content();
+    }
+  });
+}
+
 }  // namespace
 
 std::optional<ClassId> SpaceContent::worst(Span<const ClassId> order) const {
@@ -105,55 +158,39 @@ std::optional<ClassId> SpaceContent::worst(Span<const ClassId> order) const {
 }
 
 SpaceContent contentOf(const StateMap& states, const Eigen::AlignedBox3d& box) {
-  check(states.geometry(), box.min(), box.max(), [] { return std::string("the box"); });
-  const Eigen::Vector3d low = box.min() / states.geometry().resolution(),
-                        high = box.max() / states.geometry().resolution();
-  const VoxelRange x = overlapped(low.x(), high.x()), y = overlapped(low.y(), high.y()),
-                   z = overlapped(low.z(), high.z());
-  ContentReader reader(states);
-  for (std::int32_t k = z.begin; k < z.end; ++k) {
-    for (std::int32_t j = y.begin; j < y.end; ++j) reader.add(j, k, x);
-  }
-  return reader.content();
+  return contentOfOne(states, box, theBox);
 }
 
 SpaceContent contentOf(const StateMap& states, const Sphere& sphere) {
-  checkSizes(Eigen::Vector3d::Constant(sphere.radius), "the sphere");
-  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(sphere.radius);
-  check(states.geometry(), sphere.centre - reach, sphere.centre + reach,
-        [] { return std::string("the sphere"); });
-  const double resolution = states.geometry().resolution();
-  ContentReader reader(states);
-  forEachRow(sphere.centre / resolution, sphere.radius / resolution,
-             [&](std::int32_t y, std::int32_t z, VoxelRange row) { reader.add(y, z, row); });
-  return reader.content();
+  return contentOfOne(states, sphere, [] { return std::string("the sphere"); });
 }
 
 SpaceContent contentOf(const StateMap& states, const OrientedBox& box) {
-  checkSizes(box.half_extents, "the box");
-  ContentReader reader(states);
-  read(states, box, reader, [] { return std::string("the box"); });
-  return reader.content();
+  checkSizes(box.half_extents, theBox);
+  return contentOfOne(states, box, theBox);
+}
+
+void contentsOf(const StateMap& states, Span<const Eigen::AlignedBox3d> boxes, Span<SpaceContent> contents) {
+  readMany(
+      states, boxes.size(), "boxes", [&](std::size_t n) { return boxes[n]; },
+      [](std::size_t n) { return "box " + std::to_string(n); }, contents);
+}
+
+void contentsOf(const StateMap& states, Span<const Sphere> spheres, Span<SpaceContent> contents) {
+  readMany(
+      states, spheres.size(), "spheres", [&](std::size_t n) { return spheres[n]; },
+      [](std::size_t n) { return "sphere " + std::to_string(n); }, contents);
 }
 
 void contentsAlong(const StateMap& states, const OrientedBox& box,
                    Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents) {
-  checkSizes(box.half_extents, "the box");
-  if (contents.size() != T_map_vehicle.size()) {
-    throw std::invalid_argument("there are " + std::to_string(T_map_vehicle.size()) + " poses and room for " +
-                                std::to_string(contents.size()) +
-                                " contents; give as many contents as poses");
-  }
-  states.parallelFor((contents.size() + kPosesPerJob - 1) / kPosesPerJob, [&](std::size_t job) {
-    ContentReader reader(states);
-    const std::size_t end = std::min(contents.size(), (job + 1) * kPosesPerJob);
-    for (std::size_t n = job * kPosesPerJob; n < end; ++n) {
-      const OrientedBox there = {T_map_vehicle[n] * box.T_map_box, box.half_extents};
-      reader.clear();
-      read(states, there, reader, [n] { return "the box at pose " + std::to_string(n); });
-      contents[n] = reader.content();
-    }
-  });
+  checkSizes(box.half_extents, theBox);
+  const auto there = [&](std::size_t n) {
+    return OrientedBox{T_map_vehicle[n] * box.T_map_box, box.half_extents};
+  };
+  readMany(
+      states, T_map_vehicle.size(), "poses", there,
+      [](std::size_t n) { return "the box at pose " + std::to_string(n); }, contents);
 }
 
 }  // namespace bki_mapping

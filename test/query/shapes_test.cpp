@@ -162,6 +162,25 @@ TEST_F(Shapes, OrientedBoxesEqualLookingAtEveryVoxel) {
   }
 }
 
+TEST_F(Shapes, ManyAtOnceEqualOneByOne) {
+  const SemanticMap map = queryMap(37, kind_);
+  const StateMap states(map, 2);
+  std::vector<Eigen::AlignedBox3d> boxes;
+  std::vector<Sphere> spheres;
+  for (int n = 0; n < 200; ++n) {
+    const Eigen::Vector3d at(coordinate(), coordinate(), coordinate());
+    boxes.emplace_back(at, at + Eigen::Vector3d(size(), size(), size()));
+    spheres.push_back({at, size()});
+  }
+  std::vector<SpaceContent> of_boxes(200), of_spheres(200);
+  contentsOf(states, boxes, of_boxes);
+  contentsOf(states, spheres, of_spheres);
+  for (std::size_t n = 0; n < 200; ++n) {
+    expectSame(of_boxes[n], contentOf(states, boxes[n]), std::to_string(n));
+    expectSame(of_spheres[n], contentOf(states, spheres[n]), std::to_string(n));
+  }
+}
+
 TEST(SpaceContent, NamesTheWorstClass) {
   SpaceContent content;
   content.classes = {3, 7};
@@ -214,6 +233,13 @@ TEST_F(Shapes, RefusesWhatIsNoShape) {
                 [&] { contentsAlong(states, oriented, poses, contents); });
   EXPECT_THROW(contentsAlong(states, oriented, std::vector<Eigen::Isometry3d>(3), contents),
                std::invalid_argument);
+  std::vector<Sphere> spheres(70, Sphere{{0, 0, 0}, 0.1});
+  spheres[65].radius = kNan;
+  expectRefused("sphere 65 has a half extent that is not a number > 0; give metres > 0",
+                [&] { contentsOf(states, spheres, contents); });
+  const std::vector<Eigen::AlignedBox3d> boxes(69, {Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones()});
+  expectRefused("there are 69 boxes and room for 70 contents; give as many contents as boxes",
+                [&] { contentsOf(states, boxes, contents); });
 }
 
 TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
@@ -230,6 +256,7 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
     std::mt19937 random(36);
     std::uniform_real_distribution<double> coordinate(-12.0, 12.0);
     int missing = 0;
+    std::vector<Eigen::Vector3d> points;
     for (int n = 0; n < 100; ++n) {
       Eigen::Vector3d point(coordinate(random), coordinate(random), coordinate(random));
       if (n % 3 == 0) point = (point * 4).array().round() / 4;  // many are equally near
@@ -245,6 +272,7 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
         }
         expected = NearestObstacle{voxel, label, distance};
       }
+      points.push_back(point);
       const auto found = nearestObstacle(states, point, classes, most);
       ASSERT_EQ(found.has_value(), expected.has_value()) << n;
       missing += !found;
@@ -255,6 +283,18 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
     }
     EXPECT_GT(missing, 0);
     EXPECT_LT(missing, 50);
+    std::vector<std::optional<NearestObstacle>> all(points.size());
+    nearestObstacles(states, points, {3, 9}, 5.0, all);
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const auto one = nearestObstacle(states, points[n], {3, 9}, 5.0);
+      ASSERT_EQ(all[n].has_value(), one.has_value()) << n;
+      if (one) {
+        ASSERT_EQ(all[n]->voxel, one->voxel) << n;
+      }
+    }
+    points[77].x() = kNan;
+    EXPECT_THROW(nearestObstacles(states, points, {}, 5.0, all), std::invalid_argument);
+    EXPECT_THROW(nearestObstacles(states, {points.data(), 3}, {}, 5.0, all), std::invalid_argument);
     EXPECT_THROW(nearestObstacle(states, {kNan, 0, 0}), std::invalid_argument);
     EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassFilter::all(), -1.0), std::invalid_argument);
     EXPECT_THROW(nearestObstacle(states, {0, 0, 0}, ClassFilter::all(), kNan), std::invalid_argument);

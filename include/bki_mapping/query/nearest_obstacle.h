@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/query/class_filter.h"
 #include "bki_mapping/query/state_map.h"
 
@@ -26,5 +27,11 @@ struct NearestObstacle {
 std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
                                                const ClassFilter& classes = ClassFilter::all(),
                                                double max_distance = std::numeric_limits<double>::infinity());
+
+/// The same for many points, on all threads. @param found as long as `points`.
+/// @throws std::invalid_argument as nearestObstacle, naming the point, or if the lengths differ; `found` is
+/// then unchanged.
+void nearestObstacles(const StateMap& states, Span<const Eigen::Vector3d> points, const ClassFilter& classes,
+                      double max_distance, Span<std::optional<NearestObstacle>> found);
 
 }  // namespace bki_mapping

@@ -44,6 +44,11 @@ SpaceContent contentOf(const StateMap& states, const Eigen::AlignedBox3d& box);
 SpaceContent contentOf(const StateMap& states, const Sphere& sphere);
 SpaceContent contentOf(const StateMap& states, const OrientedBox& box);
 
+/// The same for many shapes, on all threads. @param contents as long as the shapes.
+/// @throws std::invalid_argument as contentOf, naming the shape, or if the lengths differ.
+void contentsOf(const StateMap& states, Span<const Eigen::AlignedBox3d> boxes, Span<SpaceContent> contents);
+void contentsOf(const StateMap& states, Span<const Sphere> spheres, Span<SpaceContent> contents);
+
 /// The content of a vehicle's box at each pose of a path, on all threads. What the vehicle sweeps between two
 /// poses is not looked at: give poses not farther apart than a voxel or two.
 /// @param box pose and size in the vehicle's frame. @param T_map_vehicle the poses, without scale or shear.
