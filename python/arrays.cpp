@@ -6,10 +6,6 @@
 namespace bki_mapping::python {
 namespace {
 
-std::string typeName(py::handle object) {
-  return py::str(py::handle(reinterpret_cast<PyObject*>(Py_TYPE(object.ptr()))).attr("__name__"));
-}
-
 /// The object as an array, of whatever numbers it holds.
 py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted) {
   py::array array = py::array::ensure(object);
@@ -37,6 +33,38 @@ py::array_t<T, kAligned<T>> contiguous(const py::array& array) {
 
 bool isNumber(char kind) {
   return kind == 'f' || kind == 'i' || kind == 'u';
+}
+
+bool isIntegerKind(char kind) {
+  return kind == 'i' || kind == 'u';
+}
+
+/// An array of shape (N, 3). @param things what it holds: "numbers". @param holds whether a kind of dtype is
+/// that.
+py::array tripletsOf(py::handle object, const std::string& name, const std::string& things,
+                     bool (*holds)(char)) {
+  const std::string wanted = "an array of " + things + " of shape (N, 3)";
+  const py::array array = arrayOf(object, name, wanted);
+  if (!holds(array.dtype().kind())) {
+    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
+  }
+  if (array.ndim() != 2 || array.shape(1) != 3) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
+  }
+  return array;
+}
+
+/// A few numbers. @param wanted for messages: "two numbers".
+template <int kCount>
+Eigen::Matrix<double, kCount, 1> numbersOf(py::handle object, const std::string& name,
+                                           const std::string& wanted) {
+  const py::array array = arrayOf(object, name, wanted);
+  if (!isNumber(array.dtype().kind()) || array.ndim() != 1 || array.size() != kCount) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of dtype " + dtypeText(array) +
+                                " and shape " + shapeText(array));
+  }
+  const auto values = contiguous<double>(array);
+  return Eigen::Map<const Eigen::Matrix<double, kCount, 1>>(values.data());
 }
 
 /// Whether the object counts as an integer, as those of NumPy do.
@@ -70,15 +98,12 @@ void flatten(const py::dict& settings, const std::string& group, std::map<std::s
 
 }  // namespace
 
+std::string typeName(py::handle object) {
+  return py::str(py::handle(reinterpret_cast<PyObject*>(Py_TYPE(object.ptr()))).attr("__name__"));
+}
+
 Points::Points(py::handle object, const std::string& name) {
-  const std::string wanted = "an array of numbers of shape (N, 3)";
-  const py::array array = arrayOf(object, name, wanted);
-  if (!isNumber(array.dtype().kind())) {
-    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
-  }
-  if (array.ndim() != 2 || array.shape(1) != 3) {
-    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
-  }
+  const py::array array = tripletsOf(object, name, "numbers", &isNumber);
   size_ = static_cast<std::size_t>(array.shape(0));
   is_float_ = array.dtype().kind() == 'f' && array.itemsize() <= 4;
   if (is_float_) {
@@ -94,7 +119,7 @@ Labels::Labels(py::handle object, const std::string& name) {
   const py::array array = arrayOf(object, name, wanted);
   const char kind = array.dtype().kind();
   const bool empty_list = array.size() == 0 && kind == 'f';  // NumPy's dtype of []
-  if (kind != 'i' && kind != 'u' && !empty_list) {
+  if (!isIntegerKind(kind) && !empty_list) {
     throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
   }
   if (array.ndim() != 1) {
@@ -112,15 +137,87 @@ Labels::Labels(py::handle object, const std::string& name) {
   array_ = contiguous<std::uint32_t>(array);
 }
 
-Eigen::Vector3d vectorOf(py::handle object, const std::string& name) {
-  const std::string wanted = "three numbers";
+DoublePoints::DoublePoints(py::handle object, const std::string& name)
+    : array_(contiguous<double>(tripletsOf(object, name, "numbers", &isNumber))) {}
+
+Indices::Indices(py::handle object, const std::string& name) {
+  const py::array array = tripletsOf(object, name, "integers", &isIntegerKind);
+  if (array.size() > 0 && array.itemsize() > 2) {
+    const py::object least = array.attr("min")(), most = array.attr("max")();
+    using Limits = std::numeric_limits<std::int32_t>;
+    if (least < py::int_(Limits::min()) || most > py::int_(Limits::max())) {
+      throw std::invalid_argument(name + " must be integers of 32 bits");
+    }
+  }
+  array_ = contiguous<std::int32_t>(array);
+}
+
+Numbers::Numbers(py::handle object, const std::string& name, std::size_t count, const std::string& things) {
+  const std::string wanted =
+      "a number, or " + std::to_string(count) + " of them, one for each of the " + things;
   const py::array array = arrayOf(object, name, wanted);
-  if (!isNumber(array.dtype().kind()) || array.ndim() != 1 || array.size() != 3) {
-    throw std::invalid_argument(name + " must be " + wanted + ", not of dtype " + dtypeText(array) +
-                                " and shape " + shapeText(array));
+  if (!isNumber(array.dtype().kind())) {
+    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
+  }
+  if (array.ndim() > 1 || (array.ndim() == 1 && static_cast<std::size_t>(array.size()) != count)) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
+  }
+  array_ = contiguous<double>(array);
+}
+
+double numberOf(py::handle object, const std::string& name) {
+  const double value = PyFloat_AsDouble(object.ptr());
+  if (PyErr_Occurred() == nullptr) return value;
+  PyErr_Clear();
+  throw py::type_error(name + " must be a number, not " + typeName(object));
+}
+
+std::size_t countOf(py::handle object, const std::string& name) {
+  const auto count = isInteger(object) ? PyNumber_AsSsize_t(object.ptr(), nullptr) : py::ssize_t{-1};
+  if (count < 0) {
+    PyErr_Clear();
+    throw std::invalid_argument(name + " must be an integer, 0 or more");
+  }
+  return static_cast<std::size_t>(count);
+}
+
+bool truthOf(py::handle object, const std::string& name) {
+  const std::string type = typeName(object);
+  if (type == "bool" || type == "bool_") return PyObject_IsTrue(object.ptr()) == 1;
+  throw py::type_error(name + " must be True or False, not " + type);
+}
+
+Eigen::Vector2d pairOf(py::handle object, const std::string& name) {
+  return numbersOf<2>(object, name, "two numbers");
+}
+
+Eigen::Vector3d tripleOf(py::handle object, const std::string& name) {
+  return numbersOf<3>(object, name, "three numbers");
+}
+
+std::vector<Eigen::Isometry3d> posesOf(py::handle object, const std::string& name) {
+  const std::string wanted = "an array of numbers of shape (N, 4, 4)";
+  const py::array array = arrayOf(object, name, wanted);
+  if (!isNumber(array.dtype().kind())) {
+    throw py::type_error(name + " must be " + wanted + ", not of dtype " + dtypeText(array));
+  }
+  if (array.ndim() != 3 || array.shape(1) != 4 || array.shape(2) != 4) {
+    throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
   }
   const auto values = contiguous<double>(array);
-  const Eigen::Vector3d vector(values.at(0), values.at(1), values.at(2));
+  std::vector<Eigen::Isometry3d> poses(static_cast<std::size_t>(array.shape(0)));
+  const double* from = values.data();
+  for (std::size_t n = 0; n < poses.size(); ++n, from += 16) {
+    poses[n].matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(from);
+    if (poses[n].matrix().row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
+      throw std::invalid_argument(name + "[" + std::to_string(n) + "] must have 0, 0, 0, 1 in the last row");
+    }
+  }
+  return poses;
+}
+
+Eigen::Vector3d vectorOf(py::handle object, const std::string& name) {
+  const Eigen::Vector3d vector = tripleOf(object, name);
   if (vector.array().isNaN().any()) throw std::invalid_argument(name + " has a coordinate that is NaN");
   return vector;
 }
@@ -131,7 +228,7 @@ GridIndex indexOf(py::handle object, const std::string& name) {
   const auto outside = [](std::int64_t i) {
     return i < std::numeric_limits<std::int32_t>::min() || i > std::numeric_limits<std::int32_t>::max();
   };
-  if ((kind == 'i' || kind == 'u') && array.ndim() == 1 && array.size() == 3) {
+  if (isIntegerKind(kind) && array.ndim() == 1 && array.size() == 3) {
     const auto values = contiguous<std::int64_t>(array);
     if (!outside(values.at(0)) && !outside(values.at(1)) && !outside(values.at(2))) {
       return {static_cast<std::int32_t>(values.at(0)), static_cast<std::int32_t>(values.at(1)),

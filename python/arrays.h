@@ -13,11 +13,15 @@
 #include <utility>
 #include <vector>
 
+#include "bki_mapping/core/span.h"
 #include "bki_mapping/core/types.h"
 
 namespace bki_mapping::python {
 
 namespace py = pybind11;
+
+/// The name of an object's type, for messages.
+std::string typeName(py::handle object);
 
 /// Points as NumPy has them, without a copy where they are contiguous single or double precision.
 class Points {
@@ -29,9 +33,14 @@ class Points {
   bool isFloat() const { return is_float_; }
   /// The points in single precision; isFloat() must be true.
   const Eigen::Vector3f* floats() const { return static_cast<const Eigen::Vector3f*>(data_); }
-  Eigen::Vector3d at(std::size_t i) const {
-    if (is_float_) return floats()[i].cast<double>();
-    return static_cast<const Eigen::Vector3d*>(data_)[i];
+  /// The points in double precision; isFloat() must be false.
+  const Eigen::Vector3d* doubles() const { return static_cast<const Eigen::Vector3d*>(data_); }
+  Eigen::Vector3d at(std::size_t i) const { return is_float_ ? floats()[i].cast<double>() : doubles()[i]; }
+  /// Calls use(Span<const Eigen::Vector3f>) or use(Span<const Eigen::Vector3d>).
+  template <typename Use>
+  void visit(Use&& use) const {
+    is_float_ ? use(Span<const Eigen::Vector3f>(floats(), size_))
+              : use(Span<const Eigen::Vector3d>(doubles(), size_));
   }
 
  private:
@@ -54,8 +63,58 @@ class Labels {
   py::array_t<std::uint32_t> array_;
 };
 
+/// Points in double precision, without a copy if they are contiguous float64.
+class DoublePoints {
+ public:
+  DoublePoints(py::handle object, const std::string& name);
+
+  std::size_t size() const { return static_cast<std::size_t>(array_.shape(0)); }
+  Span<const Eigen::Vector3d> span() const {
+    return {reinterpret_cast<const Eigen::Vector3d*>(array_.data()), size()};
+  }
+
+ private:
+  py::array_t<double> array_;
+};
+
+/// Indices of voxels or blocks, without a copy if they are contiguous int32.
+class Indices {
+ public:
+  /// @param object anything that numpy.asarray makes an array of integers of shape (N, 3) of.
+  Indices(py::handle object, const std::string& name);
+
+  Span<const GridIndex> span() const {
+    static_assert(sizeof(GridIndex) == 3 * sizeof(std::int32_t));
+    return {reinterpret_cast<const GridIndex*>(array_.data()), static_cast<std::size_t>(array_.shape(0))};
+  }
+
+ private:
+  py::array_t<std::int32_t> array_;
+};
+
+/// One number for each of many things, or the same for all of them.
+class Numbers {
+ public:
+  /// @param count of the things, which messages call `things`.
+  Numbers(py::handle object, const std::string& name, std::size_t count, const std::string& things);
+
+  double at(std::size_t i) const { return array_.data()[array_.size() == 1 ? 0 : i]; }
+
+ private:
+  py::array_t<double> array_;
+};
+
+double numberOf(py::handle object, const std::string& name);
+std::size_t countOf(py::handle object, const std::string& name);
+bool truthOf(py::handle object, const std::string& name);
+/// Two numbers, which may be infinite or NaN.
+Eigen::Vector2d pairOf(py::handle object, const std::string& name);
+/// Three numbers, which may be infinite or NaN.
+Eigen::Vector3d tripleOf(py::handle object, const std::string& name);
 /// Three finite or infinite numbers, not NaN.
 Eigen::Vector3d vectorOf(py::handle object, const std::string& name);
+/// Poses of shape (N, 4, 4). Their rotations are not looked at.
+std::vector<Eigen::Isometry3d> posesOf(py::handle object, const std::string& name);
 /// A block's index, of three integers.
 GridIndex indexOf(py::handle object, const std::string& name);
 /// A str, bytes or os.PathLike.
@@ -85,5 +144,13 @@ struct Field {
   std::size_t offset;
 };
 py::dtype structType(const std::vector<Field>& fields, std::size_t bytes);
+
+/// A read-only array that shows memory of an object, which it keeps alive.
+template <typename T>
+py::array viewOf(const py::object& owner, const T* data, const std::vector<py::ssize_t>& shape) {
+  py::array array(py::dtype::of<T>(), shape, data, owner);
+  array.attr("setflags")(false);
+  return array;
+}
 
 }  // namespace bki_mapping::python

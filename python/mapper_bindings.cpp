@@ -194,8 +194,9 @@ SharedMap snapshot(Mapper& self) {
   return alone(self, [&] {
     std::vector<DriveRecord> drives = self.drives;
     if (self.drive.scans > 0) drives.push_back(self.drive);
-    return std::make_shared<StoredMap>(
-        StoredMap{mapInfoOf(self.mapper, self.frame), std::move(drives), self.mapper.snapshot()});
+    return std::make_shared<FixedMap>(
+        StoredMap{mapInfoOf(self.mapper, self.frame), std::move(drives), self.mapper.snapshot()},
+        self.mapper.config().threads);
   });
 }
 
@@ -212,7 +213,8 @@ void addStored(Mapper& self, const StoredMap& added) {
   self.drives.insert(self.drives.end(), added.drives.begin(), added.drives.end());
 }
 
-void add(Mapper& self, const StoredMap& map) {
+void add(Mapper& self, const FixedMap& added) {
+  const StoredMap& map = added.stored;
   alone(self, [&] {
     checkSameGrid("the mapper", mapInfoOf(self.mapper, self.frame), "the added map", map.info);
     if (map.info.frame != self.frame) {

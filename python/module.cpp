@@ -1,6 +1,8 @@
 // The Python module bki_mapping._core. python/bki_mapping/__init__.py loads it when it is first used.
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 
 #include "arrays.h"
@@ -8,17 +10,26 @@
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/map/map_query.h"
+#include "bki_mapping/query/rays.h"
 #include "bki_mapping/store/map_merge.h"
+#include "class_bindings.h"
 #include "map_bindings.h"
 #include "mapper_bindings.h"
 
 namespace bki_mapping::python {
 namespace {
 
-SharedMap load(py::handle path) {
+/// A number of threads; StateMap checks its range.
+int threadsOf(py::handle threads) {
+  const std::size_t count = countOf(threads, "threads");
+  return static_cast<int>(std::min<std::size_t>(count, std::numeric_limits<int>::max()));
+}
+
+SharedMap load(py::handle path, py::handle threads) {
   const std::string file = pathOf(path, "path");
+  const int count = threadsOf(threads);
   const py::gil_scoped_release release;
-  return std::make_shared<StoredMap>(loadMapWithGains(file));
+  return std::make_shared<FixedMap>(loadMapWithGains(file), count);
 }
 
 MergeInput inputOf(py::handle input) {
@@ -144,12 +155,16 @@ PYBIND11_MODULE(_core, m) {
   m.attr("OCCLUDED") = static_cast<int>(VoxelState::kOccluded);
   m.attr("FREE_CLASS") = static_cast<int>(kFreeClass);
   m.attr("EVIDENCE_UNIT") = static_cast<double>(kEvidenceUnit);
+  m.attr("RAY_NOTHING") = static_cast<int>(RayEnd::kNothing);
+  m.attr("RAY_OCCUPIED") = static_cast<int>(RayEnd::kOccupied);
+  m.attr("RAY_UNKNOWN") = static_cast<int>(RayEnd::kUnknown);
+  addClasses(m);
   addMap(m);
   addMapper(m);
   addSequence(m);
-  m.def(
-      "load", &load, py::arg("path"),
-      "Read a map file (.bkm).\n\nRaises MapFileError if it cannot be read, is damaged, or is no map file.");
+  m.def("load", &load, py::arg("path"), py::arg("threads") = 0,
+        "Read a map file (.bkm).\n\nthreads: that queries of many things use; 0: all cores.\n\nRaises "
+        "MapFileError if it cannot be read, is damaged, or is no map file.");
   m.def("merge", &merge, py::arg("inputs"), py::arg("output"), py::arg("keep_drives") = false,
         py::arg("without") = std::vector<std::string>(),
         "Merge map files into another one: the sum of the drives that are in any of them, each counted "

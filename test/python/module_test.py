@@ -207,7 +207,7 @@ class Queries(unittest.TestCase):
     def test_queries_follow_from_the_planes(self):
         states, labels = self.map.states(self.points), self.map.labels(self.points)
         probabilities, variances = self.map.probabilities(self.points), self.map.variances(self.points)
-        posterior, whole = self.map.posterior(self.points), self.map.query(self.points)
+        posterior, whole = self.map.posterior(self.points), self.map.query(self.points, 'state,label,probability,variance,entropy')
         self.assertEqual(set(states), {bki.UNKNOWN, bki.FREE, bki.OCCUPIED})
         for i in range(0, len(self.points), 5):
             alpha, ids = self.posterior_of(self.points[i])
@@ -408,7 +408,7 @@ class WrongInput(WithFolder):
     def test_queries_and_files(self):
         map_ = mapper_with_wall().map
         for query in (map_.states, map_.labels, map_.probabilities, map_.variances, map_.posterior, map_.query):
-            self.refused(ValueError, r'points\[1\] is not finite', lambda: query([[0, 0, 0], [0, math.nan, 0]]))
+            self.refused(ValueError, 'point 1 of 2 has a coordinate that is not finite', lambda: query([[0, 0, 0], [0, math.nan, 0]]))
             self.refused(ValueError, 'of shape', lambda: query([0, 0, 0]))
         self.refused(ValueError, "voxel state 'full' is unknown", lambda: map_.voxels('full'))
         self.refused(TypeError, 'states must be a str', lambda: map_.voxels(5))
