@@ -15,7 +15,8 @@ else()
   set(BKI_MAPPING_PYTHON_BUILD ${CMAKE_BINARY_DIR}/python/${PROJECT_NAME})
 endif()
 
-set(files python/${PROJECT_NAME}/__init__.py python/${PROJECT_NAME}/__init__.pyi python/${PROJECT_NAME}/py.typed)
+set(files python/${PROJECT_NAME}/__init__.py python/${PROJECT_NAME}/__init__.pyi python/${PROJECT_NAME}/py.typed
+  python/${PROJECT_NAME}/ros.py)
 foreach(file ${files})
   get_filename_component(name ${file} NAME)
   configure_file(${file} ${BKI_MAPPING_PYTHON_BUILD}/${name} COPYONLY)

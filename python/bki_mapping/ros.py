@@ -1,0 +1,438 @@
+"""Follows the map of a running mapper: rebuilds it from the topics occupancy_updates and occupancy.
+
+    import bki_mapping.ros
+    follower = bki_mapping.ros.OccupancyFollower()
+    follower.subscribe('occupancy_updates')
+    follower.wait(10.0)
+    states = follower.query(points)['state']
+
+Needs NumPy, and neither ROS nor the C++ library; ROS is loaded by subscribe(). docs/ros.md describes the topics.
+"""
+import collections
+import struct
+import threading
+from typing import Any, Iterable, NamedTuple, Optional, Tuple, Union
+
+import numpy as np
+
+__all__ = ['BLOCK', 'OccupancyClass', 'OccupancyFollower', 'decode']
+
+_EDGE, _VOXELS = 8, 512  # of a block [voxels]
+_UNKNOWN, _FREE_LABEL = 0, 255
+_STATES = {'free': 1, 'occupied': 2, 'occluded': 3}
+_FREE_COLOR, _OCCLUDED_COLOR = (200, 225, 240), (60, 60, 70)  # those of Map.voxels
+_VALUES = ('probability', 'occupancy', 'class_probability')
+
+#: A bki_mapping/OccupancyBlock as it lies in messages; voxels by z, y, x.
+BLOCK = np.dtype([(axis, '<i4') for axis in 'xyz'] + [(name, 'u1', (_EDGE,) * 3) for name in ('state', 'label')] +
+                 [(name, '<f4', (_EDGE,) * 3) for name in _VALUES])
+_VOXEL = np.dtype([(axis, '<f4') for axis in 'xyz'] + [(name, 'u1') for name in ('red', 'green', 'blue')] +
+                  [('label', '<u2'), ('state', 'u1')] + [(name, '<f4') for name in _VALUES])
+_SAID = np.dtype([('state', 'u1'), ('label', 'u1')] + [(name, '<f4') for name in _VALUES])
+
+
+class OccupancyClass(NamedTuple):
+    """A class of the mapper's class table."""
+    id: int
+    name: str
+    color: Tuple[int, int, int]
+    dynamic: bool
+
+
+#: What a message says. sequence: None for the topic occupancy. blocks: of dtype BLOCK. removed: indices of blocks, (N, 3).
+_Content = collections.namedtuple('_Content', 'stamp frame sequence whole resolution block_edge classes blocks removed')
+
+
+class OccupancyFollower:
+    """The map of a mapper, rebuilt from its messages.
+
+    A message of occupancy_updates with `whole` replaces the map; any other one must have the number after the last one's, or it
+    is a gap: updates were missed. The map then stays as it was, and `in_sync` is False, until the whole map comes. A message of
+    the topic occupancy, which has no number, replaces the map while it is not in sync.
+
+    Threads may share a follower. Hold `lock` to ask several questions of the same map.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self._changed = threading.Condition(self.lock)
+        self._in_sync, self._missed, self._sequence = False, 0, None
+        self._stamp, self._frame, self._resolution, self._classes = 0, '', None, ()
+        self._store, self._rows, self._finder = np.zeros(0, BLOCK), {}, None
+        self._subscription = None
+
+    # The state of the map.
+
+    @property
+    def in_sync(self) -> bool:
+        """Whether the map holds all updates up to the last message."""
+        return self._in_sync
+
+    @property
+    def sequence(self) -> Optional[int]:
+        """The number of the last update in the map; None if the map is of the topic occupancy, or there is none."""
+        return self._sequence
+
+    @property
+    def missed(self) -> int:
+        """How many times updates were missed."""
+        return self._missed
+
+    @property
+    def stamp(self) -> int:
+        """Time of the last scan in the map [ns]."""
+        return self._stamp
+
+    @property
+    def frame(self) -> str:
+        """Name of the map frame."""
+        return self._frame
+
+    @property
+    def resolution(self) -> Optional[float]:
+        """Edge of a voxel [m]; None before the first map."""
+        return self._resolution
+
+    @property
+    def classes(self) -> Tuple[OccupancyClass, ...]:
+        """The class table."""
+        return self._classes
+
+    # Messages.
+
+    def update(self, message: Any) -> bool:
+        """Take a message: a bki_mapping/OccupancyUpdate or OccupancyMap, in order.
+
+        Returns whether the map changed. Raises ValueError if the message is inconsistent; the map is then unchanged.
+        """
+        content = message if isinstance(message, _Content) else _content_of(message)
+        with self.lock:
+            if content.whole:
+                if content.sequence is None and self._in_sync:
+                    return False  # may be older than the last update
+                self._replace(content)
+            elif self._in_sync and content.sequence == self._sequence + 1:
+                self._change(content)
+            else:
+                if self._in_sync and content.sequence != self._sequence:
+                    self._in_sync = False
+                    self._missed += 1
+                    self._changed.notify_all()
+                return False
+            self._sequence, self._stamp = content.sequence, content.stamp
+            self._changed.notify_all()
+            return True
+
+    def _replace(self, content: _Content) -> None:
+        rows = {key: row for row, key in enumerate(_keys_of(content.blocks))}
+        if len(rows) < len(content.blocks):
+            raise ValueError('the message has a block twice')
+        self._in_sync = content.sequence is not None
+        self._frame, self._resolution, self._classes = content.frame, content.resolution, content.classes
+        self._store, self._rows, self._finder = np.array(content.blocks), rows, None
+
+    def _change(self, content: _Content) -> None:
+        keys = _keys_of(content.blocks)
+        count = len(self._rows)
+        for key in keys:
+            self._rows.setdefault(key, len(self._rows))
+        if len(self._rows) > count:
+            self._finder = None
+        if len(self._rows) > len(self._store):
+            store = np.zeros(len(self._rows) + len(self._rows) // 2, BLOCK)
+            store[:count] = self._store[:count]
+            self._store = store
+        self._store[[self._rows[key] for key in keys]] = content.blocks
+        for key in map(tuple, content.removed.tolist()):
+            self._remove(key)
+
+    def _remove(self, key: Tuple[int, int, int]) -> None:
+        row = self._rows.pop(key, None)
+        if row is None:
+            return
+        last = len(self._rows)  # its block takes the free row
+        if row != last:
+            self._store[row] = self._store[last]
+            self._rows[_keys_of(self._store[row:row + 1])[0]] = row
+        self._finder = None
+
+    # Topics.
+
+    def subscribe(self, topic: str = 'occupancy_updates', publish_map: Optional[str] = None, patience: float = 1.0) -> None:
+        """Follow a topic. Call rospy.init_node before.
+
+        topic: occupancy_updates, or occupancy for whole maps only.
+        publish_map: name of the mapper's service, such as 'mapping/publish_map', which is called if updates were missed; all
+        subscribers then receive the whole map. None: subscribes again instead, which works if nothing else in this process
+        subscribes to the topic, for ROS shares the connection.
+        patience: time between two requests for the whole map [s].
+
+        Raises ValueError for a topic of another type.
+        """
+        self.unsubscribe()
+        self._subscription = _Subscription(self, topic, publish_map, patience)
+
+    def unsubscribe(self) -> None:
+        """Stop following the topic; the map stays."""
+        if self._subscription:
+            self._subscription.close()
+        self._subscription = None
+
+    def wait(self, timeout: float, sequence: Optional[int] = None) -> bool:
+        """Wait until the map is in sync, or, with the topic occupancy, has come; and holds an update, if given by its number.
+
+        timeout: [s]. Returns whether that happened.
+        """
+        def ready():
+            comes_whole = self._resolution is not None and self._sequence is None
+            return (self._in_sync or comes_whole) and (sequence is None or (self._sequence is not None and self._sequence >= sequence))
+        with self.lock:
+            return self._changed.wait_for(ready, timeout)
+
+    # Queries.
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """The indices of all blocks, sorted by z, y, x: (N, 3), int32."""
+        with self.lock:
+            return self._indices()[self._order()]
+
+    def block(self, index: Iterable[int]) -> Optional[np.void]:
+        """A copy of the block with an index, of dtype BLOCK: state, label, probability, occupancy and class_probability are
+        (8, 8, 8), by z, y, x. None if the map has no such block."""
+        with self.lock:
+            row = self._rows.get(tuple(int(i) for i in index))
+            return None if row is None else self._store[row].copy()
+
+    def query(self, points: Any) -> np.ndarray:
+        """What the map says of the voxels that contain points.
+
+        points: map frame [m], (N, 3).
+
+        Returns (N,), structured: state, label, probability, occupancy and class_probability, as in bki_mapping/OccupancyBlock.
+        Where the map has no block, state is 0 (unknown), label 255, and all others NaN. Raises ValueError for a point that is not
+        finite, or if there is no map yet.
+        """
+        points = np.asarray(points, float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError(f'points must be an array of numbers of shape (N, 3), not of shape {points.shape}')
+        finite = np.isfinite(points).all(axis=1)
+        if not finite.all():
+            raise ValueError(f'point {np.argmin(finite)} of {len(points)} has a coordinate that is not finite; remove such points')
+        said = np.full(len(points), np.array((_UNKNOWN, _FREE_LABEL, np.nan, np.nan, np.nan), _SAID))
+        with self.lock:
+            if self._resolution is None:
+                raise ValueError('there is no map yet; wait for one')
+            voxels = np.floor(points / self._resolution)
+            voxels[np.abs(voxels).max(axis=1) > 2**30] = 2**30  # beyond the grid
+            voxels = voxels.astype(np.int64)
+            rows = self._find(voxels // _EDGE)
+            known = rows >= 0
+            place = (rows[known], *(voxels[known] % _EDGE).T[::-1])
+            for name in _SAID.names:
+                said[name][known] = self._store[name][place]
+        return said
+
+    def voxels(self, states: Union[str, Iterable[str]] = 'occupied') -> np.ndarray:
+        """The voxels in the given states ('occupied', 'free', 'occluded'; a list, or joined by commas).
+
+        Returns them structured, as bki_mapping.Map.voxels, with the centre x, y, z [m], the colour red, green, blue, and label,
+        state, probability, occupancy and class_probability. Sorted by block. Raises ValueError for an unknown state.
+        """
+        words = states.split(',') if isinstance(states, str) else list(states)
+        for word in words:
+            if word not in _STATES:
+                raise ValueError(f"voxel state '{word}' is unknown; known states: occupied, free, occluded")
+        colors = np.full((256, 3), _OCCLUDED_COLOR, np.uint8)
+        with self.lock:
+            for each in self._classes:
+                colors[each.id] = each.color
+            order = self._order()
+            rows, *place = np.nonzero(np.isin(self._store['state'][order], [_STATES[word] for word in words]))
+            rows = order[rows]
+            voxels = np.empty(len(rows), _VOXEL)
+            for axis, within in zip('xyz', place[::-1]):
+                voxels[axis] = (_EDGE * self._store[axis][rows].astype(float) + within + 0.5) * (self._resolution or 0.0)
+            for name in ('label', 'state', *_VALUES):
+                voxels[name] = self._store[name][(rows, *place)]
+        for channel, name in enumerate(('red', 'green', 'blue')):
+            voxels[name] = np.where(voxels['state'] == _STATES['free'], _FREE_COLOR[channel], colors[voxels['label'], channel])
+        return voxels
+
+    def _indices(self) -> np.ndarray:
+        return np.stack([self._store[axis][:len(self._rows)] for axis in 'xyz'], axis=1)
+
+    def _order(self) -> np.ndarray:
+        return np.lexsort(self._indices().T)
+
+    def _find(self, indices: np.ndarray) -> np.ndarray:
+        """The row of each block in the store, or -1."""
+        if len(self._rows) == 0:
+            return np.full(len(indices), -1)
+        if self._finder is None:
+            own = self._indices().astype(np.int64)
+            axes = [np.unique(own[:, axis]) for axis in range(3)]
+            numbers = _number(axes, own)[0]
+            order = np.argsort(numbers)
+            self._finder = axes, numbers[order], order
+        axes, numbers, order = self._finder
+        wanted, may_exist = _number(axes, indices)
+        at = np.minimum(np.searchsorted(numbers, wanted), len(numbers) - 1)
+        return np.where(may_exist & (numbers[at] == wanted), order[at], -1)
+
+
+class _Subscription:
+    """Feeds a follower from a topic, and asks for the whole map when updates were missed."""
+
+    def __init__(self, follower: OccupancyFollower, topic: str, publish_map: Optional[str], patience: float) -> None:
+        import rospy  # ROS is needed only here
+        from bki_mapping.msg import OccupancyMap, OccupancyUpdate
+        kinds = {kind._type: kind for kind in (OccupancyUpdate, OccupancyMap)}
+        published = dict(rospy.get_published_topics()).get(rospy.resolve_name(topic))
+        expected = OccupancyMap._type if topic.rstrip('/').endswith('occupancy') else OccupancyUpdate._type
+        if (published or expected) not in kinds:
+            raise ValueError(f"topic '{topic}' is of type {published}; follow occupancy_updates or occupancy of a mapper")
+        self._ros, self._follower, self._topic, self._service = rospy, follower, topic, publish_map
+        self._kind = _raw(kinds[published or expected])
+        self._patience, self._closed = patience, False
+        self._subscriber = self._connect()
+        if self._kind._type == OccupancyUpdate._type:
+            threading.Thread(target=self._recover, daemon=True).start()
+
+    def _connect(self) -> Any:
+        return self._ros.Subscriber(self._topic, self._kind, lambda message: self._follower.update(message.content), queue_size=1000)
+
+    def _recover(self) -> None:
+        """Requests the whole map as long as it is needed. A thread of its own, because callbacks must not wait."""
+        follower = self._follower
+        while True:
+            with follower.lock:  # a new subscriber, and one that has asked, gets the map in a moment
+                if follower._changed.wait_for(lambda: self._closed or follower._in_sync, self._patience):
+                    follower._changed.wait_for(lambda: self._closed or not follower._in_sync)
+                if self._closed:
+                    return
+            if self._subscriber.get_num_connections() > 0:
+                self._request()
+
+    def _request(self) -> None:
+        if self._service is None:
+            self._subscriber.unregister()
+            self._subscriber = self._connect()
+            if self._closed:
+                self._subscriber.unregister()
+            return
+        from std_srvs.srv import Empty
+        try:
+            self._ros.ServiceProxy(self._service, Empty)()
+        except self._ros.ServiceException as fault:
+            self._ros.logwarn_throttle(10.0, f'{self._topic}: updates were missed, and the whole map cannot be requested: {fault}')
+
+    def close(self) -> None:
+        with self._follower.lock:
+            self._closed = True
+            self._follower._changed.notify_all()
+        self._subscriber.unregister()
+
+
+def _keys_of(blocks: np.ndarray) -> list:
+    return list(zip(*(blocks[axis].tolist() for axis in 'xyz')))
+
+
+def _number(axes: list, indices: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """A number for each index, from its positions among the coordinates that occur along each axis; and whether all occur."""
+    numbers, occur = np.zeros(len(indices), np.int64), np.ones(len(indices), bool)
+    for axis, known in enumerate(axes):
+        at = np.minimum(np.searchsorted(known, indices[:, axis]), len(known) - 1)
+        occur &= known[at] == indices[:, axis]
+        numbers = numbers * len(known) + at
+    return numbers, occur
+
+
+def _checked(content: _Content) -> _Content:
+    if content.block_edge != _EDGE:
+        raise ValueError(f'the message has blocks of {content.block_edge} voxels along an edge, not of {_EDGE}; use the package of '
+                         'the mapper')
+    if not content.resolution > 0:
+        raise ValueError('the message has a resolution that is not above 0')
+    # The parameter as the user wrote it, which the message rounds to single precision.
+    return content._replace(resolution=float(str(np.float32(content.resolution))))
+
+
+def _content_of(message: Any) -> _Content:
+    """Of a message as ROS makes it, or of anything with the same fields."""
+    blocks = np.zeros(len(message.blocks), BLOCK)
+    for to, block in zip(blocks, message.blocks):
+        to['x'], to['y'], to['z'] = block.x, block.y, block.z
+        for name in BLOCK.names[3:]:
+            values = getattr(block, name)
+            values = np.frombuffer(values, np.uint8) if isinstance(values, (bytes, bytearray)) else np.asarray(values)
+            if values.size != _VOXELS:
+                raise ValueError(f'the message has {values.size} values of {name} for the {_VOXELS} voxels of a block')
+            to[name] = values.reshape(to[name].shape)
+    is_update = hasattr(message, 'sequence')
+    removed = [(block.x, block.y, block.z) for block in message.removed] if is_update else []
+    header = message.header
+    return _checked(_Content(
+        header.stamp.secs * 10**9 + header.stamp.nsecs, header.frame_id, message.sequence if is_update else None,
+        bool(message.whole) if is_update else True, message.resolution, message.block_edge,
+        tuple(OccupancyClass(c.id, c.name, (c.red, c.green, c.blue), bool(c.dynamic)) for c in message.classes),
+        blocks, np.array(removed, np.int32).reshape(-1, 3)))
+
+
+class _Reader:
+    """Reads the values of a serialised message one after the other."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._at = data, 0
+
+    def next(self, layout: str) -> tuple:
+        values = struct.unpack_from('<' + layout, self._data, self._at)
+        self._at += struct.calcsize('<' + layout)
+        return values
+
+    def text(self) -> str:
+        length, = self.next('I')
+        return self.next(f'{length}s')[0].decode(errors='replace')
+
+    def array(self, kind: np.dtype) -> np.ndarray:
+        count, = self.next('I')
+        values = np.frombuffer(self._data, kind, count, self._at)
+        self._at += values.nbytes
+        return values
+
+
+def decode(data: bytes, is_update: bool = True) -> _Content:
+    """Read a serialised bki_mapping/OccupancyUpdate or, with is_update=False, OccupancyMap; many times as fast as ROS's own code in
+    Python, which makes an object of each number. OccupancyFollower.update takes the result.
+
+    Raises ValueError if the message is cut off or inconsistent.
+    """
+    read = _Reader(data)
+    try:
+        _, seconds, nanoseconds = read.next('III')
+        frame = read.text()
+        sequence, whole = read.next('QB') if is_update else (None, True)
+        resolution, block_edge = read.next('fI')
+        classes = []
+        for _ in range(read.next('I')[0]):
+            id_, = read.next('B')
+            name = read.text()
+            red, green, blue, dynamic = read.next('4B')
+            classes.append(OccupancyClass(id_, name, (red, green, blue), bool(dynamic)))
+        blocks = read.array(BLOCK)
+        removed = read.array(np.dtype(('<i4', 3))) if is_update else np.zeros((0, 3), np.int32)
+    except (struct.error, ValueError):
+        raise ValueError('the message is cut off, or of another type') from None
+    return _checked(_Content(seconds * 10**9 + nanoseconds, frame, sequence, bool(whole), resolution, block_edge, tuple(classes),
+                             blocks, removed.reshape(-1, 3)))
+
+
+def _raw(kind: Any) -> Any:
+    """A type that is, for ROS, the given type of message, but keeps only its content."""
+    is_update = 'sequence' in kind.__slots__
+
+    class Raw(kind):
+        def deserialize(self, data):
+            self.content = decode(data, is_update)
+            return self
+    return Raw
