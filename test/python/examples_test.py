@@ -30,15 +30,29 @@ class Examples(unittest.TestCase):
             map_ = bki_mapping.load(os.path.join(folder, 'street.bkm'))
             self.assertIn('4 scans, median', said)
             self.assertIn(f'{len(map_.voxels())} occupied voxels', said)
-            run(sys.executable, os.path.join(EXAMPLES, 'draw_section.py'), 'street.bkm', '--z', '-0.8', '--output', 'section.png')
-            for name, class_name in (('street.png', 'road'), ('section.png', 'building')):
+            draw = (sys.executable, os.path.join(EXAMPLES, 'draw_section.py'), 'street.bkm')
+            said = run(*draw, '--z', '-0.8', '--output', 'section.png')
+            self.assertIn(self.clearances(map_, -0.8), said)
+            run(*draw, '--line', '0', '-15', '0', '15', '--output', 'across.png')
+            for name, class_name in (('street.png', 'road'), ('section.png', 'building'), ('across.png', 'road')):
                 picture = image.imread(os.path.join(folder, name))[..., :3]
                 self.assertGreater(min(picture.shape[:2]), 200)
                 drawn = {tuple(color) for color in np.rint(255 * picture.reshape(-1, 3)).astype(int)}
                 self.assertIn(map_.classes[class_name].color, drawn, name)
+                self.assertEqual((68, 1, 84) in drawn, name != 'street.png', 'the colour of distance 0')
+            nothing = subprocess.run([*draw, '--z', '40'], cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+            self.assertRegex(nothing.stderr, r'^nothing is known in this section; the map reaches from \[.*\] to \[.*\] m\n$')
             wrong = subprocess.run([sys.executable, os.path.join(EXAMPLES, 'map_sequence.py'), '/no/such'], capture_output=True, text=True,
                                    timeout=60, check=False)
             self.assertNotEqual(wrong.returncode, 0)
+
+    def clearances(self, map_, z):
+        """What draw_section prints, from the obstacle that is nearest to each voxel."""
+        section = map_.horizontal_section(z, *map_.bounds[:, :2])
+        centres, free = section.centres, section.states == bki_mapping.FREE
+        solid = map_.classes.all_but([c for c in map_.classes if 'ground' in c.flags])
+        far = map_.nearest_obstacles(centres[free], solid)['distance'] > 1.0
+        return f'{free.sum()} free, {far.sum()} of them more than 1 m'
 
     def test_blocks_of_the_documents(self):
         """What README.md and docs/python.md show runs as it stands, block after block."""
