@@ -285,7 +285,11 @@ py::dtype structType(const std::vector<Field>& fields, std::size_t bytes) {
   py::list names, formats, offsets;
   for (const Field& field : fields) {
     names.append(field.name);
-    formats.append(field.format);
+    if (field.count == 1) {
+      formats.append(field.format);
+    } else {
+      formats.append(py::make_tuple(field.format, field.count));
+    }
     offsets.append(field.offset);
   }
   return py::dtype(names, formats, offsets, static_cast<py::ssize_t>(bytes));

@@ -137,11 +137,13 @@ py::array ownedArray(std::vector<T> values, const py::dtype& type) {
                    kept.data(), base);
 }
 
-/// A field of a structured array: its name, its format, and where it lies in the struct.
+/// A field of a structured array: its name, its format, where it lies in the struct, and of how many values
+/// it is an array.
 struct Field {
   const char* name;
   const char* format;
   std::size_t offset;
+  int count = 1;
 };
 py::dtype structType(const std::vector<Field>& fields, std::size_t bytes);
 

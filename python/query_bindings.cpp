@@ -64,7 +64,7 @@ py::array castAll(const FixedMap& map, py::handle origins, py::handle directions
   using H = RayHit;
   return ownedArray(std::move(hits), structType({{"end", "u1", offsetof(H, end)},
                                                  {"label", "u1", offsetof(H, label)},
-                                                 {"voxel", "(3,)i4", offsetof(H, voxel)},
+                                                 {"voxel", "i4", offsetof(H, voxel), 3},
                                                  {"length", "f8", offsetof(H, length)},
                                                  {"first_unknown", "f8", offsetof(H, first_unknown)}},
                                                 sizeof(H)));
@@ -107,7 +107,7 @@ py::array contentsAs(const FixedMap& map, std::size_t count, py::handle order, R
                                                     {"is_free", "?", offsetof(C, is_free)},
                                                     {"is_known", "?", offsetof(C, is_known)},
                                                     {"worst", "u1", offsetof(C, worst)},
-                                                    {"classes", "(256,)?", offsetof(C, classes)}},
+                                                    {"classes", "?", offsetof(C, classes), 256}},
                                                    sizeof(C)));
 }
 
@@ -169,7 +169,7 @@ py::array nearest(const FixedMap& map, py::handle object, py::handle classes, py
   }
   using N = NearestRecord;
   return ownedArray(std::move(records), structType({{"distance", "f8", offsetof(N, distance)},
-                                                    {"voxel", "(3,)i4", offsetof(N, voxel)},
+                                                    {"voxel", "i4", offsetof(N, voxel), 3},
                                                     {"label", "u1", offsetof(N, label)}},
                                                    sizeof(N)));
 }
@@ -267,7 +267,7 @@ py::object frontiersOf(const FixedMap& map, py::handle min_size, py::handle retu
   using F = FrontierRecord;
   py::array found = ownedArray(
       std::move(records),
-      structType({{"centre", "(3,)f8", offsetof(F, centre)}, {"size", "i8", offsetof(F, size)}}, sizeof(F)));
+      structType({{"centre", "f8", offsetof(F, centre), 3}, {"size", "i8", offsetof(F, size)}}, sizeof(F)));
   if (!with_voxels) return std::move(found);
   return py::make_tuple(found, indexArray(voxels));
 }
