@@ -173,10 +173,11 @@ double numberOf(py::handle object, const std::string& name) {
 }
 
 std::size_t countOf(py::handle object, const std::string& name) {
-  const auto count = isInteger(object) ? PyNumber_AsSsize_t(object.ptr(), nullptr) : py::ssize_t{-1};
+  const auto count =
+      isInteger(object) ? PyNumber_AsSsize_t(object.ptr(), PyExc_OverflowError) : py::ssize_t{-1};
   if (count < 0) {
     PyErr_Clear();
-    throw std::invalid_argument(name + " must be an integer, 0 or more");
+    throw std::invalid_argument(name + " must be an integer, 0 or more, of at most 63 bits");
   }
   return static_cast<std::size_t>(count);
 }
@@ -185,6 +186,11 @@ bool truthOf(py::handle object, const std::string& name) {
   const std::string type = typeName(object);
   if (type == "bool" || type == "bool_") return PyObject_IsTrue(object.ptr()) == 1;
   throw py::type_error(name + " must be True or False, not " + type);
+}
+
+std::string textOf(py::handle object, const std::string& name) {
+  if (py::isinstance<py::str>(object)) return py::cast<std::string>(object);
+  throw py::type_error(name + " must be a str, not " + typeName(object));
 }
 
 Eigen::Vector2d pairOf(py::handle object, const std::string& name) {

@@ -107,6 +107,7 @@ class Numbers {
 double numberOf(py::handle object, const std::string& name);
 std::size_t countOf(py::handle object, const std::string& name);
 bool truthOf(py::handle object, const std::string& name);
+std::string textOf(py::handle object, const std::string& name);
 /// Two numbers, which may be infinite or NaN.
 Eigen::Vector2d pairOf(py::handle object, const std::string& name);
 /// Three numbers, which may be infinite or NaN.

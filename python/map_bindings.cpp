@@ -13,6 +13,7 @@
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/map_query.h"
+#include "class_bindings.h"
 #include "io/export_file.h"
 #include "query_bindings.h"
 
@@ -52,14 +53,15 @@ py::array voxels(const FixedMap& map, py::handle states) {
                                sizeof(V)));
 }
 
-void exportTo(const FixedMap& map, py::handle path, py::handle states, double min_z, double max_z,
-              const std::string& height) {
+void exportTo(const FixedMap& map, py::handle path, py::handle states, py::handle min_z, py::handle max_z,
+              py::handle height) {
   ExportOptions options;
   options.states = parseStates(wordsOf(states, "states"));
-  options.columns.min_z = min_z;
-  options.columns.max_z = max_z;
-  options.columns.reference = parseHeightReference(height);
-  if (!(min_z <= max_z)) throw std::invalid_argument("min_z must not be above max_z");
+  options.columns.min_z = numberOf(min_z, "min_z");
+  options.columns.max_z = numberOf(max_z, "max_z");
+  options.columns.reference = parseHeightReference(textOf(height, "height"));
+  if (!(options.columns.min_z <= options.columns.max_z))
+    throw std::invalid_argument("min_z must not be above max_z");
   const std::string file = pathOf(path, "path");
   const py::gil_scoped_release release;
   checkExport(file);
@@ -87,8 +89,14 @@ py::array planesOf(const py::object& self) {
   return viewOf(self, data, {count, kBlockEdge, kBlockEdge, kBlockEdge});
 }
 
-py::array planeOf(const py::object& self, int id) {
-  const std::vector<ClassId>& classes = py::cast<const MapBlock&>(self).block->classes();
+py::array planeOf(const py::object& self, py::handle of_class) {
+  const auto& block = py::cast<const MapBlock&>(self);
+  const bool is_free = PyIndex_Check(of_class.ptr()) != 0 && py::int_(int{kFreeClass}).equal(of_class);
+  const std::vector<ClassId> ids = is_free ? std::vector<ClassId>{kFreeClass}
+                                           : orderOf(block.map->stored.info.classes, of_class, "class_");
+  if (ids.size() != 1) throw std::invalid_argument("class_ must be one class");
+  const ClassId id = ids.front();
+  const std::vector<ClassId>& classes = block.block->classes();
   const auto found = std::find(classes.begin(), classes.end(), id);
   if (found == classes.end()) {
     throw std::invalid_argument("the block has no plane of class " + std::to_string(id) +
@@ -120,9 +128,10 @@ void addBlock(py::module& m) {
           "planes", &planesOf,
           "The evidence of each class of `classes` at each voxel: (classes, 8, 8, 8), int32, by class, z, y, "
           "x, in units of EVIDENCE_UNIT. A read-only view; nothing is copied.")
-      .def("plane", &planeOf, py::arg("class_id"),
-           "The plane of one class: (8, 8, 8), int32, by z, y, x. A read-only view.\n\nRaises ValueError if "
-           "the block has none.")
+      .def("plane", &planeOf, py::arg("class_"),
+           "The plane of a class, or of FREE_CLASS: (8, 8, 8), int32, by z, y, x. A read-only "
+           "view.\n\nclass_: a name, "
+           "an id or a SemanticClass.\n\nRaises ValueError if the block has no such plane.")
       .def("__repr__", [](const MapBlock& b) {
         return "<bki_mapping.Block (" + std::to_string(b.index.x) + ", " + std::to_string(b.index.y) + ", " +
                std::to_string(b.index.z) + ")>";

@@ -151,16 +151,17 @@ bool areInMap(const std::string& points_in) {
 }
 
 ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels,
-                        std::uint64_t stamp, const std::string& points_in, bool labels_are_ids,
+                        py::handle scan_stamp, py::handle points_in, py::handle labels_are_ids,
                         bool withdraws) {
-  const bool in_map = areInMap(points_in);
+  const std::uint64_t stamp = countOf(scan_stamp, "stamp");
+  const bool in_map = areInMap(textOf(points_in, "points_in"));
   const Pose pose = poseOf(origin);
   const Points given(points, "points");
   const Labels classes(labels, "labels");
   ScanView scan;
   scan.origin = pose.origin;
   scan.labels = {classes.data(), classes.size()};
-  scan.labels_are_ids = labels_are_ids;
+  scan.labels_are_ids = truthOf(labels_are_ids, "labels_are_ids");
   scan.stamp = stamp;
   return alone(self, [&] {
     std::vector<Eigen::Vector3f> relative;
@@ -181,12 +182,12 @@ ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::
   });
 }
 
-ScanStats integrate(Mapper& self, py::handle origin, py::handle points, py::handle labels,
-                    std::uint64_t stamp, const std::string& points_in, bool labels_are_ids) {
+ScanStats integrate(Mapper& self, py::handle origin, py::handle points, py::handle labels, py::handle stamp,
+                    py::handle points_in, py::handle labels_are_ids) {
   return addOrWithdraw(self, origin, points, labels, stamp, points_in, labels_are_ids, false);
 }
-ScanStats withdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels, std::uint64_t stamp,
-                   const std::string& points_in, bool labels_are_ids) {
+ScanStats withdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels, py::handle stamp,
+                   py::handle points_in, py::handle labels_are_ids) {
   return addOrWithdraw(self, origin, points, labels, stamp, points_in, labels_are_ids, true);
 }
 

@@ -183,6 +183,7 @@ py::array query(const FixedMap& map, py::handle object, py::handle fields) {
       });
     } catch (const std::invalid_argument&) {
       readPoints(map.states, span, {});  // throws as well, and numbers the point among all of them
+      throw;
     }
   });
   return result;

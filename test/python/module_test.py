@@ -259,6 +259,14 @@ class Queries(unittest.TestCase):
         self.assertRaises(ValueError, planes.setflags, write=True)
         np.testing.assert_allclose(block.origin, np.array(block.index) * 8 * self.map.resolution)
         self.assertIsNone(self.map.block((1000, 0, 0)))
+        for index in self.map.blocks:
+            block = self.map.block(index)
+            for n, class_id in enumerate(block.classes):
+                keys = [class_id, int(class_id)]
+                if class_id != bki.FREE_CLASS:
+                    keys += [self.map.classes[class_id], self.map.classes[class_id].name]
+                for key in keys:
+                    np.testing.assert_array_equal(block.plane(key), block.planes[n])
 
     def test_a_snapshot_stays(self):
         mapper = mapper_with_wall()
@@ -375,7 +383,12 @@ class WrongInput(WithFolder):
                     ((TypeError, ValueError), 'origin must be three numbers', ('here', points, labels)),
                     (ValueError, 'the pose must be a rotation and a translation', (bad_pose, points, labels)),
                     (ValueError, 'the pose must be a rotation and a translation', (nan_pose, points, labels)),
-                    (ValueError, "points_in is 'car', but must be sensor or map", ((0, 0, 0), points, labels, 0, 'car'))):
+                    (ValueError, "points_in is 'car', but must be sensor or map", ((0, 0, 0), points, labels, 0, 'car')),
+                    (TypeError, 'points_in must be a str, not int', ((0, 0, 0), points, labels, 0, 1)),
+                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, -1)),
+                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, 1.5)),
+                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, 2**80)),
+                    (TypeError, 'labels_are_ids must be True or False, not str', ((0, 0, 0), points, labels, 0, 'map', 'no'))):
                 with self.subTest(words=words, arguments=arguments):
                     self.refused(error, words, lambda: call(*arguments))
         self.assertEqual(evidence_of(mapper.map), before)
@@ -415,7 +428,14 @@ class WrongInput(WithFolder):
         self.refused(ValueError, 'must be three integers', lambda: map_.block((0, 0)))
         self.refused(ValueError, 'must be three integers', lambda: map_.block((0.5, 0, 0)))
         self.refused(ValueError, 'must be three integers', lambda: map_.block((2**40, 0, 0)))
-        self.refused(ValueError, 'has no plane of class 77', lambda: map_.block(map_.blocks[0]).plane(77))
+        block = map_.block(map_.blocks[0])
+        self.refused(ValueError, 'has no class 77', lambda: block.plane(77))
+        self.refused(ValueError, "has no class 'cars'", lambda: block.plane('cars'))
+        self.refused(ValueError, r'has no plane of class \d+; see Block.classes', lambda: block.plane('bicycle'))
+        self.refused(ValueError, 'class_ must be one class', lambda: block.plane(['car', 'road']))
+        self.refused(TypeError, 'class_ must be a class', lambda: block.plane(1.5))
+        self.refused(TypeError, 'min_z must be a number, not str', lambda: map_.export(self.path('a.yaml'), min_z='low'))
+        self.refused(TypeError, 'height must be a str, not int', lambda: map_.export(self.path('a.yaml'), height=1))
         self.refused(KeyError, "has no class 'cars'", lambda: map_.classes['cars'])
         self.refused(ValueError, 'must end in .bkm', lambda: map_.save(self.path('a.ply')))
         self.refused(ValueError, 'must end in .ply, .pcd', lambda: map_.export(self.path('a.obj')))
