@@ -9,9 +9,10 @@
 Needs NumPy, and neither ROS nor the C++ library; ROS is loaded by subscribe(). docs/ros.md describes the topics.
 """
 import collections
+import operator
 import struct
 import threading
-from typing import Any, Iterable, NamedTuple, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
@@ -56,10 +57,15 @@ class OccupancyFollower:
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self._changed = threading.Condition(self.lock)
-        self._in_sync, self._missed, self._sequence = False, 0, None
-        self._stamp, self._frame, self._resolution, self._classes = 0, '', None, ()
-        self._store, self._rows, self._finder = np.zeros(0, BLOCK), {}, None
-        self._subscription = None
+        self._in_sync, self._missed = False, 0
+        self._sequence: Optional[int] = None
+        self._stamp, self._frame = 0, ''
+        self._resolution: Optional[float] = None
+        self._classes: Tuple[OccupancyClass, ...] = ()
+        self._store = np.zeros(0, BLOCK)  # blocks, and room for more
+        self._rows: Dict[Tuple[int, int, int], int] = {}  # where the block with an index is
+        self._finder: Any = None
+        self._subscription: Optional[_Subscription] = None
 
     # The state of the map.
 
@@ -111,7 +117,7 @@ class OccupancyFollower:
                 if content.sequence is None and self._in_sync:
                     return False  # may be older than the last update
                 self._replace(content)
-            elif self._in_sync and content.sequence == self._sequence + 1:
+            elif self._in_sync and self._sequence is not None and content.sequence == self._sequence + 1:
                 self._change(content)
             else:
                 if self._in_sync and content.sequence != self._sequence:
@@ -200,8 +206,12 @@ class OccupancyFollower:
     def block(self, index: Iterable[int]) -> Optional[np.void]:
         """A copy of the block with an index, of dtype BLOCK: state, label, probability, occupancy and class_probability are
         (8, 8, 8), by z, y, x. None if the map has no such block."""
+        try:
+            x, y, z = map(operator.index, index)
+        except (TypeError, ValueError):
+            raise ValueError('index must be three integers') from None
         with self.lock:
-            row = self._rows.get(tuple(int(i) for i in index))
+            row = self._rows.get((x, y, z))
             return None if row is None else self._store[row].copy()
 
     def query(self, points: Any) -> np.ndarray:
@@ -229,7 +239,7 @@ class OccupancyFollower:
             rows = self._find(voxels // _EDGE)
             known = rows >= 0
             place = (rows[known], *(voxels[known] % _EDGE).T[::-1])
-            for name in _SAID.names:
+            for name in ('state', 'label', *_VALUES):
                 said[name][known] = self._store[name][place]
         return said
 
@@ -363,7 +373,7 @@ def _content_of(message: Any) -> _Content:
     blocks = np.zeros(len(message.blocks), BLOCK)
     for to, block in zip(blocks, message.blocks):
         to['x'], to['y'], to['z'] = block.x, block.y, block.z
-        for name in BLOCK.names[3:]:
+        for name in ('state', 'label', *_VALUES):
             values = getattr(block, name)
             values = np.frombuffer(values, np.uint8) if isinstance(values, (bytes, bytearray)) else np.asarray(values)
             if values.size != _VOXELS:

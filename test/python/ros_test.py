@@ -249,6 +249,8 @@ class WrongInput(unittest.TestCase):
                 ('the message is cut off, or of another type', lambda: decode(data[:12] + b'\xff\xff\xff\xff' + data[16:])),
                 ('point 1 of 2 has a coordinate that is not finite', lambda: follower.query([[0, 0, 0], [0, np.inf, 0]])),
                 (r'points must be an array of numbers of shape \(N, 3\)', lambda: follower.query([0, 0, 0])),
+                ('index must be three integers', lambda: follower.block((1, 2))),
+                ('index must be three integers', lambda: follower.block((1, 2, 0.5))),
                 ("voxel state 'full' is unknown; known states: occupied, free, occluded", lambda: follower.voxels('full')),
                 ('there is no map yet; wait for one', lambda: OccupancyFollower().query([[0, 0, 0]]))):
             with self.subTest(words=words):
