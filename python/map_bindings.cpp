@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
@@ -56,15 +57,18 @@ py::array voxels(const FixedMap& map, py::handle states) {
 void exportTo(const FixedMap& map, py::handle path, py::handle states, py::handle min_z, py::handle max_z,
               py::handle height) {
   ExportOptions options;
-  options.states = parseStates(wordsOf(states, "states"));
+  if (!states.is_none()) options.states = options.html.states = parseStates(wordsOf(states, "states"));
+  options.html.frame = map.stored.info.frame;
+  options.html.drives = map.stored.drives;
   options.columns.min_z = numberOf(min_z, "min_z");
   options.columns.max_z = numberOf(max_z, "max_z");
   options.columns.reference = parseHeightReference(textOf(height, "height"));
   if (!(options.columns.min_z <= options.columns.max_z))
     throw std::invalid_argument("min_z must not be above max_z");
   const std::string file = pathOf(path, "path");
+  options.html.name = std::filesystem::path(file).stem().string();
   const py::gil_scoped_release release;
-  checkExport(file);
+  checkExport(file, options);
   exportFile(file, map.stored.map, *map.stored.info.classes, options);
 }
 
@@ -231,10 +235,11 @@ void addMap(py::module& m) {
            "Write a map file (.bkm), which holds all evidence without loss; an old file is replaced once the "
            "new one is complete.\n\nRaises ValueError for another ending, MapFileError if the file cannot be "
            "written.")
-      .def("export", &exportTo, py::arg("path"), py::arg("states") = "occupied",
+      .def("export", &exportTo, py::arg("path"), py::arg("states") = py::none(),
            py::arg("min_z") = ColumnRules().min_z, py::arg("max_z") = ColumnRules().max_z,
            py::arg("height") = "map",
-           "Write a file for other programs: .ply or .pcd, the voxels in `states` as points; .ot or .bt, an "
+           "Write a file for other programs: .ply or .pcd, the voxels in `states` as points (default: "
+           "occupied); .html, a page for browsers with the voxels in `states` (default: all); .ot or .bt, an "
            "OctoMap; .yaml, with an image .pgm beside it, for map_server, with obstacles from min_z to max_z "
            "[m] above the origin of the map frame (height 'map') or the ground (height 'ground').\n\nRaises "
            "ValueError for another ending, RuntimeError if the file cannot be written.")
