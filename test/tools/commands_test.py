@@ -43,8 +43,12 @@ LEFT_OUT = {
     **dict.fromkeys(('cmake -S . -B build-install -DCMAKE_BUILD_TYPE=Release -DBKI_MAPPING_ROS=OFF -DBUILD_TESTING=OFF '
                      '-DCMAKE_INSTALL_PREFIX=$HOME/bki', 'cmake --build build-install -j2 --target install',
                      'cmake -S examples -B build-examples -DCMAKE_PREFIX_PATH=$HOME/bki', 'cmake --build build-examples -j2',
-                     'build-examples/map_drive street.bkm', 'build-examples/ask_map street.bkm 4 6.1 2', 'build-examples/change_map'),
+                     'build-examples/map_drive street.bkm', 'build-examples/ask_map street.bkm 4 6.1 2', 'build-examples/change_map',
+                     'build-examples/plan_path street.bkm semantic_kitti 4 0 0 12 1 0'),
                     'builds for minutes; scripts/test builds the examples against an installation'),
+    **dict.fromkeys(('build-examples/plan_path street.bkm semantic_kitti 2 -5.3 0 48 8 0 > path.csv',
+                     'python3 examples/draw_path.py street.bkm path.csv --output path.png'), 'path_test runs them'),
+    'rosrun octomap_server octomap_server_node ~/street.bt _frame_id:=map': 'not in Debian',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.
