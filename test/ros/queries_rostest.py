@@ -303,6 +303,7 @@ class Queries(MapperTest):
             ('get_section', {'start': Point(1, 1, 0), 'end': Point(0, 2, 0)}, 'inside out; give'),
             ('get_section', {'start': Point(0, 0, NAN), 'end': Point(1, 1, 0)}, 'not finite; give'),
             ('get_section', {'start': Point(-5e4, -5e4, 0), 'end': Point(5e4, 5e4, 0)}, r'\d+ cells; make it smaller'),
+            ('get_section', {'start': Point(-1e7, 0, 0), 'end': Point(1e7, 0, 0)}, '20000001 cells; make it smaller, 4000000 are'),
             ('get_section', {'vertical': True, 'start': here, 'end': Point(0, 0, 5)}, 'the same; give two that differ'),
             ('get_distances', {'points': [here]}, 'max_distance is not a number > 0; give'),
             ('get_distances', {'points': [here], 'max_distance': INF}, r'has inf voxels; lower'),

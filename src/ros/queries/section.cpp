@@ -17,9 +17,10 @@ void checkSize(const GetSection::Request& asked, double resolution) {
   const double width = asked.vertical ? sides.head<2>().norm() : sides.x(),
                height = asked.vertical ? sides.z() : sides.y();
   const double cells = (width / resolution + 1.0) * (height / resolution + 1.0);
-  if (width > 0.0 && height > 0.0 && cells > GetSection::Request::MOST_CELLS) {
+  if (width >= 0.0 && height >= 0.0 && cells > GetSection::Request::MOST_CELLS) {
     throw std::invalid_argument("the section has " + numberText(std::round(cells)) +
-                                " cells; make it smaller, 4000000 are the most");
+                                " cells; make it smaller, " +
+                                std::to_string(GetSection::Request::MOST_CELLS) + " are the most");
   }
 }
 
