@@ -1,5 +1,7 @@
 #include "parallel/thread_pool.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -33,19 +35,24 @@ int threadCount(int setting) {
   return setting > 0 ? setting : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-ThreadPool::ThreadPool(int setting) : ranges_(static_cast<std::size_t>(threadCount(setting))) {
+ThreadPool::ThreadPool(int setting)
+    : ranges_(static_cast<std::size_t>(threadCount(setting))), process_(getpid()) {
   for (int worker = 1; worker < threadCount(setting); ++worker) {
-    helpers_.emplace_back([this, worker] { help(static_cast<std::size_t>(worker)); });
+    helpers_->threads.emplace_back([this, worker] { help(static_cast<std::size_t>(worker)); });
   }
 }
 
 ThreadPool::~ThreadPool() {
+  if (getpid() != process_) {  // a child would wait without end for threads that it does not have
+    static_cast<void>(helpers_.release());
+    return;
+  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
   }
-  begun_.notify_all();
-  for (std::thread& helper : helpers_) helper.join();
+  helpers_->begun.notify_all();
+  for (std::thread& helper : helpers_->threads) helper.join();
 }
 
 void ThreadPool::work(std::size_t worker) {
@@ -66,14 +73,14 @@ void ThreadPool::help(std::size_t worker) {
     const auto ready = [&] { return stop_ || round_ != seen; };
     if (!spinUntil(ready)) {
       std::unique_lock<std::mutex> lock(mutex_);
-      begun_.wait(lock, ready);
+      helpers_->begun.wait(lock, ready);
     }
     if (stop_) return;
     seen = round_;
     work(worker);
     if (--busy_ == 0) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      finished_.notify_one();
+      helpers_->finished.notify_one();
     }
   }
 }
@@ -86,18 +93,18 @@ void ThreadPool::run(std::size_t jobs, std::size_t parts, Call call, void* calla
     ranges_[s].next = std::min(s, parts) * jobs / parts;
     ranges_[s].end = std::min(s + 1, parts) * jobs / parts;
   }
-  if (jobs > 1 && !helpers_.empty()) {
-    busy_ = helpers_.size();
+  if (jobs > 1 && !helpers_->threads.empty() && getpid() == process_) {
+    busy_ = helpers_->threads.size();
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       ++round_;
     }
-    begun_.notify_all();
+    helpers_->begun.notify_all();
     work(0);
     const auto done = [&] { return busy_ == 0; };
     if (!spinUntil(done)) {
       std::unique_lock<std::mutex> lock(mutex_);
-      finished_.wait(lock, done);
+      helpers_->finished.wait(lock, done);
     }
   } else {
     work(0);

@@ -1,11 +1,14 @@
 /// @file A thread pool for independent jobs: the only code of the core that starts threads.
 #pragma once
 
+#include <sys/types.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <type_traits>
@@ -20,7 +23,8 @@ int threadCount(int setting);
 /// fetch lines in pairs.
 constexpr std::size_t kThreadsApart = 128;
 
-/// A fixed set of threads. Idle threads spin for a moment, so that the next call starts fast, then sleep.
+/// A fixed set of threads. Idle threads spin for a moment, so that the next call starts fast, then sleep. A
+/// process forks without them: in the child, the calling thread does all jobs.
 class ThreadPool {
  public:
   /// @param setting number of threads, the caller's among them; 0 means all cores.
@@ -30,7 +34,7 @@ class ThreadPool {
   ThreadPool& operator=(const ThreadPool&) = delete;
 
   /// Threads that take jobs, the caller's among them.
-  std::size_t count() const { return helpers_.size() + 1; }
+  std::size_t count() const { return helpers_->threads.size() + 1; }
 
   /// Calls job(j, worker) for each j in [0, jobs), and returns when all are done. Jobs must be independent of
   /// each other; `worker` in [0, count()) identifies the thread. Each thread starts with its own consecutive
@@ -77,10 +81,16 @@ class ThreadPool {
   std::atomic<std::size_t> busy_{0};     ///< helpers that have not finished this round
   std::atomic<std::uint64_t> round_{0};  ///< incremented by each call that needs the helpers
   std::atomic<bool> stop_{false};
+  /// The threads but for the caller's, and what they and it wait for.
+  struct Helpers {
+    std::vector<std::thread> threads;
+    std::condition_variable begun, finished;
+  };
+
   std::mutex mutex_;  ///< guards `failure_` and the two conditions
-  std::condition_variable begun_, finished_;
   std::exception_ptr failure_;
-  std::vector<std::thread> helpers_;
+  std::unique_ptr<Helpers> helpers_ = std::make_unique<Helpers>();
+  pid_t process_;  ///< that has the helpers
 };
 
 }  // namespace bki_mapping

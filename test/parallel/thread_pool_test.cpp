@@ -1,8 +1,11 @@
 // A ThreadPool does every job once, rethrows exceptions, and stays usable; an OrderedQueue keeps the order.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -95,6 +98,31 @@ TEST(ThreadPool, WakesFromSleep) {
     pool.forEach(10, [&](std::size_t, std::size_t) { ++done; });
     EXPECT_EQ(done, 10);
   }
+}
+
+TEST(ThreadPool, AForkedProcessDoesItsJobsAlone) {
+  auto pool = std::make_unique<ThreadPool>(4);
+  std::atomic<int> done{0};
+  const auto work = [&] { pool->forEach(100, [&](std::size_t, std::size_t) { ++done; }); };
+  work();
+  for (const auto pause :
+       {std::chrono::milliseconds(0), std::chrono::milliseconds(20)}) {  // spinning, asleep
+    std::this_thread::sleep_for(pause);
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(10);  // rather than hang
+      done = 0;
+      work();
+      pool.reset();
+      _exit(done == 100 ? 0 : 1);
+    }
+    int status = -1;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  }
+  done = 0;
+  work();
+  EXPECT_EQ(done, 100) << "the parent still has its threads";
 }
 
 TEST(OrderedQueue, TakesEachPieceInOrderAsSoonAsPossible) {

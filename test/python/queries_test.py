@@ -3,6 +3,8 @@
 import gc
 import itertools
 import math
+import os
+import signal
 import sys
 import threading
 import time
@@ -500,6 +502,22 @@ class Threads(WithMap):
         for result in results:
             for own, other in zip(result, expected):
                 np.testing.assert_array_equal(own, other)
+
+    def test_forked_processes_ask_alone(self):
+        """As those of multiprocessing do."""
+        points = self.points(30_000)
+        expected = self.map.states(points).tobytes()
+        mapper = mapper_of(1)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(20)  # rather than hang
+            mapper.integrate((0, 0, 0), *scene(3))
+            same = self.map.states(points).tobytes() == expected and len(mapper.map.cast_rays((0, 0, 0), points)) == len(points)
+            del mapper
+            gc.collect()
+            os._exit(0 if same else 1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        self.assertEqual(self.map.states(points).tobytes(), expected)
 
     def test_number_of_threads_changes_nothing(self):
         points = self.points(30_000)
