@@ -60,7 +60,7 @@ class RayWalk {
     std::array<std::int32_t, 3> face;
     std::array<double, 3> at;
     for (std::size_t a = 0; a < 3; ++a) {
-      face[a] = ((index_[a] >> shift) + 1) << shift;
+      face[a] = ((index_[a] >> shift) + 1) * (1 << shift);
       at[a] = faceAt(a, face[a]);
     }
     entered_ = std::min({at[0], at[1], at[2]});
