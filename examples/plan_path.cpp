@@ -13,6 +13,7 @@
 #include <iostream>
 #include <queue>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -132,6 +133,12 @@ int main(int argc, char** argv) try {
   }
   const StoredMap stored = loadMapWithGains(argv[1]);
   const ClassTable classes = loadClassTable(argv[2]);  // with costs, which map files do not have
+  for (const SemanticClass& each : stored.info.classes->classes()) {
+    const SemanticClass* const own = classes.find(each.id);
+    if (own && own->name == each.name) continue;
+    throw std::invalid_argument("the class table lacks class '" + each.name +
+                                "' of the map; give the map's own table");
+  }
   Eigen::AlignedBox3d area;
   for (const DriveRecord& drive : stored.drives) area.extend(drive.bounds);
   const Street street(stored.map, classes, area);

@@ -146,7 +146,13 @@ ClassFilter filterOf(const SharedTable& table, py::handle classes) {
   if (classes.is_none()) return ClassFilter::all();
   if (py::isinstance<TableFilter>(classes)) {
     const auto& given = py::cast<const TableFilter&>(classes);
-    if (given.table->name() != table->name()) {
+    const std::vector<SemanticClass>& theirs = given.table->classes();
+    const bool same = theirs.size() == table->size() &&
+                      std::all_of(theirs.begin(), theirs.end(), [&](const SemanticClass& each) {
+                        const SemanticClass* const own = table->find(each.id);
+                        return own && own->name == each.name;
+                      });
+    if (given.table->name() != table->name() || !same) {
       throw std::invalid_argument("the filter is of class table '" + given.table->name() + "', the map of '" +
                                   table->name() + "'; make it from Map.classes");
     }

@@ -321,8 +321,12 @@ class _Subscription:
                     follower._changed.wait_for(lambda: self._closed or not follower._in_sync)
                 if self._closed:
                     return
-            if self._subscriber.get_num_connections() > 0:
-                self._request()
+            try:
+                if self._subscriber.get_num_connections() > 0:
+                    self._request()
+            except (AttributeError, self._ros.ROSException):  # unsubscribed, or shut down, meanwhile
+                if not (self._closed or self._ros.is_shutdown()):
+                    raise
 
     def _request(self) -> None:
         if self._service is None:

@@ -64,7 +64,7 @@ void RecentMap::keep(Shared snapshot) noexcept {
   }
   if (!snapshot) return;
   try {
-    asking_.addCallback(ros::CallbackInterfacePtr(new Release(std::move(snapshot))));
+    freeing_.addCallback(ros::CallbackInterfacePtr(new Release(std::move(snapshot))));
   } catch (const std::bad_alloc&) {  // then it is freed here
   }
 }

@@ -37,11 +37,11 @@ class RecentMap {
   using Shared = std::shared_ptr<const QueriedMap>;
 
   /// @param take takes a snapshot; for the mapping thread. @param mapping the queue that this thread serves.
-  /// @param asking the queue that the threads of the queries serve; they also free snapshots.
+  /// @param freeing the queue of the thread that frees snapshots.
   /// @param interest how long snapshots are taken after a query.
-  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& asking,
+  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& freeing,
             Clock::duration interest = std::chrono::seconds(10))
-      : take_(std::move(take)), mapping_(mapping), asking_(asking), interest_(interest) {}
+      : take_(std::move(take)), mapping_(mapping), freeing_(freeing), interest_(interest) {}
 
   /// The map as it was after its last change. For the threads of queries.
   /// @throws std::bad_alloc, and std::future_error when the server shuts down.
@@ -58,7 +58,7 @@ class RecentMap {
 
   std::function<Shared()> take_;
   ros::CallbackQueue& mapping_;
-  ros::CallbackQueue& asking_;
+  ros::CallbackQueue& freeing_;
   Clock::duration interest_;
   std::atomic<Clock::time_point> last_asked_{Clock::time_point()};
   std::mutex mutex_;

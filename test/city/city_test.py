@@ -25,7 +25,7 @@ SOURCE = pathlib.Path(os.environ['BKI_MAPPING_SOURCE_DIR'])
 BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
 sys.path.insert(0, str(SOURCE / 'python'))
 from bki_mapping.city.description import CityError, read_city  # noqa: E402
-from bki_mapping.city.plan import sums_of  # noqa: E402
+from bki_mapping.city.plan import pieces_of, sums_of  # noqa: E402
 
 DRIVES = {'d1': (0, 0), 'd2': (12, 40), 'd3': (35, -20), 'd4': (-30, 10), 'd5': (5, 5), 'd6': (60, 30)}
 SCANS = 5
@@ -175,7 +175,8 @@ class Made(unittest.TestCase):
                 ('drives: [{sequence: d1}, {sequence: x/d1}]', "gives two drives the name 'd1'"),
                 ('{drives: [{sequence: d1}], piece_scans: 0}', 'piece_scans in '),
                 ('{drives: [{sequence: d1}], set: 3}', 'is no mapping of parameters'),
-                ('{drives: [{sequence: d1}], classes: 3}', 'classes in ')):
+                ('{drives: [{sequence: d1}], classes: 3}', 'classes in '),
+                ('{drives: [{sequence: d1}], config: 3}', 'config in ')):
             path.write_text(text)
             with self.assertRaises(CityError, msg=text) as raised:
                 read_city(path)
@@ -183,6 +184,24 @@ class Made(unittest.TestCase):
         path.write_text('drives: [{sequence: d1}]')
         with self.assertRaisesRegex(CityError, "has no drive 'x' to leave out; it has d1"):
             read_city(path, without=['x'])
+
+    def test_pieces_change_with_what_they_are_made_of(self):
+        table = self.folder / 'table.yaml'
+        shutil.copy(SOURCE / 'config/classes/semantic_kitti.yaml', table)
+        city = self.describe(['d1'], classes='table.yaml')
+
+        def files():
+            read = read_city(city)
+            return [piece.file for piece in pieces_of(read, read.drives[0])]
+        before = files()
+        self.assertEqual(len(before), 3)
+        self.assertEqual(files(), before)
+        os.utime(self.folder / 'd1/labels/000002.label', (1, 1))
+        self.assertEqual([a == b for a, b in zip(files(), before)], [True, False, True])
+        before = files()
+        with open(table, 'a') as file:
+            file.write('# changed\n')
+        self.assertFalse(set(files()) & set(before))
 
     def test_sums_are_trees(self):
         files = [f'piece {n}' for n in range(300)]

@@ -28,12 +28,12 @@ class RecentMapTest : public testing::Test {
     return asked.get();
   }
   RecentMap make(RecentMap::Clock::duration interest) {
-    return RecentMap([this] { return take(); }, mapping_, asking_, interest);
+    return RecentMap([this] { return take(); }, mapping_, freeing_, interest);
   }
 
   const ClassTable classes_{"one", {SemanticClass()}};
   SemanticMap map_{GridGeometry(1.0), 0.001, 1};
-  ros::CallbackQueue mapping_, asking_;
+  ros::CallbackQueue mapping_, freeing_;
   int scans_ = 0, taken_ = 0;
   bool no_memory_ = false;
 };
@@ -52,19 +52,19 @@ TEST_F(RecentMapTest, IsTakenOnlyWhileQueriesAreAsked) {
   EXPECT_EQ(recent.get().get(), recent.get().get());
 }
 
-TEST_F(RecentMapTest, IsGivenUpAndFreedByTheThreadsOfQueries) {
+TEST_F(RecentMapTest, IsGivenUpAndFreedByItsOwnThread) {
   RecentMap recent = make(std::chrono::seconds(-1));  // idle at once
   std::weak_ptr<const QueriedMap> kept = askAndServe(recent);
   EXPECT_FALSE(kept.expired());
   mapScan(recent);
   EXPECT_EQ(taken_, 1);
   EXPECT_FALSE(kept.expired());
-  asking_.callAvailable();
+  freeing_.callAvailable();
   EXPECT_TRUE(kept.expired());
   kept = askAndServe(recent);
   EXPECT_EQ(taken_, 2);
   recent.releaseIfIdle();
-  asking_.callAvailable();
+  freeing_.callAvailable();
   EXPECT_TRUE(kept.expired());
 }
 

@@ -31,9 +31,10 @@ def dask_client(workers=0, scheduler=None):
                 stack.enter_context(cluster)
                 scheduler = cluster
             try:
-                yield stack.enter_context(distributed.Client(scheduler, timeout=30))
+                client = stack.enter_context(distributed.Client(scheduler, timeout=30))
             except OSError as error:
                 raise CityError(f'the Dask scheduler {scheduler} does not answer: {error}') from None
+            yield client
 
 
 class Builder:
@@ -104,7 +105,11 @@ class Builder:
         futures = {self.client.submit(*call, pure=False, retries=0): task for task, call in tasks}
         done = []
         for future in as_completed(futures):
-            task, found = futures[future], future.result()
+            task = futures[future]
+            try:
+                found = future.result()
+            except OSError as error:  # of the worker, such as a full disk
+                found = {'fault': str(error)}
             if 'fault' in found and (must or self.disk_is_full()):
                 self.client.cancel(list(futures))
                 remedy = ('; the disk is full: free space, and run the same command with --resume' if self.disk_is_full()
@@ -126,8 +131,9 @@ class Builder:
             if f'regions/{path.name}' not in kept:
                 path.unlink()
         shutil.rmtree(self.folder / 'sums', ignore_errors=True)
-        for path in (self.folder / 'pieces').glob('*/.*.bkm*'):
-            path.unlink()
+        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*'):
+            for path in self.folder.glob(pattern):
+                path.unlink()
 
 
 def write_whole(path, text):

@@ -55,8 +55,11 @@ def read_city(path, add=(), without=()) -> City:
     settings = text.get('set', {})
     if not isinstance(settings, dict):
         raise CityError(f'set in {path} is no mapping of parameters to values')
-    config = text.get('config', '')
-    return City(tuple(drives[name] for name in sorted(drives)), text_of(text, 'classes', 'semantic_kitti', path),
+    config = text_of(text, 'config', '', path) if 'config' in text else ''
+    classes = text_of(text, 'classes', 'semantic_kitti', path)
+    if (path.parent / classes).is_file():
+        classes = str((path.parent / classes).absolute())
+    return City(tuple(drives[name] for name in sorted(drives)), classes,
                 str((path.parent / config).absolute()) if config else '',
                 tuple(sorted(f'{key}={scalar(value)}' for key, value in settings.items())),
                 count_of(text, 'piece_scans', 200, path), count_of(text, 'region_tiles', 16, path))
@@ -99,14 +102,13 @@ def scalar(value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def scans_of(drive: Drive) -> List[int]:
-    """The numbers of a sequence's scans, sorted. Raises CityError."""
+def scans_of(drive: Drive) -> Dict[int, pathlib.Path]:
+    """The files of a sequence's scans by their numbers, sorted. Raises CityError."""
     for folder, suffix in (('velodyne', '.bin'), ('pcd', '.pcd')):
         try:
-            names = [each.stem for each in (drive.folder / folder).iterdir() if each.suffix == suffix]
+            files = [each for each in (drive.folder / folder).iterdir() if each.suffix == suffix and each.stem.isdigit()]
         except OSError:
             continue
-        numbers = sorted(int(name) for name in names if name.isdigit())
-        if numbers:
-            return numbers
+        if files:
+            return dict(sorted((int(each.stem), each) for each in files))
     raise CityError(f'{drive.folder} holds no scans; it needs velodyne/*.bin, or pcd/*.pcd')

@@ -46,16 +46,16 @@ def stamps_of(paths: Iterable[pathlib.Path]) -> List:
 
 def pieces_of(city: City, drive: Drive) -> List[Piece]:
     """Raises CityError if the drive has no scans."""
-    numbers = scans_of(drive)
-    kind = ('velodyne', '.bin') if (drive.folder / 'velodyne').is_dir() else ('pcd', '.pcd')
-    names = {int(each.stem): each.name for each in (drive.folder / kind[0]).iterdir() if each.stem.isdigit()}
+    files = scans_of(drive)
+    numbers = list(files)
     shared = stamps_of(drive.folder / name for name in ('poses.txt', 'calib.txt', 'times.txt'))
-    settings = [city.classes, stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings]
+    settings = [city.classes, stamps_of([pathlib.Path(city.classes)]), stamps_of([pathlib.Path(city.config)]) if city.config else None,
+                city.settings]
     pieces = []
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
-        scans = stamps_of(drive.folder / kind[0] / names[number] for number in some)
-        labels = stamps_of(drive.folder / drive.labels / f'{pathlib.Path(names[number]).stem}.label' for number in some)
+        scans = stamps_of(files[number] for number in some)
+        labels = stamps_of(drive.folder / drive.labels / f'{files[number].stem}.label' for number in some)
         key = digest(drive.name, str(drive.folder), drive.labels, shared, settings, scans, labels)
         pieces.append(Piece(drive, some[0], len(some), f'pieces/{drive.name}/{some[0]:06d}-{key}.bkm'))
     return pieces

@@ -35,7 +35,7 @@ class DistanceSection : public MapPublisher {
     const DistanceSectionConfig& config = snapshot.config.distance_section;
     const GridGeometry& geometry = snapshot.map.geometry();
     const std::optional<SectionRegion> region = regionOf(config, geometry, snapshot.sensor);
-    if (!region) return;
+    if (!region) return field_.reset();  // it would miss what changes meanwhile
     const StateMap states(snapshot.map, snapshot.threadsFor(snapshot.map.size()));
     bring(states, region->field, obstaclesOf(config, snapshot.classes));
     publisher_.publish(message(snapshot, states, *region));

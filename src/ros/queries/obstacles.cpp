@@ -1,3 +1,4 @@
+#include <chrono>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -17,7 +18,16 @@ void query(const QueriedMap& map, const GetNearestObstacles::Request& asked,
   const double most = asked.max_distance == 0.0 ? kInfinity : asked.max_distance;
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   answer.header = map.header;
+  // Where the map has no such class, each point takes a look at every block.
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end =
+      Clock::now() + std::chrono::seconds(GetNearestObstacles::Request::MOST_SECONDS);
   for (std::size_t n = 0; n < count; ++n) {
+    if (Clock::now() > end) {
+      throw std::invalid_argument("the call takes more than " +
+                                  std::to_string(GetNearestObstacles::Request::MOST_SECONDS) +
+                                  " s; set max_distance, or split it");
+    }
     std::optional<NearestObstacle> found;
     try {
       found = nearestObstacle(map.states, toVector(asked.points[n]), classes, most);
