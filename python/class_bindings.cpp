@@ -81,7 +81,7 @@ constexpr char kClassesHelp[] =
 void addFilter(py::module& m) {
   py::class_<TableFilter>(
       m, "ClassFilter",
-      "A set of classes of a table, as queries take it. Made by ClassTable.only and ClassTable.all_but.")
+      "A set of classes of a table, for queries. Made by ClassTable.only and ClassTable.all_but.")
       .def_property_readonly(
           "ids",
           [](const TableFilter& f) {
@@ -171,15 +171,16 @@ void addClasses(py::module& m) {
           "color", [](const SemanticClass& c) { return py::make_tuple(c.color[0], c.color[1], c.color[2]); },
           "Red, green and blue, 0 to 255.")
       .def_readonly("raw", &SemanticClass::raw, "Labels of the data set that mean this class.")
-      .def_property_readonly("flags", &flagsOf,
-                             "Those of the file: unlabelled, dynamic, living, ground, ignored.")
+      .def_property_readonly(
+          "flags", &flagsOf,
+          "Flags of the class in the table's file: unlabelled, dynamic, living, ground, ignored.")
       .def("__repr__", [](const SemanticClass& c) {
         return "<bki_mapping.SemanticClass " + std::to_string(c.id) + ": '" + c.name + "'>";
       });
   addFilter(m);
   using Table = std::shared_ptr<ClassTable>;
-  py::class_<ClassTable, Table>(
-      m, "ClassTable", "Which classes a data set has, and which labels stand for them. Does not change.")
+  py::class_<ClassTable, Table>(m, "ClassTable",
+                                "The classes of a data set, and the labels that stand for them. Immutable.")
       .def(py::init([](py::handle name_or_file) {
              return std::make_shared<ClassTable>(loadClassTable(pathOf(name_or_file, "name_or_file")));
            }),

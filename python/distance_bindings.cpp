@@ -93,15 +93,15 @@ std::string description(SharedField& self) {
 }
 
 constexpr char kRegionHelp[] =
-    "lower, upper: corners of a box [m], (3,); the field has all voxels that overlap it, at most 100 "
-    "million, "
-    "and 16384 along an axis, at 12 bytes a voxel. Obstacles outside do not count: add to the box the "
-    "distance up to which you need it.\n";
+    "lower, upper: corners of a box, map frame [m], (3,). The field has all voxels that overlap it: at most "
+    "100 million, and 16384 along an axis, at 12 bytes per voxel. Obstacles outside the box do not count: "
+    "enlarge it by the greatest distance that you need.\n";
 constexpr char kFieldHelp[] =
     "The exact signed distance to the nearest obstacle at every voxel of a box, made by Map.distance_field. "
-    "Between centres of voxels [m]; in obstacles the resolution minus the distance to the nearest voxel that "
-    "is none: 0 in their outermost voxels, negative behind them. Infinite without an obstacle in the box, "
-    "minus infinite without anything else. Threads may share a field; their calls wait for each other.";
+    "It is measured between centres of voxels [m]. In obstacles it is the resolution minus the distance to "
+    "the nearest voxel that is no obstacle: 0 in their outermost voxels, negative behind them. It is "
+    "infinite if the box has no obstacle, and minus infinity if it has nothing else. Threads may share a "
+    "field; their calls wait for each other.";
 
 }  // namespace
 
@@ -109,7 +109,7 @@ void addDistances(py::module& m, MapClass& map) {
   py::class_<SharedField>(m, "DistanceField", kFieldHelp)
       .def_property_readonly(
           "values", &values,
-          "The distance at the centre of every voxel [m]: (layers, rows, columns), that is by z, y, x, "
+          "The distance at the centre of every voxel [m]: (layers, rows, columns), that is, by z, y, x, "
           "float32. A read-only view; nothing is copied. `update` changes what it shows; `compute` leaves it "
           "as it is.")
       .def_property_readonly(
@@ -118,7 +118,8 @@ void addDistances(py::module& m, MapClass& map) {
             const Eigen::Vector3d origin = alone(self, [&] { return originOf(*self.field); });
             return py::array_t<double>(3, origin.data());
           },
-          "The corner of the first voxel, the one with the smallest coordinates [m]: (3,), float64.")
+          "The lower corner of the first voxel, which has the smallest coordinates, map frame [m]: (3,), "
+          "float64.")
       .def_property_readonly(
           "resolution",
           [](SharedField& self) { return alone(self, [&] { return self.field->resolution(); }); },
@@ -129,15 +130,16 @@ void addDistances(py::module& m, MapClass& map) {
            "(N,), and gradients [m/m], (N, 3), float32; NaN for points outside of the box or not finite. "
            "Where one of the eight is infinite, so is the distance, and the gradient is 0.")
       .def("update", &update, py::arg("map"), py::arg("blocks"),
-           "Make this the field of a newer map, equal to a new field to the bit, in less time if few blocks "
-           "have changed.\n\nmap: a Map of the same resolution.\nblocks: indices of the blocks that may have "
-           "changed since, (N, 3), such as SemanticMapper.touched_blocks of each scan; those outside of the "
-           "box are ignored.\n\nRaises ValueError if the resolution differs.")
+           "Bring the field up to date with a newer map. The result equals a new field to the bit, and takes "
+           "less time if few blocks have changed.\n\nmap: a Map of the same resolution.\nblocks: indices of "
+           "the blocks that may have changed since, (N, 3), such as SemanticMapper.touched_blocks of each "
+           "scan; "
+           "those outside of the box are ignored.\n\nRaises ValueError if the resolution differs.")
       .def("compute", &compute, py::arg("map"), py::arg("lower"), py::arg("upper"),
-           (std::string("Make this the field of another box, which may have moved with the robot, in the "
-                        "memory that it has: much of a new field's time goes into memory. Keep no array of "
-                        "`values`, or it takes new memory.\n\n") +
-            kRegionHelp + "\nRaises ValueError as Map.distance_field; the field is then unchanged.")
+           (std::string("Compute the field of another box, for example one that moves with the robot. This "
+                        "reuses the field's memory, and so saves much of the time of a new field, unless "
+                        "you still hold an array of `values`.\n\n") +
+            kRegionHelp + "\nRaises ValueError like Map.distance_field; the field is then unchanged.")
                .c_str())
       .def("__repr__", &description);
   map.def("distance_field", &makeField, py::arg("lower"), py::arg("upper"), py::arg("classes") = py::none(),
@@ -147,9 +149,9 @@ void addDistances(py::module& m, MapClass& map) {
            kRegionHelp +
            "classes: those that are obstacles: None (all), a name, an id, a list of them, or a ClassFilter "
            "such as street.classes.all_but('road').\n"
-           "unknown: whether unknown and occluded voxels are obstacles, too.\n\n"
+           "unknown: whether unknown and occluded voxels are obstacles as well.\n\n"
            "Raises ValueError if the box is not finite, inside out, too large or beyond the grid, or a class "
-           "is unknown; MemoryError if the memory does not suffice.")
+           "is unknown; MemoryError if there is not enough memory.")
               .c_str());
 }
 

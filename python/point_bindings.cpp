@@ -236,24 +236,24 @@ void addPoints(MapClass& map) {
       .def("labels", &valuesAt<&PointValues::labels>, py::arg("points"),
            "The class id of each occupied voxel; FREE_CLASS elsewhere; (N,), uint8.")
       .def("probabilities", &valuesAt<&PointValues::probability>, py::arg("points"),
-           "The probability of the class that `labels` gives, which is that of free where no class is given; "
-           "(N,), float32.")
+           "The expected probability of the voxel's class if it is occupied, otherwise of free; (N,), "
+           "float32.")
       .def("variances", &valuesAt<&PointValues::variance>, py::arg("points"),
            "The variance of `probabilities` under the posterior; (N,), float32.")
       .def("occupancies", &valuesAt<&PointValues::occupancy>, py::arg("points"),
            "The probability that something, of any class, is there: 0 to 0.91; (N,), float32.")
       .def("class_probabilities", &valuesAt<&PointValues::class_probability>, py::arg("points"),
-           "The probability of the likeliest class, given that something is there; (N,), float32.")
+           "The probability of the most likely class, given that something is there; (N,), float32.")
       .def("posterior", &posterior, py::arg("points"),
            "The expected probability of every class, in the order of the class table, and, last, of free; "
            "(N, number of classes + 1), float32. Rows sum to 1.")
       .def("query", &query, py::arg("points"),
            py::arg("fields") =
                py::make_tuple("state", "label", "probability", "variance", "occupancy", "class_probability"),
-           "All that the map says of each voxel, in one pass: (N,), structured.\n\nfields: those of the "
+           "Several values of each voxel, read in one pass: (N,), structured.\n\nfields: those of the "
            "result, a list or joined by commas: state, label, probability, variance, occupancy, "
-           "class_probability as the functions above, evidence (the sum over all classes and free) and "
-           "entropy (of the expected class distribution [nat]; takes logarithms, and so much longer).\n\n"
+           "class_probability (as from the functions above), evidence (the sum over all classes and free), "
+           "entropy (of the expected distribution over all classes and free [nat]; slow to compute).\n\n"
            "Raises ValueError for an unknown field.");
 }
 

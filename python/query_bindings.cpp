@@ -211,8 +211,8 @@ void addSection(py::module& m) {
     return [member](const Section& s) { return py::array_t<double>(3, (s.*member).data()); };
   };
   py::class_<Section>(m, "Section",
-                      "A grid of square cells of the map's resolution, through the map. A cell says what the "
-                      "voxel is at its centre.")
+                      "A horizontal or vertical grid of square cells through the map, with its resolution. A "
+                      "cell has the state and label of the voxel at its centre.")
       .def_property_readonly(
           "states",
           [](const py::object& self) {
@@ -229,11 +229,11 @@ void addSection(py::module& m) {
           "The class id of each occupied cell; FREE_CLASS elsewhere: (rows, columns), uint8. A read-only "
           "view.")
       .def_property_readonly("origin", vectorAt(&Section::origin),
-                             "The corner of cell [0, 0] [m]: (3,), float64.")
+                             "The corner of cell [0, 0], map frame [m]: (3,), float64.")
       .def_property_readonly("right", vectorAt(&Section::right),
-                             "The direction of rising columns, of length 1: (3,), float64.")
+                             "Unit vector in the direction of increasing columns, map frame: (3,), float64.")
       .def_property_readonly("up", vectorAt(&Section::up),
-                             "The direction of rising rows, of length 1: (3,), float64.")
+                             "Unit vector in the direction of increasing rows, map frame: (3,), float64.")
       .def_readonly("resolution", &Section::resolution, "Edge of a cell [m].")
       .def_property_readonly("centres", &centresOf,
                              "The centre of each cell, map frame [m]: (rows, columns, 3), float64. Computed "
@@ -284,10 +284,10 @@ void addQueries(py::module& m, MapClass& map) {
       classes, py::arg("stop_at_unknown") = false,
       "Follow rays through the map, to the first occupied voxel.\n\n"
       "origins: map frame [m], (N, 3), or one for all rays, (3,).\n"
-      "directions: of any length above 0, (N, 3).\n"
-      "max_length: of the rays [m], 0 or more; a number, or one for each. Infinite rays end where the map "
-      "does.\n"
-      "classes: those at which rays stop; they pass through others. None (all), a name, an id, a list of "
+      "directions: in the map frame, of any length above 0, (N, 3).\n"
+      "max_length: maximum length of the rays [m], 0 or more; a number, or one for each. Infinite rays end "
+      "where the map does.\n"
+      "classes: those at which rays stop; they pass through all others. None (all), a name, an id, a list of "
       "them, or a ClassFilter.\n"
       "stop_at_unknown: whether rays also stop at unknown and occluded voxels.\n\n"
       "Returns (N,), structured: end (RAY_NOTHING, RAY_OCCUPIED or RAY_UNKNOWN), label (the class id if "
@@ -297,7 +297,7 @@ void addQueries(py::module& m, MapClass& map) {
       "Raises ValueError if a coordinate is not finite, a direction is 0, a length is negative or NaN, an "
       "origin lies beyond the grid, or a class is unknown.");
   constexpr char kContentHelp[] =
-      "order: classes, the worst first, for the field worst.\n\n"
+      "order: classes from the worst to the least bad, for the field worst.\n\n"
       "Returns (N,), structured, of the voxels that each shape overlaps: free, occupied and unknown (numbers "
       "of voxels; occluded ones are among the unknown), is_free (nothing occupied or unknown), is_known "
       "(nothing unknown), worst (the id of the first class of `order` that is present; FREE_CLASS without "
@@ -306,28 +306,30 @@ void addQueries(py::module& m, MapClass& map) {
       "more than 100 million voxels, or a class is unknown.";
   const auto content = [&](const char* text) { return std::string(text) + kContentHelp; };
   map.def("box_contents", &boxContents, py::arg("lower"), py::arg("upper"), order,
-          content("What is in boxes along the axes of the map.\n\n"
+          content("Count the voxels in boxes along the axes of the map frame, by state, and find their "
+                  "classes.\n\n"
                   "lower, upper: corners, map frame [m], (N, 3) each.\n")
               .c_str())
       .def("sphere_contents", &sphereContents, py::arg("centres"), py::arg("radii"), order,
-           content("What is in spheres.\n\n"
+           content("Count the voxels in spheres, by state, and find their classes.\n\n"
                    "centres: map frame [m], (N, 3).\n"
                    "radii: above 0 [m]; a number, or one for each.\n")
                .c_str())
       .def("contents_along", &pathContents, py::arg("poses"), py::arg("half_extents"),
            py::arg("centre") = py::make_tuple(0.0, 0.0, 0.0), order,
-           content("What is in the box of a vehicle at each pose of a path, or in boxes of any orientation. "
-                   "What it sweeps between two poses is not looked at: give poses a voxel or two apart.\n\n"
+           content("Count the voxels in the box of a vehicle at each pose of a path, or in boxes of any "
+                   "orientation, by state, and find their classes. What it sweeps between two poses is not "
+                   "checked: give poses a voxel or two apart.\n\n"
                    "poses: T_map_vehicle, rotation and translation [m], (N, 4, 4).\n"
                    "half_extents: half the length, width and height of the box [m], (3,), above 0.\n"
                    "centre: of the box, in the vehicle's frame [m], (3,).\n")
                .c_str())
       .def("nearest_obstacles", &nearest, py::arg("points"), classes, py::arg("max_distance") = kInfinity,
-           "The nearest occupied voxel to each point, by its centre. Exact; for many points of one region, a "
-           "distance field is faster.\n\n"
+           "Find the occupied voxel whose centre is nearest to each point. Exact; for many points close "
+           "together, a distance field is faster.\n\n"
            "points: map frame [m], (N, 3).\n"
            "classes: those that are obstacles: None (all), a name, an id, a list of them, or a ClassFilter.\n"
-           "max_distance: to the centre [m], 0 or more.\n\n"
+           "max_distance: greatest distance to the centre [m], 0 or more.\n\n"
            "Returns (N,), structured: distance (from the point to the centre [m]; infinite if there is none "
            "within max_distance), voxel (its index; its centre is (voxel + 0.5) * resolution) and label (its "
            "class id; FREE_CLASS if there is none).\n\n"
@@ -335,27 +337,28 @@ void addQueries(py::module& m, MapClass& map) {
            "or a class is unknown.")
       .def("horizontal_section", &horizontal, py::arg("z"), py::arg("lower"), py::arg("upper"),
            "The layer of voxels at a height, as a Section.\n\n"
-           "z: height [m].\n"
-           "lower, upper: corners of the area, x and y [m], (2,); the section has all voxels that overlap "
-           "it, at most 100 million.\n\n"
+           "z: height in the map frame [m].\n"
+           "lower, upper: corners of the area, x and y in the map frame [m], (2,); the section has all "
+           "voxels that overlap it, at most 100 million.\n\n"
            "Raises ValueError if a number is not finite, the area is inside out, or the section is too large "
            "or reaches beyond the grid.")
       .def("vertical_section", &vertical, py::arg("start"), py::arg("end"), py::arg("min_z"),
            py::arg("max_z"),
-           "A vertical plane on the line between two points, seen with `start` on the left, as a Section.\n\n"
-           "start, end: x and y [m], (2,); must differ.\n"
-           "min_z, max_z: heights [m]; the section has all layers of voxels between them, at most 100 "
-           "million cells.\n\n"
-           "Raises ValueError as horizontal_section.")
+           "The vertical plane through two points, seen with `start` on the left, as a Section.\n\n"
+           "start, end: x and y in the map frame [m], (2,); must differ.\n"
+           "min_z, max_z: heights in the map frame [m]; the section has all layers of voxels between them, "
+           "at most 100 million cells.\n\n"
+           "Raises ValueError like horizontal_section.")
       .def("frontiers", &frontiersOf, py::arg("min_size") = 1, py::arg("return_voxels") = false,
            "Where known free space ends: clusters of free voxels with an unknown or occluded one on at least "
            "one of six sides. Those that share a face, an edge or a corner form one cluster. The largest "
            "comes first.\n\n"
            "min_size: least number of voxels; smaller frontiers are left out.\n"
-           "return_voxels: whether to return the indices of their voxels, too.\n\n"
-           "Returns (N,), structured: centre (mean of the centres of the voxels [m], (3,)) and size (number "
-           "of voxels); with return_voxels, also the voxels of all frontiers one after the other, (sum of "
-           "sizes, 3), int32.\n\nRaises ValueError if min_size is negative.");
+           "return_voxels: whether to return the indices of their voxels as well.\n\n"
+           "Returns (N,), structured: centre (mean of the centres of its voxels, map frame [m], (3,)) and "
+           "size (number of voxels); with return_voxels, also the voxels of all frontiers one after the "
+           "other, "
+           "(sum of sizes, 3), int32.\n\nRaises ValueError if min_size is negative.");
   addDistances(m, map);
 }
 

@@ -6,7 +6,7 @@
     follower.wait(10.0)
     states = follower.query(points)['state']
 
-Needs NumPy, and neither ROS nor the C++ library; ROS is loaded by subscribe(). docs/ros.md describes the topics.
+Needs NumPy, but not the C++ library; only subscribe() needs ROS (rospy). docs/ros.md describes the topics.
 """
 import collections
 import operator
@@ -47,8 +47,8 @@ _Content = collections.namedtuple('_Content', 'stamp frame sequence whole resolu
 class OccupancyFollower:
     """The map of a mapper, rebuilt from its messages.
 
-    A message of occupancy_updates with `whole` replaces the map; any other one must have the number after the last one's, or it
-    is a gap: updates were missed. The map then stays as it was, and `in_sync` is False, until the whole map comes. A message of
+    A message of occupancy_updates with `whole` replaces the map; in any other one, `sequence` must be one more than in the
+    last. If not, updates were missed: the map stays as it was, and `in_sync` is False, until a whole map comes. A message of
     the topic occupancy, which has no number, replaces the map while it is not in sync.
 
     Threads may share a follower. Hold `lock` to ask several questions of the same map.
@@ -76,7 +76,7 @@ class OccupancyFollower:
 
     @property
     def sequence(self) -> Optional[int]:
-        """The number of the last update in the map; None if the map is of the topic occupancy, or there is none."""
+        """The number of the last update in the map; None if the map is from the topic occupancy, or there is no map."""
         return self._sequence
 
     @property
@@ -169,8 +169,8 @@ class OccupancyFollower:
 
         topic: occupancy_updates, or occupancy for whole maps only.
         publish_map: name of the mapper's service, such as 'mapping/publish_map', which is called if updates were missed; all
-        subscribers then receive the whole map. None: subscribes again instead, which works if nothing else in this process
-        subscribes to the topic, for ROS shares the connection.
+        subscribers then receive the whole map. None: subscribes again instead, which works only if nothing else in this process
+        subscribes to the topic, because ROS would share the connection.
         patience: time between two requests for the whole map [s].
 
         Raises ValueError for a topic of another type.
@@ -185,9 +185,12 @@ class OccupancyFollower:
         self._subscription = None
 
     def wait(self, timeout: float, sequence: Optional[int] = None) -> bool:
-        """Wait until the map is in sync, or, with the topic occupancy, has come; and holds an update, if given by its number.
+        """Wait until the map is in sync or, with the topic occupancy, has been received.
 
-        timeout: [s]. Returns whether that happened.
+        timeout: [s].
+        sequence: also wait for the update with this number.
+
+        Returns whether that happened in time.
         """
         def ready():
             comes_whole = self._resolution is not None and self._sequence is None
@@ -215,7 +218,7 @@ class OccupancyFollower:
             return None if row is None else self._store[row].copy()
 
     def query(self, points: Any) -> np.ndarray:
-        """What the map says of the voxels that contain points.
+        """Look up the voxels that contain points.
 
         points: map frame [m], (N, 3).
 
@@ -246,7 +249,7 @@ class OccupancyFollower:
     def voxels(self, states: Union[str, Iterable[str]] = 'occupied') -> np.ndarray:
         """The voxels in the given states ('occupied', 'free', 'occluded'; a list, or joined by commas).
 
-        Returns them structured, as bki_mapping.Map.voxels, with the centre x, y, z [m], the colour red, green, blue, and label,
+        Returns them structured, like bki_mapping.Map.voxels, with the centre x, y, z [m], the colour red, green, blue, and label,
         state, probability, occupancy and class_probability. Sorted by block. Raises ValueError for an unknown state.
         """
         words = states.split(',') if isinstance(states, str) else list(states)
@@ -416,8 +419,8 @@ class _Reader:
 
 
 def decode(data: bytes, is_update: bool = True) -> _Content:
-    """Read a serialised bki_mapping/OccupancyUpdate or, with is_update=False, OccupancyMap; many times as fast as ROS's own code in
-    Python, which makes an object of each number. OccupancyFollower.update takes the result.
+    """Read a serialised bki_mapping/OccupancyUpdate or, with is_update=False, OccupancyMap. This is many times as fast as ROS's own
+    Python code, which makes an object of each number. OccupancyFollower.update takes the result.
 
     Raises ValueError if the message is cut off or inconsistent.
     """
