@@ -259,8 +259,9 @@ if(CATKIN_ENABLE_TESTING)
   set_tests_properties(real_bag_rostest PROPERTIES COST 20)
   # Long, and on one processor: their limits of time are many times what they take.
   foreach(name soak hostile)
-    set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES COST 90)
+    set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES COST 90 LABELS long)
   endforeach()
+  set_tests_properties(commands_test PROPERTIES LABELS long)
   # They limit times, which another test at the same time would change.
   foreach(name publishing query_latency)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)
