@@ -12,7 +12,7 @@ endif()
 get_property(bki_mapping_rooms GLOBAL PROPERTY BKI_MAPPING_ROOMS)
 # Programs are made of these alone; they have no public headers.
 set(bki_mapping_private_rooms ${bki_mapping_rooms})
-list(FILTER bki_mapping_private_rooms INCLUDE REGEX "_(simulation|evaluation|tools|ros)$")
+list(FILTER bki_mapping_private_rooms INCLUDE REGEX "_(simulation|evaluation|tools|ros|costmap)$")
 set(bki_mapping_public_rooms ${bki_mapping_rooms})
 list(REMOVE_ITEM bki_mapping_public_rooms ${bki_mapping_private_rooms})
 

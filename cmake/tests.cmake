@@ -202,6 +202,7 @@ if(CATKIN_ENABLE_TESTING)
     test/ros/query_latency_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+  bki_mapping_unit_tests(costmap grid_copy)
   bki_mapping_unit_tests(ros cloud_conversion query_services recent_map scan_account scan_reader sensor_trajectory server_config)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
