@@ -39,6 +39,7 @@ LIBRARIES = {
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
+    'costmap/semantic_layer.cpp': ('costmap_2d/', 'dynamic_reconfigure/', 'pluginlib/', 'ros/', 'tf2/', 'tf2_ros/'),
     'tools': ('boost/program_options', 'nlohmann/', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
 }
 MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')
