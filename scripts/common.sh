@@ -72,7 +72,10 @@ say_progress() {
 build_targets() {
   local folder=$1 targets=()
   shift
-  if [ $# -gt 0 ]; then targets=(--target "$@"); fi
+  if [ $# -gt 0 ]; then
+    cmake "$folder" -DBKI_MAPPING_CHOSEN="$(IFS=';' && echo "$*")" >/dev/null
+    targets=(--target chosen)
+  fi
   cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | say_progress ||
     { grep -E -A 12 '(error|warning):' "$folder/build.log" | head -60; tail -20 "$folder/build.log"; return 1; } >&2
 }
