@@ -74,7 +74,7 @@ build_targets() {
   shift
   if [ $# -gt 0 ]; then
     cmake "$folder" -DBKI_MAPPING_CHOSEN="$(IFS=';' && echo "$*")" >/dev/null
-    targets=(--target chosen)
+    targets=(--target bki_mapping_chosen)
   fi
   cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | say_progress ||
     { grep -E -A 12 '(error|warning):' "$folder/build.log" | head -60; tail -20 "$folder/build.log"; return 1; } >&2
