@@ -303,7 +303,7 @@ class Viewer {
     this.showClasses(this.header.classes.map((c) => [c.id, on]));
   }
 
-  /// Takes over the section from its controls.
+  /// Takes over the cut from its controls.
   cut() {
     const {voxels} = this, {min, max} = this.header.bounds, top = Number(byId('top').value), bottom = Number(byId('bottom').value);
     voxels.layers = [bottom <= min[2] ? -1e9 : bottom, top >= max[2] + 1 ? 1e9 : top];

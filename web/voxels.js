@@ -3,7 +3,7 @@
 // Each tile is one draw call a state. Occupied voxels are cubes, of which only the three faces that look to the eye are drawn:
 // seven corners, each with the voxel's eight bytes, and six triangles. Instances would need less memory, but take ten times as
 // long where the processor draws, and waste the small ones of many graphics cards. Faces between occupied voxels are dropped, and
-// so are voxels without a free face, unless a section or a hidden class can lay them open. Free and occluded voxels are points:
+// so are voxels without a free face, unless a cut or a hidden class can lay them open. Free and occluded voxels are points:
 // between them one sees what lies behind. What is shown, how it is coloured and where it is cut are uniforms and textures of 256
 // colours: changing them builds nothing.
 'use strict';
