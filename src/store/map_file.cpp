@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "store/box_tiles.h"
 #include "store/database.h"
 #include "store/records.h"
 #include "store/schema.h"
@@ -15,7 +16,6 @@ namespace {
 
 /// Tiles farther out contain no voxel with a valid index, nor any neighbour of one.
 constexpr int kMostTileIndex = (1 << 22) + 1;
-constexpr int kTileEdge = Region::kEdge * kBlockEdge;
 static_assert(GridGeometry::kMaxCoordinate == double{1 << 22} * kTileEdge);
 
 // Statements that read the list of tiles. Their first columns are those that readEntry() reads.
