@@ -13,7 +13,7 @@ namespace bki_mapping::ros_interface {
 namespace {
 
 /// How long the thread waits for a callback [s]: with an empty queue, and while clouds wait for transforms.
-constexpr double kIdleWait = 0.1, kTransformWait = 0.005;
+constexpr double kScanWait = 0.1, kTransformWait = 0.005;
 
 }  // namespace
 
@@ -107,7 +107,7 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
 
 void MappingServer::work() {
   while (running_) {
-    queue_.callOne(ros::WallDuration(waiting_.size() == 0 ? kIdleWait : kTransformWait));
+    queue_.callOne(ros::WallDuration(waiting_.size() == 0 ? kScanWait : kTransformWait));
     // Handle messages first, so that every cloud is in waiting_ and counted. The limit keeps a flood of
     // messages from starving the mapper.
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
