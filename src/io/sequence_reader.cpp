@@ -156,8 +156,10 @@ std::string sixDigits(std::size_t number) {
 
 }  // namespace
 
-Sequence::Sequence(const std::string& folder, const std::string& labels) : folder_(folder), labels_(labels) {
-  const fs::path root(folder), poses_file = root / "poses.txt", times_file = root / "times.txt";
+Sequence::Sequence(const std::string& folder, const std::string& labels, const std::string& map_poses)
+    : folder_(folder), labels_(labels) {
+  const fs::path root(folder), times_file = root / "times.txt";
+  const fs::path poses_file = map_poses.empty() ? root / "poses.txt" : fs::path(map_poses);
   const fs::path pcd = root / "pcd", scans = root / "velodyne";
   std::vector<std::vector<double>> times;
   const bool timed = fs::exists(times_file);
@@ -172,6 +174,10 @@ Sequence::Sequence(const std::string& folder, const std::string& labels) : folde
   };
   if (fs::is_directory(pcd) && !fs::is_directory(scans)) {
     layout_ = SequenceLayout::kDynamicMap;
+    if (!map_poses.empty()) {
+      fail(map_poses + " cannot be used for " + pcd.string() +
+           ", whose files have the poses of their scans; leave it out");
+    }
     labelled_ = fs::is_directory(root / labels);
     if (!labelled_ && labels != "labels")
       fail((root / labels).string() + " is not a folder; give one with labels");
@@ -190,7 +196,7 @@ Sequence::Sequence(const std::string& folder, const std::string& labels) : folde
     const std::string what = poses_file.string() + " line " + std::to_string(number + 1);
     return Eigen::Isometry3d(T_camera_sensor.inverse() * rigid(numbers, what) * T_camera_sensor);
   };
-  const Eigen::Isometry3d T_first = pose(0, sixDigits(0));
+  const Eigen::Isometry3d T_first = map_poses.empty() ? pose(0, sixDigits(0)) : Eigen::Isometry3d::Identity();
   for (const auto& [number, name] : names) {
     addScan(number, name, T_first.inverse() * pose(number, name), secondsOf(number, name));
   }

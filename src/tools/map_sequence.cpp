@@ -31,6 +31,9 @@ po::options_description options() {
       "resume", text("FILE.bkm"), "continue the map in this file")(
       "drive", text("ID"),
       "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
+      "poses", text("FILE"),
+      "poses in the frame of the map, one line for each scan as in poses.txt; default: poses.txt, relative to "
+      "its first pose")(
       "include", text("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
       "points", text("FILE.pcd"),

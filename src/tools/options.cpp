@@ -154,7 +154,8 @@ po::options_description sequenceOptions() {
 
 Sequence openSequence(const po::variables_map& given) {
   if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
-  Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>());
+  Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>(),
+                    given.count("poses") ? given["poses"].as<std::string>() : "");
   const std::string gaps = sequence.gaps();
   if (!gaps.empty()) std::cerr << gaps << "; the others keep their poses and times\n";
   return sequence;

@@ -69,6 +69,16 @@ TEST_F(SequenceFolder, TheMapFrameIsTheFirstSensorFrame) {
   EXPECT_TRUE(sequence.read(1).T_map_sensor.translation().isApprox(Eigen::Vector3d(5, 0, 0), 1e-12));
 }
 
+TEST_F(SequenceFolder, PosesOfAnotherFileAreInTheMapFrame) {
+  replace("calib.txt", "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n");
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n");
+  replace("city.txt", "1 0 0 -2 0 1 0 -3 0 0 1 7\n1 0 0 -2 0 1 0 -3 0 0 1 9\n");
+  const Sequence sequence(folder_ / "drive", "labels", folder_ / "drive/city.txt");
+  EXPECT_TRUE(sequence.pose(0).translation().isApprox(Eigen::Vector3d(7, 2, 3), 1e-12));
+  EXPECT_TRUE(sequence.pose(1).translation().isApprox(Eigen::Vector3d(9, 2, 3), 1e-12));
+  EXPECT_TRUE(sequence.read(1).T_map_sensor.isApprox(sequence.pose(1)));
+}
+
 TEST_F(SequenceFolder, UpperHalfOfLabelsIsTheInstance) {
   const std::uint32_t labels[] = {40u | 7u << 16, 252u};
   replace("labels/000000.label", std::string(reinterpret_cast<const char*>(labels), sizeof(labels)));

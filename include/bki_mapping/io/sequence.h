@@ -29,7 +29,8 @@ enum class SequenceLayout {
 /// A folder with velodyne/NNNNNN.bin, LABELS/NNNNNN.label, poses.txt (3x4 row-major, camera frame of scan 0),
 /// calib.txt (Tr: sensor to camera) and, optionally, times.txt [s]; without it scans are 0.1 s apart. Line
 /// N + 1 of poses and times belongs to scan NNNNNN = N, even if earlier scans are missing. The map frame is
-/// the sensor's frame at the pose in the first line. Rotations are orthonormalised.
+/// the sensor's frame at the pose in the first line, or, with a file of poses in the map frame, the sensor's
+/// frame at the identity. Rotations are orthonormalised.
 ///
 /// Or a folder of the DynamicMap benchmark, with pcd/NNNNNN.pcd: points in the map frame, and the pose of the
 /// sensor in VIEWPOINT. LABELS and times.txt are optional there; without labels, all are 0.
@@ -38,10 +39,12 @@ class Sequence {
   /// Offset added to all times [ns], because time 0 means "the latest" to tf.
   static constexpr std::uint64_t kFirstStamp = 1000000000;
 
-  /// @param labels name of the folder with the labels, or an absolute path.
+  /// @param labels name of the folder with the labels, or an absolute path. @param map_poses file like
+  /// poses.txt, whose poses are in the map frame; "": poses.txt, relative to its first pose.
   /// @throws std::runtime_error in one sentence: a missing folder or file, a scan whose name is not a number,
   /// a value that is not a number, a singular or missing calibration, a scan without a pose or time.
-  explicit Sequence(const std::string& folder, const std::string& labels = "labels");
+  explicit Sequence(const std::string& folder, const std::string& labels = "labels",
+                    const std::string& map_poses = "");
 
   /// Number of scans that exist; the index `i` below runs over these, without gaps.
   std::size_t size() const { return poses_.size(); }
