@@ -16,7 +16,7 @@ target_link_libraries(bki_mapping_io PRIVATE pcl_common pcl_io yaml-cpp nlohmann
 target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 # In debug builds OctoMap would print what it writes to standard error.
 set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG)
-bki_mapping_room(simulation SOURCES drive_file.cpp lidar.cpp scene.cpp street.cpp voxel_truth.cpp LINK bki_mapping_io)
+bki_mapping_room(simulation SOURCES city.cpp drive_file.cpp lidar.cpp scene.cpp street.cpp street_parts.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation)
@@ -27,7 +27,7 @@ function(bki_mapping_tool target)
   target_link_libraries(${target} PRIVATE bki_mapping_tools ${ARGN})
   bki_mapping_warnings(${target})
 endfunction()
-foreach(name map_sequence clear_map evaluate_map export_map inspect_map merge_maps migrate_map simulate_drive)
+foreach(name map_sequence clear_map evaluate_map export_map inspect_map merge_maps migrate_map simulate_city simulate_drive)
   add_executable(${name} src/tools/${name}.cpp)
   bki_mapping_tool(${name})
   if(name STREQUAL map_sequence)

@@ -23,7 +23,8 @@ Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const E
   Return nearest{max_range, 0};
   if (direction.z() < 0.0 && -origin.z() / direction.z() < nearest.range) {
     nearest.range = -origin.z() / direction.z();
-    nearest.label = scene.ground.labelAt(origin.y() + nearest.range * direction.y());
+    nearest.label = scene.ground.labelAt(origin.x() + nearest.range * direction.x(),
+                                         origin.y() + nearest.range * direction.y());
   }
   for (const Shape* shape : shapes) {
     const auto range = shape->hit(origin, direction, time);
@@ -52,6 +53,13 @@ std::uint32_t randomLabel(const Scene& scene, double pick) {
 }
 
 const DriveConfig& checked(const DriveConfig& config) {
+  checkDrive(config);
+  return config;
+}
+
+}  // namespace
+
+void checkDrive(const DriveConfig& config) {
   const LidarConfig& lidar = config.lidar;
   struct Limit {
     const char* name;
@@ -75,10 +83,7 @@ const DriveConfig& checked(const DriveConfig& config) {
     throw std::invalid_argument(
         "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
   }
-  return config;
 }
-
-}  // namespace
 
 LidarConfig lidarNamed(const std::string& name) {
   LidarConfig lidar;

@@ -40,6 +40,9 @@ struct DriveConfig {
   double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };
 
+/// @throws std::invalid_argument if a setting is out of its limits.
+void checkDrive(const DriveConfig& config);
+
 /// A drive along the street of makeScene.
 class Drive {
  public:

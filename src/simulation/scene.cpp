@@ -90,15 +90,19 @@ std::optional<double> Shape::hit(const Eigen::Vector3d& origin, const Eigen::Vec
   return enter;
 }
 
-std::uint32_t Ground::labelAt(double y) const {
-  return std::abs(y) < road_half_width ? road : (std::abs(y) < sidewalk_half_width ? sidewalk : terrain);
+std::uint32_t Ground::labelAt(double x, double y) const {
+  const auto toAxis = [&](double c) {
+    return std::abs(c - street_distance * std::clamp(std::round(c / street_distance), 0.0, streets - 1.0));
+  };
+  const double distance = streets == 0 ? std::abs(y) : std::min(toAxis(x), toAxis(y));
+  return distance < road_half_width ? road : (distance < sidewalk_half_width ? sidewalk : terrain);
 }
 
 std::optional<std::uint32_t> Scene::labelAt(const Eigen::Vector3d& point, double time) const {
   for (const Shape& shape : shapes) {
     if (shape.contains(point, time)) return shape.label;
   }
-  if (point.z() <= 0.0) return ground.labelAt(point.y());
+  if (point.z() <= 0.0) return ground.labelAt(point.x(), point.y());
   return std::nullopt;
 }
 

@@ -38,12 +38,15 @@ struct Shape {
                             double time) const;
 };
 
-/// The plane z = 0 with a road along x: the label depends on |y|.
+/// The plane z = 0 with a road along x, whose axis is y = 0, or with a grid of roads along x and y.
 struct Ground {
   double road_half_width = 5.0;      ///< [m]
   double sidewalk_half_width = 8.0;  ///< [m]
   std::uint32_t road = 40, sidewalk = 48, terrain = 72;
-  std::uint32_t labelAt(double y) const;
+  int streets = 0;  ///< number of roads in each direction of a grid; 0: one road along x
+  double street_distance =
+      0.0;  ///< of the axes of parallel roads, of which the first are x = 0 and y = 0 [m]
+  std::uint32_t labelAt(double x, double y) const;
 };
 
 struct Scene {

@@ -143,7 +143,7 @@ class Navigation : public testing::Test {
     double share = 0.0;
     for (const Pose& pose : path) {
       const Eigen::Vector3d point = drive_->T_world_sensor(0) * Eigen::Vector3d(pose.x, pose.y, pose.z);
-      share += drive_->scene().ground.labelAt(point.y()) == label;
+      share += drive_->scene().ground.labelAt(point.x(), point.y()) == label;
     }
     return share / static_cast<double>(path.size());
   }

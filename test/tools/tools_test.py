@@ -49,7 +49,7 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
             self.assertGreater(len(options), 1, program)
             for option in options:
@@ -351,6 +351,48 @@ class Tools(unittest.TestCase):
             self.assertGreater(figures['robot'][figure], figures['paper_line'][figure], figure)
         self.assertGreater(figures['robot']['sa'], 0.98)
         self.assertLess(figures['robot']['floor_holes'], 0.2 * figures['paper_line']['floor_holes'])
+
+    def test_simulate_city(self):
+        cities = [self.path('city_a'), self.path('city_b')]
+        for city in cities:
+            made = call('simulate_city', '--output', city, '--drives', '2', '--blocks', '1', '--scans', '2', '--beams', '8',
+                        '--columns', '90')
+            self.assertEqual((made.returncode, made.stderr), (0, ''))
+        files = [sorted(os.path.relpath(os.path.join(folder, name), city) for folder, _, names in os.walk(city) for name in names)
+                 for city in cities]
+        self.assertEqual(files[0], files[1])
+        self.assertEqual(len(files[0]), 1 + 2 * (3 + 2 + 2))
+        for name in files[0]:
+            with open(os.path.join(cities[0], name), 'rb') as a, open(os.path.join(cities[1], name), 'rb') as b:
+                self.assertEqual(a.read(), b.read(), name)
+        with open(os.path.join(cities[0], 'city.yaml')) as file:
+            self.assertEqual(file.read(), 'classes: semantic_kitti\ndrives:\n  - sequence: drive_0000\n  - sequence: drive_0001\n')
+        self.fails('city.yaml exists; give a new folder', 'simulate_city', '--output', cities[0])
+        for option, value in (('drives', '0'), ('blocks', '101'), ('block-edge', '59'), ('scans', '0'), ('columns', '0')):
+            self.fails(f'{option} is {value}, but must be', 'simulate_city', '--output', self.path('no'), '--' + option, value)
+        self.assertFalse(os.path.exists(self.path('no')))
+
+    def test_poses_in_the_frame_of_the_map(self):
+        poses = os.path.join(self.drive, 'poses.txt')
+        with open(poses) as file:
+            lines = [line.split() for line in file]
+        for line in lines:
+            line[3] = repr(float(line[3]) + 19.2)  # by whole blocks
+        moved = self.path('moved.txt')
+        with open(moved, 'w') as file:
+            file.writelines(' '.join(line) + '\n' for line in lines)
+        bounds = []
+        for given in ([], ['--poses', moved]):
+            call('map_sequence', '--sequence', self.drive, '--output', self.path('moved.bkm'), *given)
+            call('inspect_map', self.path('moved.bkm'), '--json', self.path('moved.json'))
+            with open(self.path('moved.json')) as file:
+                bounds.append(json.load(file)['bounds'])
+        self.assertAlmostEqual(bounds[1]['min'][0] - bounds[0]['min'][0], 19.2, delta=0.31)
+        self.assertAlmostEqual(bounds[1]['max'][1], bounds[0]['max'][1], delta=0.31)
+        self.fails('missing.txt', 'map_sequence', '--sequence', self.drive, '--poses', self.path('missing.txt'))
+        export = self.path('pcd_poses')
+        call('simulate_drive', '--output', export, '--scans', '1', '--beams', '4', '--columns', '40', '--layout', 'dynamic_map')
+        self.fails('have the poses of their scans', 'map_sequence', '--sequence', export, '--poses', moved)
 
     def test_benchmark(self):
         result = call('benchmark_sequence', '--sequence', self.drive, '--repeats', '0')
