@@ -22,6 +22,7 @@ bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp
   LINK bki_mapping_simulation)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation Boost::program_options)
+target_compile_definitions(bki_mapping_tools PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 
 function(bki_mapping_tool target)
   target_link_libraries(${target} PRIVATE bki_mapping_tools ${ARGN})

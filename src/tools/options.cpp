@@ -42,7 +42,7 @@ std::size_t count(const po::variables_map& given, const std::string& name) {
 
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
                                          po::options_description options, const std::string& positional) {
-  options.add_options()("help,h", "print this help");
+  options.add_options()("help,h", "print this help")("version", "print the version");
   po::options_description all = options;
   po::positional_options_description words;
   if (!positional.empty()) {
@@ -56,6 +56,10 @@ std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::strin
     po::store(parsed, *given);
     if (given->count("help")) {
       std::cout << what << "\n\n" << options;
+      return nullptr;
+    }
+    if (given->count("version")) {
+      std::cout << "bki_mapping " BKI_MAPPING_VERSION "\n";
       return nullptr;
     }
     po::notify(*given);

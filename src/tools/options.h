@@ -20,11 +20,11 @@ namespace bki_mapping::tools {
 
 namespace po = boost::program_options;
 
-/// Parses a command line of named options; adds --help. An unknown option is refused by name, with the most
+/// Parses a command line of named options; adds --help and --version. An unknown option is refused by name, with the most
 /// similar known one.
 /// @param positional name under which the words that belong to no option are found, as a vector of strings;
 /// "": there must be none.
-/// @return nullptr if the help was printed. @throws std::invalid_argument in one sentence.
+/// @return nullptr if the help or the version was printed. @throws std::invalid_argument in one sentence.
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
                                          po::options_description options, const std::string& positional = "");
 

@@ -50,7 +50,7 @@ class Tools(unittest.TestCase):
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
         for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
-            options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help'}
+            options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help', '--version'}
             self.assertGreater(len(options), 1, program)
             for option in options:
                 self.assertIn(option, rows[program], program)
@@ -95,6 +95,9 @@ class Tools(unittest.TestCase):
             result = call(program, '--help')
             self.assertEqual(result.returncode, 0)
             self.assertIn('--output', result.stdout)
+            result = call(program, '--version')
+            self.assertEqual(result.returncode, 0)
+            self.assertRegex(result.stdout, r'^bki_mapping \d+\.\d+\.\d+\n$')
 
     def test_map_and_report(self):
         result = call('map_sequence', '--sequence', self.drive, '--output', self.path('map.ply'), '--report',
