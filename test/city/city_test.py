@@ -2,11 +2,13 @@
 """A city made by map_city equals one run of map_sequence over all its scans, to the bit, whatever happens meanwhile."""
 import contextlib
 import json
+import math
 import os
 import pathlib
 import random
 import shutil
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -16,6 +18,7 @@ import unittest
 
 try:
     import distributed  # noqa: F401
+    import numpy
     import psutil
 except ImportError:
     print('SKIPPED: needs python3-distributed', file=sys.stderr)
@@ -24,25 +27,17 @@ except ImportError:
 SOURCE = pathlib.Path(os.environ['BKI_MAPPING_SOURCE_DIR'])
 BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
 sys.path.insert(0, str(SOURCE / 'python'))
-from bki_mapping.city.description import CityError, read_city  # noqa: E402
+from bki_mapping.city import bags, report, work  # noqa: E402
+from bki_mapping.city.description import Bag, CityError, read_city  # noqa: E402
 from bki_mapping.city.plan import pieces_of, sums_of  # noqa: E402
 
-DRIVES = {'d1': (0, 0), 'd2': (12, 40), 'd3': (35, -20), 'd4': (-30, 10), 'd5': (5, 5), 'd6': (60, 30)}
+DRIVES = [f'd{n}' for n in range(1, 7)]
 SCANS = 5
+CITY = ('--blocks', 2, '--block-edge', 70, '--scans', SCANS, '--rate', 1, '--beams', 32, '--columns', 900)
 
 
 def program(name, *arguments):
     subprocess.run([str(BIN / name), *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
-
-
-def simulate(folder, seed, shift):
-    """Writes a drive whose poses are moved into the frame of the city."""
-    program('simulate_drive', '--output', folder, '--scans', SCANS, '--seed', seed, '--beams', 16, '--columns', 400)
-    poses = [[float(number) for number in line.split()] for line in (folder / 'poses.txt').read_text().splitlines()]
-    for pose in poses:
-        pose[3] += shift[0]
-        pose[7] += shift[1]
-    (folder / 'poses.txt').write_text(''.join(' '.join(map(repr, pose)) + '\n' for pose in poses))
 
 
 def tiles_of(*paths):
@@ -61,8 +56,9 @@ class Made(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp())
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        for seed, (name, shift) in enumerate(DRIVES.items(), 1):
-            simulate(cls.folder / name, seed, shift)
+        program('simulate_city', '--output', cls.folder / 'made', '--drives', len(DRIVES), *CITY)
+        for number, name in enumerate(DRIVES):
+            (cls.folder / f'made/drive_{number:04d}').rename(cls.folder / name)
         cls.wholes = {}
 
     def whole(self, names):
@@ -71,7 +67,8 @@ class Made(unittest.TestCase):
         if not path.exists():
             resume = ()
             for name in names:
-                program('map_sequence', '--sequence', self.folder / name, '--output', path, *resume)
+                program('map_sequence', '--sequence', self.folder / name, '--poses', self.folder / name / 'poses.txt',
+                        '--output', path, *resume)
                 resume = ('--resume', path)
         return tiles_of(path)
 
@@ -81,10 +78,10 @@ class Made(unittest.TestCase):
         path.write_text(json.dumps(text))  # JSON is YAML
         return path
 
-    def start(self, city, *arguments):
+    def start(self, city, *arguments, programs=BIN):
         self.output = self.folder / self.id().split('.')[-1]
         return subprocess.Popen([sys.executable, str(SOURCE / 'scripts/map_city'), str(city), '--output', str(self.output),
-                                 '--programs', str(BIN), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                 '--programs', str(programs), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                 universal_newlines=True, env={**os.environ, 'PYTHONPATH': str(SOURCE / 'python')})
 
     def finish(self, process, status=0):
@@ -95,13 +92,14 @@ class Made(unittest.TestCase):
     def expect_equal(self, names):
         index = json.loads((self.output / 'index.json').read_text())
         regions = [self.output / region['file'] for region in index['regions']]
-        self.assertEqual(sorted(path.name for path in (self.output / 'regions').iterdir()), sorted(path.name for path in regions))
+        self.assertEqual(sorted((self.output / 'regions').iterdir()), sorted(regions))
         self.assertGreater(len(regions), 4)
         self.assertEqual(tiles_of(*regions), self.whole(sorted(names)))
         return index
 
     def test_kills_change_no_bit(self):
-        """Two workers are killed while they map, then all of it with the scheduler; it is continued, with another worker killed."""
+        """Two workers are killed while they map, then all of it with the scheduler; it is continued, with another one
+        killed."""
         names = list(DRIVES)
         city, drawn = self.describe(names[::-1]), random.Random(1)
 
@@ -111,8 +109,8 @@ class Made(unittest.TestCase):
             while time.monotonic() < end and process.poll() is None:
                 for found in psutil.Process(process.pid).children(recursive=True):
                     with contextlib.suppress(psutil.Error):
-                        if found.name() in ('map_sequence', 'merge_maps', 'inspect_map'):
-                            worker = found.parent()
+                        worker = found.parent()
+                        if found.name() in ('map_sequence', 'merge_maps', 'inspect_map') and worker.pid != process.pid:
                             if drawn.random() < 0.5:
                                 found.kill()
                             worker.kill()
@@ -162,6 +160,110 @@ class Made(unittest.TestCase):
         self.assertEqual(sorted(index['left_out']), ['broken', 'missing'])
         self.assertIn('| broken | map_sequence: ', (self.output / 'report.md').read_text())
 
+    def test_a_worker_that_is_not_fit_is_named_and_no_drive_is_blamed(self):
+        """A program that cannot run, or is ended from outside, ends the run with one sentence, also after the start."""
+        city, host = self.describe(['d1', 'd2']), socket.gethostname()
+        programs = self.folder / 'programs'
+        programs.mkdir()
+        for name in ('map_sequence', 'merge_maps', 'inspect_map'):
+            (programs / name).symlink_to(BIN / name)
+
+        def fails(sentence):
+            text = self.finish(self.start(city, '--workers', '2', '--resume', programs=programs), 1)
+            self.assertRegex(text, rf'map_city: .*{sentence}')
+            self.assertIn('--resume once this is mended', text)
+            self.assertNotIn('is left out', text)
+            self.assertFalse((self.output / 'index.json').exists())
+
+        def replace(name, script):
+            (programs / name).unlink()
+            (programs / name).write_text('#!/bin/sh\n' + script)
+            (programs / name).chmod(0o755)
+
+        at_start = f'case "$1" in --version|--print-config) exec {BIN}/map_sequence "$@";; esac\n'
+        replace('map_sequence', at_start + 'echo "$0: error while loading shared libraries: libyaml-cpp.so" >&2; exit 127\n')
+        fails(rf'map_sequence cannot be started on {host} .*libyaml-cpp.*; install the same version of bki_mapping there')
+        replace('map_sequence', at_start + 'kill -9 $$\n')
+        fails(rf'map_sequence was ended 3 times by signal 9 on {host}')
+        (programs / 'map_sequence').unlink()
+        (programs / 'map_sequence').symlink_to(BIN / 'map_sequence')
+        replace('merge_maps', '')
+        (programs / 'merge_maps').chmod(0o644)
+        fails(rf'merge_maps cannot be started on {host} \(Permission denied\)')
+        (programs / 'merge_maps').unlink()
+        (programs / 'merge_maps').symlink_to(BIN / 'merge_maps')
+        self.finish(self.start(city, '--workers', '2', '--resume', programs=programs))
+        self.expect_equal(['d1', 'd2'])
+
+    def test_other_programs_and_unseen_folders_are_of_the_worker(self):
+        token = self.folder / 'token'
+        token.write_text('')
+        setup = work.Setup(str(self.folder), str(BIN), str(token), (), work.identity_of(BIN, ()))
+        work.prepare(setup)
+        with self.assertRaisesRegex(work.Fault, rf'are others than where map_city runs .*on {socket.gethostname()}|'
+                                    rf"on {socket.gethostname()} are others .*'bki_mapping 9.9.9'") as raised:
+            work.prepare(setup._replace(identity='bki_mapping 9.9.9\n' + setup.identity.split('\n', 1)[1]))
+        self.assertTrue(raised.exception.of_worker)
+        with self.assertRaisesRegex(work.Fault, 'cannot be started on') as raised:
+            work.prepare(setup._replace(programs=str(self.folder)))
+        self.assertTrue(raised.exception.of_worker)
+        self.addCleanup(setattr, work, 'SIGHT', work.SIGHT)
+        work.SIGHT = 0.3
+        with self.assertRaisesRegex(work.Fault, f'{socket.gethostname()} does not see {self.folder}; mount it') as raised:
+            work.prepare(setup._replace(token=str(self.folder / 'other')))
+        self.assertTrue(raised.exception.of_worker)
+
+    def test_a_scheduler_of_its_own(self):
+        """Workers of a scheduler that somebody else has started: first one that lacks this package, then one that has it."""
+        place = self.folder / 'scheduler.json'
+
+        def dask(name, *arguments, **environment):
+            process = subprocess.Popen([sys.executable, '-m', f'distributed.cli.dask_{name}', '--no-dashboard',
+                                        *map(str, arguments)],
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=str(self.folder),
+                                       env={**os.environ, **environment})
+            self.addCleanup(process.wait)
+            self.addCleanup(process.terminate)
+            return process
+
+        dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place)
+        end = time.monotonic() + 60
+        while not place.exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        address = json.loads(place.read_text())['address']
+        city = self.describe(['d1', 'd2'])
+        options = ('--nworkers', 1, '--nthreads', 1, '--local-directory', self.folder)
+        unfit = dask('worker', address, *options, PYTHONPATH='')
+        text = self.finish(self.start(city, '--scheduler', address), 1)
+        self.assertRegex(text, rf'map_city: the worker on {socket.gethostname()} cannot import bki_mapping.city .*; install')
+        unfit.terminate()
+        unfit.wait()
+        dask('worker', address, *options, PYTHONPATH=str(SOURCE / 'python'))
+        self.finish(self.start(city, '--scheduler', address, '--resume'))
+        self.expect_equal(['d1', 'd2'])
+
+    def test_a_picture_and_the_costs_are_reported(self):
+        text = self.finish(self.start(self.describe(['d1', 'd2', 'd3']), '--workers', '2'))
+        self.assertRegex(text, r'pieces: 9 of 9, 3 of 3 drives, [0-9.]+ a second')
+        self.assertRegex(text, r'regions: \d+ of \d+, \d+ tiles, ')
+        found = (self.output / 'report.md').read_text()
+        self.assertRegex(found, r'\| map pieces \| 9 \| 9 \| [0-9.]+ \| [0-9.]+ \| [0-9.]+ \|')
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.assertIn('install python3-matplotlib', found)
+        else:
+            self.assertIn('(city.png)', found)
+            self.assertEqual((self.output / 'city.png').read_bytes()[:4], b'\x89PNG')
+        # The ways are where the sensor was.
+        index = json.loads((self.output / 'index.json').read_text())
+        poses = [[float(word) for word in line.split()] for line in (self.folder / 'd1/poses.txt').read_text().splitlines()]
+        self.assertEqual([list(at) for at in report.way_of(index['drives'][0])], [[p[3], p[7], p[11]] for p in poses])
+        again = self.finish(self.start(self.describe(['d1', 'd2', 'd3']), '--workers', '2', '--resume', '--no-picture'))
+        self.assertIn('9 of 9', again)
+        self.assertIn('| map pieces | 9 | 0 | 0.0 |', (self.output / 'report.md').read_text())
+        self.assertNotIn('city.png', (self.output / 'report.md').read_text())
+
     def test_wrong_descriptions_are_refused(self):
         path = self.folder / 'wrong.yaml'
         for text, sentence in (
@@ -173,6 +275,10 @@ class Made(unittest.TestCase):
                 ('drives: [{name: d1}]', 'has no sequence: FOLDER'),
                 ('drives: [{sequence: d1, name: a/b}]', 'is no name for a drive'),
                 ('drives: [{sequence: d1}, {sequence: x/d1}]', "gives two drives the name 'd1'"),
+                ('drives: [{sequence: d1, poses: 3}]', 'poses in '),
+                ('drives: [{bag: d1.bag}]', 'd1.bag in '),
+                ('drives: [{bag: d1.bag, labels: x}]', "'labels' in "),
+                ('drives: [{bag: d1.bag, cloud_topic: /c, labelled: 3}]', 'labelled in '),
                 ('{drives: [{sequence: d1}], piece_scans: 0}', 'piece_scans in '),
                 ('{drives: [{sequence: d1}], set: 3}', 'is no mapping of parameters'),
                 ('{drives: [{sequence: d1}], classes: 3}', 'classes in '),
@@ -202,6 +308,129 @@ class Made(unittest.TestCase):
         with open(table, 'a') as file:
             file.write('# changed\n')
         self.assertFalse(set(files()) & set(before))
+
+    def ros(self):
+        """The modules that bags need; skips the test where they are missing."""
+        try:
+            import rosbag
+            import rospy
+            import tf2_ros  # noqa: F401
+            from geometry_msgs.msg import TransformStamped
+            from sensor_msgs.msg import PointCloud2, PointField
+            from tf2_msgs.msg import TFMessage
+        except ImportError as error:
+            print(f'SKIPPED: {self.id()} needs ROS: {error}', file=sys.stderr)
+            self.skipTest(str(error))
+        return rosbag, rospy, TransformStamped, PointCloud2, PointField, TFMessage
+
+    def write_bag(self, path, name, label=7):
+        """Writes a sequence as a bag: the sensor on a vehicle, whose pose changes linearly between transforms 0.5 s apart."""
+        rosbag, rospy, TransformStamped, PointCloud2, PointField, TFMessage = self.ros()
+        poses = numpy.loadtxt(self.folder / name / 'poses.txt').reshape(-1, 3, 4)
+
+        def transform(parent, child, stamp, translation, yaw=0.0):
+            made = TransformStamped()
+            made.header.frame_id, made.child_frame_id, made.header.stamp = parent, child, rospy.Time.from_sec(stamp)
+            made.transform.translation.x, made.transform.translation.y, made.transform.translation.z = translation
+            made.transform.rotation.z, made.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+            return made
+
+        with rosbag.Bag(str(path), 'w', compression='lz4') as bag:
+            bag.write('/tf_static', TFMessage([transform('base', 'lidar', 0.0, (0.0, 0.0, 1.5))]), rospy.Time(99))
+            for number, pose in enumerate(poses):
+                stamp = 100.0 + number
+                points = numpy.fromfile(self.folder / name / f'velodyne/{number:06d}.bin', '<f4').reshape(-1, 4)
+                labels = numpy.fromfile(self.folder / name / f'labels/{number:06d}.label', '<u4')
+                rows = numpy.zeros(len(points), numpy.dtype({
+                    'names': ['x', 'y', 'z', 'intensity', 'label'], 'formats': ['<f4', '<f4', '<f4', '<f4', '<u2'],
+                    'offsets': [0, 4, 8, 16, 24], 'itemsize': 26}))
+                for column, field in enumerate(('x', 'y', 'z', 'intensity')):
+                    rows[field] = points[:, column]
+                rows['label'] = labels
+                cloud = PointCloud2(height=1, width=len(points), point_step=26, row_step=26 * len(points), data=rows.tobytes())
+                cloud.fields = [PointField(field, offset, kind, 1) for field, offset, kind in (
+                    ('x', 0, label), ('y', 4, 7), ('z', 8, 7), ('intensity', 16, 7), ('label', 24, 4))]
+                cloud.header.frame_id, cloud.header.stamp = 'lidar', rospy.Time.from_sec(stamp)
+                at = pose[:, 3] - [0, 0, 1.5]
+                yaw = math.atan2(pose[1, 0], pose[0, 0])
+                for shift in (-0.25, 0.25):  # the cloud is between the two
+                    if number < len(poses) - 1:  # and the last one is later than all transforms
+                        bag.write('/tf', TFMessage([transform('city', 'base', stamp + shift, at + [shift, 0, 0], yaw)]),
+                                  rospy.Time.from_sec(stamp))
+                bag.write('/points', cloud, rospy.Time.from_sec(stamp))
+        return poses
+
+    def test_bags_are_drives(self):
+        path = self.folder / 'monday.bag'
+        poses = self.write_bag(path, 'd2')
+        city = self.describe([])
+        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
+            {'sequence': 'd1'}, {'bag': 'monday.bag', 'cloud_topic': '/points', 'frame': 'city'}]}))
+        text = self.finish(self.start(city, '--workers', '2'))
+        self.assertIn(f"drive 'monday': 1 of {SCANS} clouds have no transform to 'city' and are left out", text)
+        index = json.loads((self.output / 'index.json').read_text())
+        drive = index['drives'][1]
+        self.assertEqual((drive['name'], drive['bag']), ('monday', str(path)))
+        written = pathlib.Path(drive['sequence'])
+        for number in range(SCANS - 1):
+            for each in (f'velodyne/{number:06d}.bin', f'labels/{number:06d}.label'):
+                self.assertEqual((written / each).read_bytes(), (self.folder / 'd2' / each).read_bytes(), each)
+        found = numpy.loadtxt(written / 'poses.txt').reshape(-1, 3, 4)
+        numpy.testing.assert_allclose(found, poses[:SCANS - 1], atol=1e-9)
+        self.assertEqual((written / 'times.txt').read_text(), ''.join(f'{n}.000000000\n' for n in range(SCANS - 1)))
+        # The city is that of the sequence d1 and of the written one.
+        (self.folder / 'written').symlink_to(written)
+        self.expect_equal(['d1', 'written'])
+        # Nothing is written or mapped again.
+        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.assertIn('| write bags as sequences | 1 | 0 | ', (self.output / 'report.md').read_text())
+        self.assertIn('| 0 | 0.0 |', (self.output / 'report.md').read_text())
+
+    def test_wrong_bags_are_left_out_with_a_sentence(self):
+        self.ros()
+        path = self.folder / 'wrong.bag'
+        self.write_bag(path, 'd2', label=9)
+
+        def refused(sentence, bag=Bag(path, '/points', 'city', 'label', True)):
+            with self.assertRaisesRegex(CityError, sentence):
+                bags.extract(bag, self.folder / f'out{time.monotonic_ns()}')
+        refused("the field 'x' of /points is no number")
+        self.write_bag(path, 'd2')
+        good = Bag(path, '/points', 'city', 'label', True)
+        refused('wrong.bag has no clouds at /cloud; it has clouds at: /points', good._replace(cloud_topic='/cloud'))
+        refused("no cloud of /points has a transform to 'earth' .*; record tf", good._replace(frame='earth'))
+        refused("have no field 'class', but intensity, label, x, y, z; give label_field, or labelled: false",
+                good._replace(label_field='class'))
+        bags.extract(good._replace(label_field='class', labelled=False), self.folder / 'unlabelled')
+        self.assertEqual(set((self.folder / 'unlabelled/labels/000000.label').read_bytes()), {0})
+        content = path.read_bytes()
+        for length in (0, 5, 5000, len(content) // 2):
+            path.write_bytes(content[:length])
+            refused('wrong.bag (cannot be read|has no index)')
+        path.write_bytes(b'#ROSBAG V2.0\n' + bytes(range(256)) * 50)
+        refused('wrong.bag (cannot be read|has no index)')
+        city = self.describe([])
+        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
+            {'sequence': 'd1'}, *({'bag': name, 'cloud_topic': '/points'} for name in ('wrong.bag', 'missing.bag'))]}))
+        text = self.finish(self.start(city, '--workers', '2'), 1)
+        self.assertRegex(text, "drive 'wrong' is left out: .*wrong.bag (cannot be read|has no index)")
+        self.assertRegex(text, "drive 'missing' is left out: .*missing.bag does not exist")
+        self.expect_equal(['d1'])
+
+    def test_a_real_bag_without_labels_and_tf(self):
+        path = pathlib.Path(os.environ.get('BKI_MAPPING_TEST_DATA', '')) / 'bags/luminar_no_label_no_tf.bag'
+        if not path.exists():
+            print(f'SKIPPED: {self.id()} needs BKI_MAPPING_TEST_DATA with bags/{path.name}', file=sys.stderr)
+            self.skipTest('no real bag')
+        self.ros()
+        bag = Bag(path, '/luminar_pointcloud', 'map', 'label', False)
+        with self.assertRaisesRegex(CityError, "no cloud of /luminar_pointcloud has a transform to 'map'"):
+            bags.extract(bag, self.folder / 'real1')
+        # In the frame of its clouds, no tf is needed.
+        self.assertEqual(bags.extract(bag._replace(frame='luminar_lidar'), self.folder / 'real2'), (5, 0))
+        program('map_sequence', '--sequence', self.folder / 'real2', '--classes', 'occupancy',
+                '--output', self.folder / 'real.bkm')
+        self.assertGreater(len(tiles_of(self.folder / 'real.bkm')), 10)
 
     def test_sums_are_trees(self):
         files = [f'piece {n}' for n in range(300)]

@@ -49,7 +49,6 @@ LEFT_OUT = {
     **dict.fromkeys(('build-examples/plan_path street.bkm semantic_kitti 2 -5.3 0 48 8 0 > path.csv',
                      'python3 examples/draw_path.py street.bkm path.csv --output path.png'), 'path_test runs them'),
     'rosrun octomap_server octomap_server_node ~/street.bt _frame_id:=map': 'not in Debian',
-    'scripts/map_city city.yaml --output city --workers 2': 'needs drives in one frame; city_test runs it',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.

@@ -3,8 +3,12 @@ import contextlib
 import json
 import os
 import pathlib
+import re
 import shutil
+import sys
+import tempfile
 import time
+import uuid
 from typing import Dict, List
 
 from bki_mapping.city import plan, report, work
@@ -13,6 +17,8 @@ from bki_mapping.city.description import City, CityError
 # A worker that is killed takes its task with it through no fault of the task; Dask gives up on a task after this many.
 ALLOWED_FAILURES = 1000
 SMALLEST_FREE = 16 << 20  # of a disk [bytes]: below it, a task that failed is taken to have failed for want of space
+NO_SPACE = re.compile('No space left on device|Disk quota exceeded')
+WAIT = 60  # for the first worker of a scheduler [s]
 
 
 @contextlib.contextmanager
@@ -26,30 +32,74 @@ def dask_client(workers=0, scheduler=None):
     with dask.config.set({'distributed.scheduler.allowed-failures': ALLOWED_FAILURES, 'distributed.admin.log-length': 100}):
         with contextlib.ExitStack() as stack:
             if scheduler is None:
-                cluster = distributed.LocalCluster(n_workers=workers or os.cpu_count(), threads_per_worker=1, processes=True,
-                                                   host='127.0.0.1', dashboard_address=None, memory_limit=0, silence_logs=50)
+                own = stack.enter_context(tempfile.TemporaryDirectory(prefix='map_city-', ignore_cleanup_errors=True))
+                cluster = distributed.LocalCluster(local_directory=own, n_workers=workers or os.cpu_count(),
+                                                   threads_per_worker=1, processes=True, host='127.0.0.1',
+                                                   dashboard_address=None, memory_limit=0, silence_logs=50)
                 stack.enter_context(cluster)
                 scheduler = cluster
             try:
                 client = stack.enter_context(distributed.Client(scheduler, timeout=30))
-            except OSError as error:
+            except (OSError, ValueError) as error:
                 raise CityError(f'the Dask scheduler {scheduler} does not answer: {error}') from None
+            if not workers_of(client, distributed):
+                raise CityError(f'the Dask scheduler {scheduler} has no workers; start some: '
+                                f'dask-worker {scheduler} --nthreads 1')
+            sentence = unfit_worker(client)
+            if sentence:
+                raise CityError(sentence)
             yield client
 
 
+def workers_of(client, distributed):
+    """Waits for a worker. Returns whether there is one."""
+    try:
+        client.wait_for_workers(1, timeout=WAIT)
+    except (distributed.TimeoutError, TimeoutError):
+        return False
+    return True
+
+
 class Builder:
-    def __init__(self, city: City, folder, programs, client, say=print):
+    def __init__(self, city: City, folder, programs, client, say=print, draw=True):
         self.city, self.folder, self.programs, self.client, self.say = city, pathlib.Path(folder), str(programs), client, say
-        self.seconds: Dict[str, float] = {}
+        self.draw = draw
+        self.costs: Dict[str, report.Cost] = {}
+        self.broken: Dict[str, str] = {}
+        self.setup = None
 
     def build(self):
-        """Makes the city. Returns its index. Raises CityError if the disk is full or a step fails for other reasons than
-        a drive."""
+        """Makes the city. Returns its index. Raises CityError if the disk is full, a worker is not fit, or a step fails for
+        other reasons than a drive."""
         begin = time.time()
-        pieces, broken = self.map_drives()
-        mapped = {drive.name: drive for drive in self.city.drives if drive.name not in broken}
+        token = self.folder / f'.run.{uuid.uuid4().hex}'
+        token.write_text('')
+        try:
+            self.setup = self.check_programs(str(token))
+            index = self.make()
+            self.remove_old(index)
+        finally:
+            token.unlink()
+        picture = report.draw(self.folder, index) if self.draw else None
+        report.write(self.folder, index, self.costs, time.time() - begin, picture)
+        return index
+
+    def check_programs(self, token):
+        city = self.city
+        settings = ['--classes', city.classes] + (['--config', city.config] if city.config else [])
+        settings += [word for setting in city.settings for word in ('--set', setting)]
+        try:
+            identity = work.identity_of(self.programs, settings)
+            return work.Setup(str(self.folder), self.programs, token, tuple(settings), identity)
+        except work.Fault as fault:
+            raise CityError(str(fault)) from None
+
+    def make(self):
+        pieces = self.map_drives(self.write_bags())
+        mapped = {drive.name: drive for drive in self.city.drives if drive.name not in self.broken}
         if not mapped:
-            raise CityError('no drive could be mapped: ' + '; '.join(f'{name}: {why}' for name, why in sorted(broken.items())))
+            reasons = '; '.join(f'{name}: {why}' for name, why in sorted(self.broken.items()))
+            raise CityError('no drive could be mapped: ' + reasons)
         inputs: Dict[plan.Region, List[str]] = {}
         for piece, found in pieces:
             if piece.drive.name in mapped:
@@ -57,83 +107,141 @@ class Builder:
                     inputs.setdefault(region, []).append(piece.file)
         levels = plan.sums_of(inputs)
         for level in levels:
-            self.follow('sum', 'sums', [(each, (work.sum_region, str(self.folder), self.programs, self.city.region_tiles, each))
-                                        for each in level], must=True)
+            self.follow('sum', 'sums', [(each, (work.sum_region, self.setup, self.city.region_tiles, each)) for each in level],
+                        must=True)
         last = [each for level in levels for each in level if each.file.startswith('regions/')]
-        checked = self.follow('check', 'regions', [(each, (work.check_region, str(self.folder), self.programs, each))
-                                                   for each in last], must=True)
+        checked = self.follow('check', 'regions', [(each, (work.check_region, self.setup, self.draw, each)) for each in last],
+                              must=True, count_of=lambda found: ('tiles', found['tiles']))
         index = {
             'version': 1, 'region_tiles': self.city.region_tiles,
-            'drives': [{'name': name, 'sequence': str(drive.folder),
-                        'pieces': [dict(file=piece.file, id=piece.id, first=piece.first, scans=piece.scans)
-                                   for piece, _ in pieces if piece.drive.name == name]} for name, drive in sorted(mapped.items())],
-            'left_out': dict(sorted(broken.items())),
+            'drives': [self.drive_entry(drive, [piece for piece, _ in pieces if piece.drive.name == name])
+                       for name, drive in sorted(mapped.items())],
+            'left_out': dict(sorted(self.broken.items())),
             'regions': [dict(found, x=each.region[0], y=each.region[1], inputs=len(inputs[each.region]))
                         for each, found in sorted(checked, key=lambda pair: pair[0].region)],
         }
         for region in index['regions']:
-            region.pop('seconds')
+            for name in ('seconds', 'core_seconds', 'made'):
+                region.pop(name)
         write_whole(self.folder / 'index.json', json.dumps(index, indent=1) + '\n')
-        report.write(self.folder, index, self.seconds, time.time() - begin)
-        self.remove_old(index)
         return index
 
-    def map_drives(self):
-        """Returns the pieces that are mapped, with what is known of them, and the drives that are broken, with the reason."""
-        broken: Dict[str, str] = {}
-        tasks = []
-        for drive in self.city.drives:
-            try:
-                tasks += [(piece, (work.map_piece, str(self.folder), self.programs, self.city, piece))
-                          for piece in plan.pieces_of(self.city, drive)]
-            except CityError as error:
-                broken[drive.name] = str(error)
-        done = self.follow('map', 'pieces', tasks)
-        for piece, found in done:
-            if 'fault' in found:
-                broken.setdefault(piece.drive.name, found['fault'])
-        for name, why in sorted(broken.items()):
-            self.say(f"drive '{name}' is left out: {why}")
-        return sorted((pair for pair in done if 'fault' not in pair[1]), key=lambda pair: pair[0].id), broken
+    @staticmethod
+    def drive_entry(drive, pieces):
+        """What the index says of a drive."""
+        source = {'bag': str(drive.bag.path)} if drive.bag else {}
+        folder = pieces[0].drive.folder
+        return {'name': drive.name, 'sequence': str(folder), **source, 'poses': str(pieces[0].drive.poses),
+                'pieces': [dict(file=piece.file, id=piece.id, first=piece.first, scans=piece.scans) for piece in pieces]}
 
-    def follow(self, stage, what, tasks, must=False):
-        """Lets workers do tasks. Returns each task with its result. must: a fault ends the whole."""
+    def leave_out(self, drive, why):
+        if drive.name not in self.broken:
+            self.broken[drive.name] = why
+            self.say(f"drive '{drive.name}' is left out: {why}")
+
+    def write_bags(self):
+        """Writes bags as sequences, unless it was done before. Returns the drives, all with sequences."""
+        bags = [(drive, (work.write_bag, self.setup, drive)) for drive in self.city.drives if drive.bag]
+        drives = {drive.name: drive for drive in self.city.drives if not drive.bag}
+        for drive, found in self.follow('bag', 'bags', bags, drive_of=lambda drive: drive):
+            if 'fault' in found:
+                continue
+            if found['without_pose']:
+                self.say(f"drive '{drive.name}': {found['without_pose']} of {found['clouds'] + found['without_pose']} clouds "
+                         f"have no transform to '{drive.bag.frame}' and are left out")
+            folder = self.folder / found['file']
+            drives[drive.name] = drive._replace(folder=folder, poses=folder / 'poses.txt')
+        return [drive for _, drive in sorted(drives.items())]
+
+    def map_drives(self, drives):
+        """Returns the pieces that are mapped, with what is known of them."""
+        tasks = []
+        for drive in drives:
+            try:
+                tasks += [(piece, (work.map_piece, self.setup, piece)) for piece in plan.pieces_of(self.city, drive)]
+            except CityError as error:
+                self.leave_out(drive, str(error))
+        done = self.follow('map', 'pieces', tasks, drive_of=lambda piece: piece.drive)
+        return sorted((pair for pair in done if 'fault' not in pair[1]), key=lambda pair: pair[0].id)
+
+    def follow(self, stage, what, tasks, must=False, drive_of=None, count_of=None):
+        """Lets workers do tasks. Returns each task with its result. must: a fault ends the whole, as one of a worker
+        always does. drive_of: the drive of a task, which a fault leaves out. count_of: something else to count in a result."""
         from distributed import as_completed
         if not tasks:
             return []
-        progress = report.Progress(what, len(tasks), self.say)
-        futures = {self.client.submit(*call, pure=False, retries=0): task for task, call in tasks}
+        progress = report.Progress(what, len(tasks), self.say, [drive_of(each).name for each, _ in tasks] if drive_of else [])
+        cost = self.costs.setdefault(stage, report.Cost())
+        futures = {self.client.submit(*call, pure=False, retries=0): each for each, call in tasks}
         done = []
         for future in as_completed(futures):
-            task = futures[future]
+            each = futures[future]
             try:
                 found = future.result()
-            except OSError as error:  # of the worker, such as a full disk
-                found = {'fault': str(error)}
-            if 'fault' in found and (must or self.disk_is_full()):
+            except Exception as error:  # not of a task, which returns its faults
+                self.client.cancel(list(futures))
+                raise CityError(unfit_worker(self.client) or f'a task failed ({type(error).__name__}: {error}); run the '
+                                'same command with --resume') from None
+            if 'fault' in found and (must or found['of_worker'] or self.disk_is_full()):
                 self.client.cancel(list(futures))
                 remedy = ('; the disk is full: free space, and run the same command with --resume' if self.disk_is_full()
-                          else '; run the same command with --resume once this is mended')
+                          or NO_SPACE.search(found['fault']) else '; run the same command with --resume once this is mended')
                 raise CityError(found['fault'] + remedy)
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + found.get('seconds', 0.0)
-            done.append((task, found))
-            progress.step(failed='fault' in found)
+            done.append((each, found))
+            if 'fault' in found:
+                self.leave_out(drive_of(each), found['fault'])
+            else:
+                cost.add(found)
+            progress.step(failed='fault' in found, drive=drive_of(each).name if drive_of else None,
+                          more=count_of(found) if count_of else None)
         return done
 
     def disk_is_full(self):
         return shutil.disk_usage(self.folder).free < SMALLEST_FREE
 
     def remove_old(self, index):
-        """Removes what earlier cities left, and what killed tasks did, once the new index names all that is needed. Pieces stay:
-        they make changes of the city cheap."""
+        """Removes what earlier cities left, and what killed tasks did, once the new index names all that is needed. Pieces and
+        written bags stay: they make changes of the city cheap."""
         kept = {each['file'] for each in index['regions']}
         for path in (self.folder / 'regions').iterdir():
             if f'regions/{path.name}' not in kept:
                 path.unlink()
-        shutil.rmtree(self.folder / 'sums', ignore_errors=True)
-        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*'):
-            for path in self.folder.glob(pattern):
+        pictures = {plan.picture_of(file) for file in kept}
+        for path in self.folder.glob('pictures/*'):
+            if f'pictures/{path.name}' not in pictures:
                 path.unlink()
+        shutil.rmtree(self.folder / 'sums', ignore_errors=True)
+        own = pathlib.Path(self.setup.token)
+        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*', 'bags/.*', 'pictures/.*', '.run.*', '.index.json.*'):
+            for path in self.folder.glob(pattern):
+                if path.is_dir():
+                    shutil.rmtree(path)
+                elif path != own:
+                    path.unlink()
+
+
+def unfit_worker(client):
+    """A sentence about a worker that has not the same modules as this process; None if all have."""
+    version, source = work.VERSION, sys.version_info[:2]
+
+    def probe():  # without names of this package, so that it can run where that is missing
+        import socket
+        host = socket.gethostname()
+        try:
+            from bki_mapping.city import work
+        except Exception as error:
+            return f"the worker on {host} cannot import bki_mapping.city ({error})"
+        if getattr(work, 'VERSION', None) != version:
+            return f'the worker on {host} has another version of bki_mapping.city ({work.__file__})'
+        return None
+    try:
+        sentences = sorted({found for found in client.run(probe).values() if found})
+    except Exception as error:
+        return f'a worker cannot be asked for its modules ({type(error).__name__}: {error}); give all the same version of ' \
+               f'Dask and of Python, here {source[0]}.{source[1]}'
+    if not sentences:
+        return None
+    return sentences[0] + '; install the same bki_mapping there, source its setup.bash, and start the worker again'
 
 
 def write_whole(path, text):

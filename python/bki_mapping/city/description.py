@@ -1,6 +1,7 @@
 """What a city is made of: a YAML file with drives and settings."""
+import os
 import pathlib
-from typing import Dict, List, NamedTuple, Tuple
+from typing import Dict, NamedTuple, Optional, Tuple
 
 import yaml
 
@@ -9,10 +10,20 @@ class CityError(Exception):
     """One sentence for the user, with the thing and the remedy."""
 
 
+class Bag(NamedTuple):
+    path: pathlib.Path
+    cloud_topic: str
+    frame: str  # of the city, in tf
+    label_field: str
+    labelled: bool
+
+
 class Drive(NamedTuple):
     name: str
-    folder: pathlib.Path
+    folder: pathlib.Path  # of the sequence; of a bag, where it is written as a sequence
     labels: str
+    poses: pathlib.Path  # in the frame of the city
+    bag: Optional[Bag] = None
 
 
 class City(NamedTuple):
@@ -25,7 +36,8 @@ class City(NamedTuple):
 
 
 KEYS = {'drives', 'classes', 'config', 'set', 'piece_scans', 'region_tiles'}
-DRIVE_KEYS = {'sequence', 'name', 'labels'}
+SEQUENCE_KEYS = {'sequence', 'name', 'labels', 'poses'}
+BAG_KEYS = {'bag', 'name', 'cloud_topic', 'frame', 'label_field', 'labelled'}
 
 
 def read_city(path, add=(), without=()) -> City:
@@ -66,14 +78,26 @@ def read_city(path, add=(), without=()) -> City:
 
 
 def read_drive(entry, path) -> Drive:
-    known(entry, DRIVE_KEYS, path)
-    if not isinstance(entry.get('sequence'), str):
-        raise CityError(f'a drive in {path} has no sequence: FOLDER')
-    folder = (path.parent / entry['sequence']).absolute()
-    name = text_of(entry, 'name', folder.name, path)
-    if not name or name in ('.', '..') or any(c in name for c in '/\0#'):
+    is_bag = isinstance(entry, dict) and 'bag' in entry
+    known(entry, BAG_KEYS if is_bag else SEQUENCE_KEYS, path)
+    source = entry.get('bag' if is_bag else 'sequence')
+    if not isinstance(source, str) or not source:
+        raise CityError(f'a drive in {path} has no sequence: FOLDER, and no bag: FILE')
+    source = pathlib.Path(os.path.normpath((path.parent / source).absolute()))
+    name = text_of(entry, 'name', source.stem if is_bag else source.name, path)
+    if name in ('.', '..') or any(c in name for c in '/\0#'):
         raise CityError(f"'{name}' in {path} is no name for a drive, whose files are named after it; leave out / and #")
-    return Drive(name, folder, text_of(entry, 'labels', 'labels', path))
+    if not is_bag:
+        poses = path.parent / text_of(entry, 'poses', '-', path) if 'poses' in entry else source / 'poses.txt'
+        return Drive(name, source, text_of(entry, 'labels', 'labels', path), poses.absolute())
+    if 'cloud_topic' not in entry:
+        raise CityError(f'{source} in {path} has no cloud_topic; give that of its labelled clouds')
+    labelled = entry.get('labelled', True)
+    if not isinstance(labelled, bool):
+        raise CityError(f'labelled in {path} is {labelled!r}; give true or false')
+    bag = Bag(source, text_of(entry, 'cloud_topic', '', path), text_of(entry, 'frame', 'map', path),
+              text_of(entry, 'label_field', 'label', path), labelled)
+    return Drive(name, source, 'labels', source, bag)
 
 
 def known(mapping, keys, path):

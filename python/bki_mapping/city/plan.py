@@ -44,13 +44,18 @@ def stamps_of(paths: Iterable[pathlib.Path]) -> List:
     return stamps
 
 
+def written_bag(drive: Drive) -> str:
+    """Where a bag is written as a sequence, below the folder of the city."""
+    return f'bags/{drive.name}-{digest(str(drive.bag.path), *drive.bag[1:], stamps_of([drive.bag.path]))}'
+
+
 def pieces_of(city: City, drive: Drive) -> List[Piece]:
     """Raises CityError if the drive has no scans."""
     files = scans_of(drive)
     numbers = list(files)
-    shared = stamps_of(drive.folder / name for name in ('poses.txt', 'calib.txt', 'times.txt'))
-    settings = [city.classes, stamps_of([pathlib.Path(city.classes)]), stamps_of([pathlib.Path(city.config)]) if city.config else None,
-                city.settings]
+    shared = [str(drive.poses), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
+    settings = [city.classes, stamps_of([pathlib.Path(city.classes)]),
+                stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings]
     pieces = []
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
@@ -68,6 +73,10 @@ def columns_of(path) -> List[Tuple[int, int]]:
         return sorted(set(database.execute('SELECT DISTINCT x, y FROM tile WHERE part = 0')))
     finally:
         database.close()
+
+
+def picture_of(region_file: str) -> str:
+    return f'pictures/{pathlib.PurePath(region_file).stem}.png'
 
 
 def regions_of(columns: Iterable[Tuple[int, int]], edge: int) -> List[Region]:

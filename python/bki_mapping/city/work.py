@@ -1,101 +1,239 @@
-"""The tasks that workers do. Each writes to a name of its own and renames, so that it may be done twice, at the same time, or be
-killed. Each returns a dictionary: `file` and what is known of it, or `fault`, the sentence of the program that failed."""
+"""The tasks that workers do. Each writes to a name of its own and renames, so that it may be done twice, at the same time,
+or be killed. Each returns a dictionary: `file` and what is known of it, or `fault`, a sentence, and with `of_worker` whether
+the worker is to blame, and not what it worked on."""
+import functools
 import json
 import os
 import pathlib
+import shutil
+import signal
+import socket
 import subprocess
+import tempfile
 import time
 import uuid
+from typing import NamedTuple
 
-from bki_mapping.city import plan
+from bki_mapping.city import bags, plan
+from bki_mapping.city.description import CityError
 
-
+VERSION = 2  # of the tasks: a worker whose modules have another cannot do them
 TRIES = 3  # of a program that a signal ends, as when memory is short
+SIGHT = 10.0  # how long a worker may take to see what another machine has written [s]
+# Signals that come from outside of a program, or from a processor that it was not built for.
+OF_WORKER = {signal.SIGKILL, signal.SIGTERM, signal.SIGILL, signal.SIGXCPU}
 
 
-def run(city_folder, programs, name, arguments, log):
-    """Runs a program of this package. Returns its fault, or None. Its output is added to a log of its own."""
-    path = pathlib.Path(city_folder) / 'log' / log
-    path.parent.mkdir(parents=True, exist_ok=True)
-    command = [str(pathlib.Path(programs) / name), *map(str, arguments)]
-    for _ in range(TRIES):
+class Setup(NamedTuple):
+    """What all tasks of a run have in common."""
+    folder: str  # of the city
+    programs: str  # folder
+    token: str  # a file in the folder of the city, by which workers know that they see it
+    settings: tuple  # arguments of map_sequence
+    identity: str  # what the programs say of themselves and of the settings
+
+
+class Fault(Exception):
+    def __init__(self, text, of_worker=False):
+        super().__init__(text)
+        self.of_worker = of_worker
+
+
+def identity_of(programs, settings):
+    """The version of the programs and the parameters that they would use. Raises Fault."""
+    text = ''
+    for arguments in (['--version'], ['--print-config', *settings]):
+        command = [str(pathlib.Path(programs) / 'map_sequence'), *arguments]
+        try:
+            result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+        except OSError as error:
+            raise not_started(command[0], error.strerror) from None
+        if result.returncode:
+            lines = result.stderr.strip().splitlines()
+            if arguments[0] == '--version' or result.returncode in (126, 127):
+                raise not_started(command[0], lines[-1] if lines else f'status {result.returncode}')
+            raise Fault(lines[-1] if lines else f'{command[0]} ended with status {result.returncode}')
+        text += result.stdout
+    return text
+
+
+def not_started(program, why):
+    return Fault(f'{program} cannot be started on {socket.gethostname()} ({why}); install the same version of '
+                 'bki_mapping there as where map_city runs, or name the folder of its programs with --programs', of_worker=True)
+
+
+def unseen(folder):
+    return Fault(f'{socket.gethostname()} does not see {folder}; mount it there at the same path', of_worker=True)
+
+
+def prepare(setup: Setup):
+    """Checks that this process sees the city and has the same programs. Raises Fault."""
+    end = time.monotonic() + SIGHT
+    while not os.path.exists(setup.token):
+        if time.monotonic() > end:
+            raise unseen(setup.folder)
+        time.sleep(0.2)
+    check_programs(setup)
+
+
+@functools.lru_cache(maxsize=16)
+def check_programs(setup: Setup):
+    try:
+        found = identity_of(setup.programs, setup.settings)
+    except Fault as fault:
+        raise Fault(str(fault), of_worker=True) from None
+    if found != setup.identity:
+        ours, theirs = setup.identity.splitlines(), found.splitlines()
+        first = next(((a, b) for a, b in zip(ours, theirs) if a != b), ('', ''))
+        raise Fault(f"the programs in {setup.programs} on {socket.gethostname()} are others than where map_city runs "
+                    f"('{first[1]}' instead of '{first[0]}'); install the same version of bki_mapping there", of_worker=True)
+
+
+def task(do):
+    """A function of a setup and more: what it raises becomes a result."""
+    @functools.wraps(do)
+    def done(setup, *arguments):
         begin = time.time()
         try:
-            result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True,
-                                    errors='replace')
-        except OSError as error:
-            return f'{command[0]} cannot be started: {error.strerror}'
-        with open(path, 'a') as file:
-            file.write(f'$ {" ".join(command)}\n{result.stdout}{result.stderr}status {result.returncode}, '
-                       f'{time.time() - begin:.1f} s\n')
-        if result.returncode >= 0:
+            prepare(setup)
+            found = do(setup, *arguments)
+        except Fault as fault:
+            found = {'fault': str(fault), 'of_worker': fault.of_worker}
+        except OSError as error:  # such as a full disk; programs read the drives, so it is not about one of them
+            found = {'fault': f'{error} on {socket.gethostname()}', 'of_worker': True}
+        return dict(found, seconds=time.time() - begin)
+    return done
+
+
+def run(setup, name, arguments, log):
+    """Runs a program of this package. Returns its processor time [s]. Its output is added to a log of its own. Raises Fault."""
+    path = pathlib.Path(setup.folder) / 'log' / log
+    path.parent.mkdir(parents=True, exist_ok=True)
+    command = [str(pathlib.Path(setup.programs) / name), *map(str, arguments)]
+    spent = 0.0
+    for _ in range(TRIES):
+        begin = time.time()
+        with open(path, 'a') as file, tempfile.TemporaryFile() as errors:
+            file.write(f'$ {" ".join(command)}\n')
+            file.flush()
+            try:
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors)
+            except OSError as error:
+                raise not_started(command[0], error.strerror) from None
+            _, status, usage = os.wait4(process.pid, 0)
+            status = process.returncode = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
+            errors.seek(0)
+            text = errors.read().decode(errors='replace')
+            spent += usage.ru_utime + usage.ru_stime
+            file.seek(0, os.SEEK_END)
+            file.write(f'{text}status {status}, {time.time() - begin:.1f} s\n')
+        if status >= 0:
             break
-    if result.returncode == 0:
-        return None
-    lines = [line for line in result.stderr.strip().splitlines() if line]
-    return lines[-1] if lines else f'{name} ended with status {result.returncode}; see {path}'
+    if status == 0:
+        return spent
+    lines = [line for line in text.strip().splitlines() if line]
+    if status in (126, 127):
+        raise not_started(command[0], lines[-1] if lines else f'status {status}')
+    if -status in OF_WORKER:
+        raise Fault(f'{name} was ended {TRIES} times by signal {-status} on {socket.gethostname()}, as when memory is short; '
+                    f'give each worker more of it, or start fewer ({path})', of_worker=True)
+    raise Fault(lines[-1] if lines else f'{name} ended with status {status}; see {path}')
 
 
-def produce(city_folder, file, make):
-    """Lets `make` write a file under a name of its own, and renames it. make returns a fault or None."""
-    target = pathlib.Path(city_folder) / file
+def produce(setup, file, make):
+    """Lets `make` write a file under a name of its own, and renames it. Returns what make returns; None if it was there."""
+    target = pathlib.Path(setup.folder) / file
     if target.exists():
         return None
     target.parent.mkdir(parents=True, exist_ok=True)
     own = target.with_name(f'.{target.stem}.{uuid.uuid4().hex}{target.suffix}')
     try:
-        fault = make(own)
-        if fault is None:
+        made = make(own)
+        try:
             os.replace(own, target)
-        return fault
+        except OSError:  # a folder: another worker has written it meanwhile
+            if not target.is_dir():
+                raise
+        return made
     finally:
-        if own.exists():
+        if own.is_dir():
+            shutil.rmtree(own)
+        elif own.exists():
             own.unlink()
 
 
-def map_piece(city_folder, programs, city, piece):
-    begin = time.time()
+def result_of(setup, file, spent, **more):
+    """spent: processor time of a program [s]; None if the file was there."""
+    return {'file': file, 'bytes': (pathlib.Path(setup.folder) / file).stat().st_size, 'made': spent is not None,
+            'core_seconds': spent or 0.0, **more}
+
+
+@task
+def write_bag(setup, drive):
+    """Writes a bag as a sequence."""
+    if not drive.bag.path.exists():
+        raise Fault(f'{drive.bag.path} does not exist; give the path of a bag')
+    begin = time.process_time()
+    try:
+        made = produce(setup, plan.written_bag(drive), lambda own: bags.extract(drive.bag, own))
+    except CityError as error:
+        raise Fault(str(error)) from None
+    except ImportError as error:
+        raise Fault(f'drive {drive.name} is a bag, which needs ROS on {socket.gethostname()} ({error}); install '
+                    'python3-rosbag and python3-tf2-ros there', of_worker=True) from None
+    folder = pathlib.Path(setup.folder) / plan.written_bag(drive)
+    known = json.loads((folder / 'bag.json').read_text())
+    return {'file': plan.written_bag(drive), 'bytes': sum(each.stat().st_size for each in folder.rglob('*') if each.is_file()),
+            'made': made is not None, 'core_seconds': time.process_time() - begin, 'clouds': known['clouds'],
+            'without_pose': known['without_pose']}
+
+
+@task
+def map_piece(setup, piece):
     drive = piece.drive
     arguments = ['--sequence', drive.folder, '--labels', drive.labels, '--first', piece.first, '--scans', piece.scans,
-                 '--drive', piece.id, '--classes', city.classes, '--threads', 1]
-    if city.config:
-        arguments += ['--config', city.config]
-    for setting in city.settings:
-        arguments += ['--set', setting]
-    fault = produce(city_folder, piece.file, lambda own: run(
-        city_folder, programs, 'map_sequence', arguments + ['--output', own], f'{drive.name}-{piece.first:06d}.log'))
-    if fault:
-        return {'fault': fault}
-    path = pathlib.Path(city_folder) / piece.file
-    return {'file': piece.file, 'columns': plan.columns_of(path), 'bytes': path.stat().st_size, 'seconds': time.time() - begin}
-
-
-def sum_region(city_folder, programs, region_tiles, task):
-    begin = time.time()
-    x, y = (region_tiles * index for index in task.region)
-    columns = f'{x},{y},{x + region_tiles - 1},{y + region_tiles - 1}'
-    inputs = [pathlib.Path(city_folder) / each for each in task.inputs]
-    log = f'region-{task.region[0]}_{task.region[1]}.log'
-    fault = produce(city_folder, task.file, lambda own: run(
-        city_folder, programs, 'merge_maps', [*inputs, '--tiles', columns, '--output', own], log))
-    if fault:
-        return {'fault': fault}
-    size = (pathlib.Path(city_folder) / task.file).stat().st_size
-    return {'file': task.file, 'bytes': size, 'seconds': time.time() - begin}
-
-
-def check_region(city_folder, programs, task):
-    """Reads every byte of a region's file, and returns its figures."""
-    begin = time.time()
-    own = pathlib.Path(city_folder) / f'.{uuid.uuid4().hex}.json'
+                 '--drive', piece.id, '--threads', 1, *setup.settings]
+    if (drive.folder / 'velodyne').is_dir():
+        arguments += ['--poses', drive.poses]
     try:
-        fault = run(city_folder, programs, 'inspect_map', [pathlib.Path(city_folder) / task.file, '--json', own],
-                    f'region-{task.region[0]}_{task.region[1]}.log')
-        if fault:
-            return {'fault': fault}
+        spent = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
+                                                           f'{drive.name}-{piece.first:06d}.log'))
+    except Fault as fault:
+        if not drive.folder.is_dir():
+            raise unseen(drive.folder) from None
+        raise fault
+    path = pathlib.Path(setup.folder) / piece.file
+    return result_of(setup, piece.file, spent, columns=plan.columns_of(path))
+
+
+@task
+def sum_region(setup, region_tiles, each):
+    x, y = (region_tiles * index for index in each.region)
+    columns = f'{x},{y},{x + region_tiles - 1},{y + region_tiles - 1}'
+    inputs = [pathlib.Path(setup.folder) / file for file in each.inputs]
+    spent = produce(setup, each.file, lambda own: run(setup, 'merge_maps', [*inputs, '--tiles', columns, '--output', own],
+                                                      log_of(each)))
+    return result_of(setup, each.file, spent)
+
+
+@task
+def check_region(setup, picture, each):
+    """Reads every byte of a region's file, and returns its figures. picture: whether to draw it, too."""
+    own = pathlib.Path(setup.folder) / f'.{uuid.uuid4().hex}.json'
+    arguments = [pathlib.Path(setup.folder) / each.file, '--json', own]
+    drawn = pathlib.Path(setup.folder) / plan.picture_of(each.file)
+    if picture and not drawn.exists():
+        drawn.parent.mkdir(exist_ok=True)
+        arguments += ['--top', drawn]
+    try:
+        spent = run(setup, 'inspect_map', arguments, log_of(each))
         found = json.loads(own.read_text())
     finally:
         if own.exists():
             own.unlink()
-    return {'file': task.file, 'bounds': found['bounds'], 'voxels': found['voxels'], 'voxels_by_class': found['voxels_by_class'],
-            'blocks': found['blocks'], 'tiles': found['tiles'], 'bytes': found['file_bytes'], 'seconds': time.time() - begin}
+    figures = {name: found[name] for name in ('bounds', 'voxels', 'voxels_by_class', 'blocks', 'tiles')}
+    return result_of(setup, each.file, spent, **figures)
+
+
+def log_of(each):
+    return f'region-{each.region[0]}_{each.region[1]}.log'
