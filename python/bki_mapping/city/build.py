@@ -35,7 +35,7 @@ def dask_client(workers=0, scheduler=None):
                 own = stack.enter_context(tempfile.TemporaryDirectory(prefix='map_city-', ignore_cleanup_errors=True))
                 cluster = distributed.LocalCluster(local_directory=own, n_workers=workers or os.cpu_count(),
                                                    threads_per_worker=1, processes=True, host='127.0.0.1',
-                                                   dashboard_address=None, memory_limit=0, silence_logs=50)
+                                                   dashboard_address='127.0.0.1:0', memory_limit=0, silence_logs=50)
                 stack.enter_context(cluster)
                 scheduler = cluster
             try:

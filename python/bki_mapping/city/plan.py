@@ -4,6 +4,7 @@ The name of a file follows from everything that its content depends on. So a fil
 change of the city makes just the files that change."""
 import hashlib
 import json
+import os
 import pathlib
 import sqlite3
 from typing import Dict, Iterable, List, NamedTuple, Tuple
@@ -36,11 +37,16 @@ def digest(*parts) -> str:
 
 
 def stamps_of(paths: Iterable[pathlib.Path]) -> List:
-    """Sizes and times of files: other ones make another piece."""
+    """Sizes and times of files: other ones make another piece. The programs say what is wrong with a file that cannot be
+    seen."""
     stamps = []
     for path in paths:
-        found = path.stat() if path.is_file() else None
-        stamps.append([path.name, found and found.st_size, found and found.st_mtime_ns])
+        try:
+            found = os.stat(path)
+        except OSError:
+            stamps.append([path.name, None, None])
+        else:
+            stamps.append([path.name, found.st_size, found.st_mtime_ns])
     return stamps
 
 
