@@ -232,7 +232,7 @@ class Made(unittest.TestCase):
             time.sleep(0.05)
         address = json.loads(place.read_text())['address']
         city = self.describe(['d1', 'd2'])
-        options = ('--nworkers', 1, '--nthreads', 1, '--local-directory', self.folder)
+        options = ('--nthreads', 1, '--local-directory', self.folder)
         unfit = dask('worker', address, *options, PYTHONPATH='')
         text = self.finish(self.start(city, '--scheduler', address), 1)
         self.assertRegex(text, rf'map_city: the worker on {socket.gethostname()} cannot import bki_mapping.city .*; install')

@@ -32,7 +32,8 @@ def dask_client(workers=0, scheduler=None):
     with dask.config.set({'distributed.scheduler.allowed-failures': ALLOWED_FAILURES, 'distributed.admin.log-length': 100}):
         with contextlib.ExitStack() as stack:
             if scheduler is None:
-                own = stack.enter_context(tempfile.TemporaryDirectory(prefix='map_city-', ignore_cleanup_errors=True))
+                own = tempfile.mkdtemp(prefix='map_city-')
+                stack.callback(shutil.rmtree, own, ignore_errors=True)
                 cluster = distributed.LocalCluster(local_directory=own, n_workers=workers or os.cpu_count(),
                                                    threads_per_worker=1, processes=True, host='127.0.0.1',
                                                    dashboard_address='127.0.0.1:0', memory_limit=0, silence_logs=50)
