@@ -1,15 +1,11 @@
 #include "bki_mapping/io/mapper_file.h"
 
-#include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <stdexcept>
 
 #include "bki_mapping/io/config_yaml.h"
-#include "bki_mapping/map/clear_box.h"
 #include "bki_mapping/mapping/parameters.h"
-#include "store/box_tiles.h"
 
 namespace bki_mapping {
 
@@ -54,26 +50,8 @@ SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info) {
 
 StoredMap loadMapWithGains(const std::string& path) {
   MapFile file(path, MapFile::Access::kRead);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return readBoxWithGains(file,
-                          {Eigen::Vector3d::Constant(-kInfinity), Eigen::Vector3d::Constant(kInfinity)});
-}
-
-StoredMap readBoxWithGains(MapFile& file, const Eigen::AlignedBox3d& box) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  if (box.min().hasNaN() || box.max().hasNaN())
-    throw std::invalid_argument("a corner of the box is not a number");
-  StoredMap stored{file.info(), file.drives(), emptyMapWithGains(file.path(), file.info())};
-  const auto [first, last] = tilesAbout(box, stored.info.resolution);
-  for (const TileEntry& tile : file.tilesIn(first, last)) file.addTileTo(stored.map, {tile.index});
-  for (int axis = 0; axis < 3; ++axis) {
-    Eigen::AlignedBox3d below(Eigen::Vector3d::Constant(-kInfinity), Eigen::Vector3d::Constant(kInfinity));
-    Eigen::AlignedBox3d above = below;
-    below.max()[axis] = std::nextafter(box.min()[axis], -kInfinity);
-    above.min()[axis] = std::nextafter(box.max()[axis], kInfinity);
-    if (box.min()[axis] > -kInfinity) clearBox(stored.map, below);
-    if (box.max()[axis] < kInfinity) clearBox(stored.map, above);
-  }
+  StoredMap stored{file.info(), file.drives(), emptyMapWithGains(path, file.info())};
+  for (const TileEntry& tile : file.tiles()) file.addTileTo(stored.map, {tile.index});
   return stored;
 }
 

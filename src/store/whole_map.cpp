@@ -11,10 +11,7 @@ namespace {
 /// @param limit for the memory of a map of these tiles [bytes]; 0: no limit.
 void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, std::size_t limit) {
   std::size_t bytes = 0;
-  for (const TileEntry& tile : tiles) {
-    bytes += static_cast<std::size_t>(tile.planes) * kBlockVoxels * sizeof(EvidenceUnits) +
-             static_cast<std::size_t>(tile.blocks) * (sizeof(Block) + kReferenceCountBytes);
-  }
+  for (const TileEntry& tile : tiles) bytes += memoryOf(tile);
   if (limit == 0 || bytes <= limit) return;
   throw MapFileError("the map in " + path + " takes " + std::to_string(bytes / 1'000'000) +
                      " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
@@ -78,6 +75,11 @@ void checkFits(const MapFile& file, const MapInfo& own) {
   } catch (const std::invalid_argument& difference) {
     throw MapFileError(difference.what());
   }
+}
+
+std::size_t memoryOf(const TileEntry& tile) {
+  return static_cast<std::size_t>(tile.planes) * kBlockVoxels * sizeof(EvidenceUnits) +
+         static_cast<std::size_t>(tile.blocks) * (sizeof(Block) + kReferenceCountBytes);
 }
 
 std::vector<GridIndex> tilesOf(const SemanticMap& map) {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/io/tiled_map.h"
 #include "io/export_file.h"
 #include "io/trajectory_file.h"
 #include "tools/options.h"
@@ -39,6 +39,7 @@ po::options_description options() {
       "greatest height of obstacles in a .yaml map")(
       "height", text("map|ground")->default_value("map"),
       "zero of these heights: the origin of the map frame, or the ground below");
+  tools::addMemoryLimit(options);
   return options;
 }
 
@@ -90,12 +91,12 @@ int exportMapFile(const po::variables_map& given) {
   ExportOptions options = exportOptions(given);
   checkExport(output, options);
 
-  MapFile file(path, MapFile::Access::kRead);
-  const StoredMap stored = readBoxWithGains(file, box);
-  options.html.name = std::filesystem::path(path).stem().string();
+  TiledMap map(path);
+  const StoredMap stored = map.readBox(box, tools::memoryLimit(given));
+  options.html.name = std::filesystem::path(map.path()).stem().string();
   options.html.frame = stored.info.frame;
   options.html.drives = stored.drives;
-  options.html.parts = &file;
+  options.html.parts = map.file();
   exportFile(output, stored.map, *stored.info.classes, options);
   std::cout << output << ": written, in frame " << stored.info.frame << "\n";
   return 0;
@@ -106,8 +107,9 @@ int exportMapFile(const po::variables_map& given) {
 int main(int argc, char** argv) {
   return tools::run("export_map", [&] {
     const auto given = tools::parse(argc, argv,
-                                    "export_map FILE.bkm --output FILE\n"
-                                    "Converts a map for other programs.",
+                                    "export_map MAP --output FILE\n"
+                                    "Converts a map, or a part of one, for other programs. MAP is a map file "
+                                    "(.bkm) or the folder of a city.",
                                     options(), "files");
     return given ? exportMapFile(*given) : 0;
   });

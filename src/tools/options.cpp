@@ -10,6 +10,7 @@
 
 #include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/tiled_map.h"
 #include "bki_mapping/mapping/parameters.h"
 
 namespace bki_mapping::tools {
@@ -102,6 +103,19 @@ Eigen::AlignedBox3d parseBox(const std::string& text) {
   }
   const Eigen::Vector3d a(numbers[0], numbers[1], numbers[2]), b(numbers[3], numbers[4], numbers[5]);
   return {a.cwiseMin(b), a.cwiseMax(b)};
+}
+
+void addMemoryLimit(po::options_description& options) {
+  constexpr std::int64_t kMegabyte = 1'000'000;
+  options.add_options()("memory-limit",
+                        countOption("--memory-limit", 0, 1'000'000'000)
+                            ->value_name("MB")
+                            ->default_value(static_cast<std::int64_t>(TiledMap::kUsualLimit) / kMegabyte),
+                        "refuse to read more of the map than this into memory; 0: no limit");
+}
+
+std::size_t memoryLimit(const po::variables_map& given) {
+  return 1'000'000 * count(given, "memory-limit");
 }
 
 po::options_description mapperOptions() {

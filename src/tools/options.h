@@ -46,6 +46,10 @@ std::string onlyMapFile(const po::variables_map& given);
 /// @throws std::invalid_argument if it is not six numbers.
 Eigen::AlignedBox3d parseBox(const std::string& text);
 
+/// The option --memory-limit of programs that read a TiledMap, and its value [bytes]; 0: no limit.
+void addMemoryLimit(po::options_description& options);
+std::size_t memoryLimit(const po::variables_map& given);
+
 /// Options of all programs with a mapper: --classes, --config, --set, --threads.
 po::options_description mapperOptions();
 /// The configuration that these options give. Prints a warning to standard error for questionable settings.

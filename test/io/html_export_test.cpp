@@ -365,38 +365,6 @@ TEST_F(HtmlExport, SaysWhatToInstall) {
   EXPECT_EQ(folder_.fileCount(), 1u);
 }
 
-TEST(BoxOfAMap, HasTheVoxelsInTheBoxAndNoOthers) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
-  saveMap(path, infoOf(), {driveOf("a")}, randomMap(4, 60, 12));
-  MapFile file(path, MapFile::Access::kRead);
-  const SemanticMap whole = loadMapWithGains(path).map;
-  const Eigen::Vector3d centre = whole.geometry().voxelCentre({{3, 5, -20}});
-  for (const Eigen::AlignedBox3d& box :
-       {Eigen::AlignedBox3d(Eigen::Vector3d(-9.0, -13.1, -20.0), centre),  // a centre on the faces
-        Eigen::AlignedBox3d(Eigen::Vector3d(-kInfinity, 2.0, -kInfinity),
-                            Eigen::Vector3d(4.0, kInfinity, -5.0))}) {
-    const SemanticMap part = readBoxWithGains(file, box).map;
-    std::size_t inside = 0, outside = 0;
-    for (const auto& [index, block] : whole.entries()) {
-      for (int v = 0; v < kBlockVoxels; ++v) {
-        const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
-        const VoxelView all = viewVoxel(whole, *block, v), found = viewWithoutEntropy(part, voxel);
-        if (all.state == VoxelState::kUnknown) continue;
-        const bool in = box.contains(whole.geometry().voxelCentre(voxel));
-        ASSERT_EQ(found.state, in ? all.state : VoxelState::kUnknown);
-        ASSERT_EQ(found.evidence, in ? all.evidence : 0.0f);
-        ++(in ? inside : outside);
-      }
-    }
-    EXPECT_GT(inside, 0u);
-    EXPECT_GT(outside, 0u);
-  }
-  Eigen::AlignedBox3d wrong(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones());
-  wrong.max().x() = std::nan("");
-  EXPECT_THROW(readBoxWithGains(file, wrong), std::invalid_argument);
-}
-
 TEST(TrajectoryFile, HasThePlacesOfPoses) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& text) {

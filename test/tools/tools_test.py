@@ -674,6 +674,9 @@ class Tools(unittest.TestCase):
         self.assertGreater(len(inside), 100)
         self.assertEqual(records(part), inside)
         self.fails('--box has 2 numbers', 'export_map', a, '--output', part, '--box', '1 2')
+        self.fails('MB of memory, and the limit is 1 MB; ask for a smaller box, or raise the limit', 'export_map', a, '--output', part,
+                   '--memory-limit', '1')
+        self.succeeds('export_map', a, '--output', part, '--memory-limit', '0')
 
     def test_exporting_a_page(self):
         a, page, library = self.path('paged.bkm'), self.path('page.html'), self.path('three.js')

@@ -1,7 +1,6 @@
 /// @file Keeps the map of a mapper in a map file (.bkm), and resumes from it.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <string>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -26,12 +25,8 @@ StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, cons
 /// @param path of the file, for errors. @throws MapFileError if the parameters are not YAML.
 SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
 
-/// Reads a whole map as loadMap, into the map that emptyMapWithGains gives, to be asked. @throws as these.
+/// Reads a whole map as loadMap, into the map that emptyMapWithGains gives, to be asked. TiledMap reads a
+/// part of one, or of a city. DriveRecord::part is as in the file. @throws as these.
 StoredMap loadMapWithGains(const std::string& path);
-/// The same of an open file, and of a box: voxels whose centres lie outside stay unknown, and tiles outside
-/// are not read. DriveRecord::part is as in the file.
-/// @param box map frame [m], faces included; may be infinite.
-/// @throws std::invalid_argument if a corner of the box is not a number.
-StoredMap readBoxWithGains(MapFile& file, const Eigen::AlignedBox3d& box);
 
 }  // namespace bki_mapping

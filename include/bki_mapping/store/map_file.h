@@ -164,6 +164,9 @@ StoredMap readMap(MapFile& file, std::size_t memory_limit = 0);
 /// @throws MapFileError in one sentence with the file and both values.
 void checkFits(const MapFile& file, const MapInfo& own);
 
+/// The memory of a tile in a map, without the map's index [bytes].
+std::size_t memoryOf(const TileEntry& tile);
+
 /// The tiles in which a map has blocks, sorted by index.
 std::vector<GridIndex> tilesOf(const SemanticMap& map);
 
