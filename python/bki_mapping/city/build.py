@@ -114,7 +114,7 @@ class Builder:
         checked = self.follow('check', 'regions', [(each, (work.check_region, self.setup, self.draw, each)) for each in last],
                               must=True, count_of=lambda found: ('tiles', found['tiles']))
         index = {
-            'version': 1, 'region_tiles': self.city.region_tiles,
+            'version': 1, 'region_tiles': self.city.region_tiles, 'resolution': checked[0][1]['resolution'] if checked else None,
             'drives': [self.drive_entry(drive, [piece for piece, _ in pieces if piece.drive.name == name])
                        for name, drive in sorted(mapped.items())],
             'left_out': dict(sorted(self.broken.items())),
@@ -122,7 +122,7 @@ class Builder:
                         for each, found in sorted(checked, key=lambda pair: pair[0].region)],
         }
         for region in index['regions']:
-            for name in ('seconds', 'core_seconds', 'made'):
+            for name in ('seconds', 'core_seconds', 'made', 'resolution'):
                 region.pop(name)
         write_whole(self.folder / 'index.json', json.dumps(index, indent=1) + '\n')
         return index

@@ -231,7 +231,7 @@ def check_region(setup, picture, each):
     finally:
         if own.exists():
             own.unlink()
-    figures = {name: found[name] for name in ('bounds', 'voxels', 'voxels_by_class', 'blocks', 'tiles')}
+    figures = {name: found[name] for name in ('bounds', 'voxels', 'voxels_by_class', 'blocks', 'tiles', 'resolution')}
     return result_of(setup, each.file, spent, **figures)
 
 
