@@ -33,7 +33,7 @@ install(TARGETS ${bki_mapping_private_rooms}
 install(EXPORT bki_mapping-targets NAMESPACE bki_mapping:: DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
 
 set(bki_mapping_programs benchmark_sequence benchmark_store clear_map evaluate_map export_map inspect_map map_sequence merge_maps
-  migrate_map simulate_city simulate_drive)
+  migrate_map query_city simulate_city simulate_drive)
 if(TARGET benchmark_parts)
   list(APPEND bki_mapping_programs benchmark_parts)
 endif()

@@ -33,6 +33,19 @@ void count(MapStatistics& statistics, const BlockIndex& index, const BlockView& 
   }
 }
 
+/// Counts the blocks of a map.
+void countAll(MapStatistics& statistics, const SemanticMap& map, const BlockVisit& visit) {
+  BlockView view;
+  for (const auto& [index, block] : sortedBlocks(map)) {
+    ++statistics.blocks;
+    statistics.planes += block->classes().size();
+    statistics.memory_bytes += block->bytes();
+    readBlock(map, *block, BlockFields::kStates, view);
+    count(statistics, index, view);
+    if (visit) visit(index, view);
+  }
+}
+
 }  // namespace
 
 Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
@@ -43,20 +56,19 @@ Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
 
 MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit) {
   MapStatistics statistics;
-  BlockView view;
   for (const TileEntry& tile : file.tiles()) {
     SemanticMap map = empty_map.snapshot();
     file.addTileTo(map, {tile.index});
     ++statistics.tiles;
-    for (const auto& [index, block] : sortedBlocks(map)) {
-      ++statistics.blocks;
-      statistics.planes += block->classes().size();
-      statistics.memory_bytes += block->bytes();
-      readBlock(map, *block, BlockFields::kStates, view);
-      count(statistics, index, view);
-      if (visit) visit(index, view);
-    }
+    countAll(statistics, map, visit);
   }
+  return statistics;
+}
+
+MapStatistics statisticsOf(const SemanticMap& map, const BlockVisit& visit) {
+  MapStatistics statistics;
+  statistics.tiles = map.regions().size();
+  countAll(statistics, map, visit);
   return statistics;
 }
 

@@ -31,4 +31,7 @@ struct MapStatistics {
 using BlockVisit = std::function<void(const BlockIndex& index, const BlockView& view)>;
 MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit = nullptr);
 
+/// The same of a map in memory; `tiles` counts its regions.
+MapStatistics statisticsOf(const SemanticMap& map, const BlockVisit& visit = nullptr);
+
 }  // namespace bki_mapping

@@ -49,7 +49,7 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'query_city', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help', '--version'}
             self.assertGreater(len(options), 1, program)
             for option in options:
