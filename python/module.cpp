@@ -1,8 +1,6 @@
 // The Python module bki_mapping._core. python/bki_mapping/__init__.py loads it when it is first used.
 #include <pybind11/stl.h>
 
-#include <algorithm>
-#include <limits>
 #include <memory>
 
 #include "arrays.h"
@@ -12,25 +10,13 @@
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/query/rays.h"
 #include "bki_mapping/store/map_merge.h"
+#include "city_bindings.h"
 #include "class_bindings.h"
 #include "map_bindings.h"
 #include "mapper_bindings.h"
 
 namespace bki_mapping::python {
 namespace {
-
-/// A number of threads; StateMap checks its range.
-int threadsOf(py::handle threads) {
-  const std::size_t count = countOf(threads, "threads");
-  return static_cast<int>(std::min<std::size_t>(count, std::numeric_limits<int>::max()));
-}
-
-SharedMap load(py::handle path, py::handle threads) {
-  const std::string file = pathOf(path, "path");
-  const int count = threadsOf(threads);
-  const py::gil_scoped_release release;
-  return std::make_shared<FixedMap>(loadMapWithGains(file), count);
-}
 
 MergeInput inputOf(py::handle input) {
   if (!py::isinstance<py::tuple>(input)) return {pathOf(input, "an input"), std::nullopt};
@@ -162,9 +148,7 @@ PYBIND11_MODULE(_core, m) {
   addMap(m);
   addMapper(m);
   addSequence(m);
-  m.def("load", &load, py::arg("path"), py::arg("threads") = 0,
-        "Read a map file (.bkm).\n\nthreads: that queries of many things use; 0: all cores.\n\nRaises "
-        "MapFileError if it cannot be read, is damaged, or is no map file.");
+  addCity(m);
   m.def("merge", &merge, py::arg("inputs"), py::arg("output"), py::arg("keep_drives") = false,
         py::arg("without") = std::vector<std::string>(),
         "Merge map files into another one: the sum of the drives that are in any of them, each counted "

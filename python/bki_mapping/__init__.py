@@ -11,8 +11,8 @@ explains more. ROS is not needed; where the package was built with ROS, bki_mapp
 import importlib
 
 __all__ = ['EVIDENCE_UNIT', 'FREE', 'FREE_CLASS', 'OCCLUDED', 'OCCUPIED', 'RAY_NOTHING', 'RAY_OCCUPIED', 'RAY_UNKNOWN', 'UNKNOWN', 'Block',
-           'ClassFilter', 'ClassTable', 'DistanceField', 'Drive', 'Frame', 'Map', 'MapFileError', 'ScanRefused', 'ScanStats', 'Section',
-           'SemanticClass', 'SemanticMapper', 'Sequence', 'load', 'merge']
+           'City', 'ClassFilter', 'ClassTable', 'DistanceField', 'Drive', 'Frame', 'Map', 'MapFileError', 'ScanRefused', 'ScanStats', 'Section',
+           'SemanticClass', 'SemanticMapper', 'Sequence', 'load', 'merge', 'open_city']
 
 
 # Loaded when first used: nodes that import only messages need neither the library nor NumPy.

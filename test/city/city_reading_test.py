@@ -73,7 +73,7 @@ class CityReading(unittest.TestCase):
         self.assertTrue(all(row['nearest_class'] == row['class'] and float(row['nearest_distance']) < 1e-4 for row in rows[300:350]))
         found = 0
         for point, row in zip(points, rows):
-            self.assertEqual(float(row['x']), point[0])
+            self.assertAlmostEqual(float(row['x']), point[0], delta=1e-9 * abs(point[0]))
             nearest = min(math.dist(point, centre) for centre, _ in voxels)
             if nearest <= 24.999:
                 found += 1

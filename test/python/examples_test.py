@@ -16,6 +16,8 @@ import bki_mapping
 
 BIN = os.environ['BKI_MAPPING_BIN']
 EXAMPLES = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'examples')
+sys.path.insert(0, os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'test', 'city'))
+import small_city  # noqa: E402
 
 
 class Examples(unittest.TestCase):
@@ -65,6 +67,8 @@ class Examples(unittest.TestCase):
             self.addCleanup(os.chdir, before)
             subprocess.run([os.path.join(BIN, 'simulate_drive'), '--scans', '2', '--beams', '8', '--columns', '200', '--output',
                             'demo_output/drive'], check=True, capture_output=True, timeout=60)
+            small_city.program(BIN, 'map_sequence', '--sequence', 'demo_output/drive', '--output', 'drive.bkm')
+            small_city.write_city(BIN, ['drive.bkm'], 'city', 2)
             for name in ('a', 'b', 'yesterday'):
                 bki_mapping.SemanticMapper(config='robot').save(f'{name}.bkm')
             for document in ('README.md', 'docs/python.md'):
