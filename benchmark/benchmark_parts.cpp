@@ -296,8 +296,8 @@ void sections(benchmark::State& state, int threads) {
   });
 }
 
-void findingFrontiers(benchmark::State& state, int threads) {
-  ask(state, threads, 1, [&](const StateMap& states) { benchmark::DoNotOptimize(frontiers(states)); });
+void findingFrontiers(benchmark::State& state, int threads, const FrontierRules& rules) {
+  ask(state, threads, 1, [&](const StateMap& states) { benchmark::DoNotOptimize(frontiers(states, rules)); });
 }
 
 /// A region of 100 m x 100 m x 10 m.
@@ -362,7 +362,11 @@ int main(int argc, char** argv) {
     addOn("RaysToUnknown", [=](auto& state) { castingRays(state, threads, {ClassFilter::all(), true}); });
     addOn("Footprints", [=](auto& state) { footprints(state, threads); });
     addOn("Section", [=](auto& state) { sections(state, threads); });
-    addOn("Frontiers", [=](auto& state) { findingFrontiers(state, threads); });
+    addOn("Frontiers", [=](auto& state) { findingFrontiers(state, threads, {}); });
+    addOn("FrontierSizes", [=](auto& state) { findingFrontiers(state, threads, {1, false, std::nullopt}); });
+    addOn("FrontierSizesInBox", [=](auto& state) {
+      findingFrontiers(state, threads, {1, false, queryFixture().region(30.0, 30.0, 10.0)});
+    });
     addOn("DistanceField", [=](auto& state) { distances(state, threads, {}); });
     addOn("DistanceFieldUnknown", [=](auto& state) {
       distances(state, threads, {ClassFilter::all(), true});

@@ -70,7 +70,7 @@ class Street:
                 ('Footprints', lambda: map_.contents_along(self.poses, (2.5, 1.0, 0.75)), 2000),
                 ('NearestObstacle', lambda: map_.nearest_obstacles(self.points[:2000]), 2000),
                 ('Section', lambda: map_.horizontal_section(self.z, self.low[:2], self.high[:2]), 1),
-                ('Frontiers', map_.frontiers, 1),
+                ('FrontierSizes', map_.frontiers, 1),
                 ('DistanceField', lambda: map_.distance_field(self.low, self.high), 1),
                 ('DistanceUpdate', self.follow, 2))
 

@@ -179,9 +179,9 @@ if(TARGET bki_mapping_python)
   set_property(TEST path_test APPEND PROPERTY ENVIRONMENT "PYTHONPATH=${python_path}")
   if(TARGET benchmark_parts)  # that the comparison runs, not how fast
     add_test(NAME compare_python_test COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/benchmark/compare_python.py
-      --programs $<TARGET_FILE_DIR:benchmark_parts> --repeats 1 --only PointStates,Frontiers)
+      --programs $<TARGET_FILE_DIR:benchmark_parts> --repeats 1 --only PointStates,FrontierSizes)
     set_tests_properties(compare_python_test PROPERTIES TIMEOUT 300 PROCESSORS 2 ENVIRONMENT "PYTHONPATH=${python_path}"
-      PASS_REGULAR_EXPRESSION "PointStates +[0-9.]+ +[0-9.]+ +[0-9.]+\nFrontiers +[0-9.]+ +[0-9.]+ +[0-9.]+\n$")
+      PASS_REGULAR_EXPRESSION "PointStates +[0-9.]+ +[0-9.]+ +[0-9.]+\nFrontierSizes +[0-9.]+ +[0-9.]+ +[0-9.]+\n$")
   endif()
 endif()
 add_test(NAME vector_symbols_test

@@ -250,25 +250,30 @@ struct FrontierRecord {
   std::int64_t size;
 };
 
-py::object frontiersOf(const FixedMap& map, py::handle min_size, py::handle return_voxels) {
-  const std::size_t least = countOf(min_size, "min_size");
-  const bool with_voxels = truthOf(return_voxels, "return_voxels");
+py::object frontiersOf(const FixedMap& map, py::handle min_size, py::handle return_voxels, py::handle lower,
+                       py::handle upper) {
+  FrontierRules rules;
+  rules.min_size = countOf(min_size, "min_size");
+  rules.with_voxels = truthOf(return_voxels, "return_voxels");
+  if (lower.is_none() != upper.is_none()) {
+    throw std::invalid_argument("the box has only one corner; give lower and upper, or neither");
+  }
+  if (!lower.is_none()) rules.box.emplace(tripleOf(lower, "lower"), tripleOf(upper, "upper"));
   std::vector<FrontierRecord> records;
   std::vector<GridIndex> voxels;
   {
     const py::gil_scoped_release release;
-    for (const Frontier& each : frontiers(map.states, least)) {
+    for (const Frontier& each : frontiers(map.states, rules)) {
       const Eigen::Vector3d& centre = each.centre;
-      records.push_back(
-          {{centre.x(), centre.y(), centre.z()}, static_cast<std::int64_t>(each.voxels.size())});
-      if (with_voxels) voxels.insert(voxels.end(), each.voxels.begin(), each.voxels.end());
+      records.push_back({{centre.x(), centre.y(), centre.z()}, static_cast<std::int64_t>(each.size)});
+      voxels.insert(voxels.end(), each.voxels.begin(), each.voxels.end());
     }
   }
   using F = FrontierRecord;
   py::array found = ownedArray(
       std::move(records),
       structType({{"centre", "f8", offsetof(F, centre), 3}, {"size", "i8", offsetof(F, size)}}, sizeof(F)));
-  if (!with_voxels) return std::move(found);
+  if (!rules.with_voxels) return std::move(found);
   return py::make_tuple(found, indexArray(voxels));
 }
 
@@ -350,15 +355,21 @@ void addQueries(py::module& m, MapClass& map) {
            "at most 100 million cells.\n\n"
            "Raises ValueError like horizontal_section.")
       .def("frontiers", &frontiersOf, py::arg("min_size") = 1, py::arg("return_voxels") = false,
+           py::arg("lower") = py::none(), py::arg("upper") = py::none(),
            "Where known free space ends: clusters of free voxels with an unknown or occluded one on at least "
            "one of six sides. Those that share a face, an edge or a corner form one cluster. The largest "
            "comes first.\n\n"
            "min_size: least number of voxels; smaller frontiers are left out.\n"
-           "return_voxels: whether to return the indices of their voxels as well.\n\n"
+           "return_voxels: whether to return the indices of their voxels as well.\n"
+           "lower, upper: corners of a box, map frame [m], (3,): only voxels that it overlaps count, as if "
+           "there "
+           "were no other frontier voxels. None: the whole map.\n\n"
            "Returns (N,), structured: centre (mean of the centres of its voxels, map frame [m], (3,)) and "
            "size (number of voxels); with return_voxels, also the voxels of all frontiers one after the "
            "other, "
-           "(sum of sizes, 3), int32.\n\nRaises ValueError if min_size is negative.");
+           "(sum of sizes, 3), int32.\n\nRaises ValueError if min_size is negative, or the box is not "
+           "finite, inside out, or "
+           "reaches beyond the grid.");
   addDistances(m, map);
 }
 

@@ -1,7 +1,11 @@
 #include "bki_mapping/query/frontiers.h"
 
 #include <algorithm>
+#include <array>
+#include <stdexcept>
 #include <utility>
+
+#include "query/voxel_rows.h"
 
 namespace bki_mapping {
 namespace {
@@ -13,11 +17,63 @@ constexpr std::uint64_t kFirstColumn = kAll / 0xff;  ///< the voxels with x = 0 
 /// A set of voxels of a block, by layer.
 using Layers = std::array<std::uint64_t, kBlockEdge>;
 
+/// The voxels that a box overlaps.
+class VoxelBox {
+ public:
+  /// @throws std::invalid_argument.
+  VoxelBox(const GridGeometry& geometry, const Eigen::AlignedBox3d& box) {
+    if (!box.min().allFinite() || !box.max().allFinite()) {
+      throw std::invalid_argument("the box has a coordinate that is not finite; give finite ones");
+    }
+    if ((box.min().array() > box.max().array()).any()) {
+      throw std::invalid_argument("the box is inside out; give a min below its max");
+    }
+    if (!geometry.contains(box.min()) || !geometry.contains(box.max())) {
+      throw std::invalid_argument("the box reaches beyond the map's grid; cut it to where the map is");
+    }
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      ranges_[static_cast<std::size_t>(axis)] =
+          overlapped(box.min()[axis] / geometry.resolution(), box.max()[axis] / geometry.resolution());
+    }
+  }
+
+  bool overlaps(const BlockIndex& index) const {
+    return bits(0, index.x) != 0 && bits(1, index.y) != 0 && bits(2, index.z) != 0;
+  }
+  /// Takes the voxels outside the box out of a block's.
+  void cut(const BlockIndex& index, Layers& layers) const {
+    const std::uint64_t x = bits(0, index.x), y = bits(1, index.y), z = bits(2, index.z);
+    std::uint64_t rows = 0;
+    for (std::size_t row = 0; row < kBlockEdge; ++row) {
+      if (y >> row & 1) rows |= x << kBlockEdge * row;
+    }
+    for (std::size_t layer = 0; layer < kBlockEdge; ++layer) layers[layer] &= z >> layer & 1 ? rows : 0;
+  }
+
+ private:
+  /// Those of a block's eight layers across an axis that are in the box. @param block its index on the axis.
+  std::uint64_t bits(std::size_t axis, std::int32_t block) const {
+    const std::int64_t first = std::int64_t{block} * kBlockEdge;
+    const std::int64_t begin = std::max<std::int64_t>(0, ranges_[axis].begin - first),
+                       end = std::min<std::int64_t>(kBlockEdge, ranges_[axis].end - first);
+    return begin < end ? ((std::uint64_t{1} << end) - 1) & ~((std::uint64_t{1} << begin) - 1) : 0;
+  }
+
+  std::array<VoxelRange, 3> ranges_;
+};
+
 class FrontierFinder {
  public:
-  explicit FrontierFinder(const StateMap& states) : states_(states), blocks_(sortedBlocks(states.map())) {
+  FrontierFinder(const StateMap& states, const FrontierRules& rules)
+      : states_(states), with_voxels_(rules.with_voxels), min_size_(rules.min_size) {
+    std::optional<VoxelBox> box;
+    if (rules.box) box.emplace(states.geometry(), *rules.box);
+    for (const auto& entry : states.map().entries()) {
+      if (!box || box->overlaps(entry.index)) blocks_.push_back(entry.index);
+    }
+    std::sort(blocks_.begin(), blocks_.end());
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      position_.insert(blocks_[b].first, static_cast<std::uint32_t>(b));
+      position_.insert(blocks_[b], static_cast<std::uint32_t>(b));
     }
     left_.resize(blocks_.size());
     cluster_.resize(blocks_.size());
@@ -25,31 +81,42 @@ class FrontierFinder {
     states.parallelFor((blocks_.size() + kBlocksPerJob - 1) / kBlocksPerJob, [&](std::size_t job) {
       BlockReader reader(states);
       const std::size_t end = std::min(blocks_.size(), (job + 1) * kBlocksPerJob);
-      for (std::size_t b = job * kBlocksPerJob; b < end; ++b) left_[b] = frontierIn(reader, blocks_[b].first);
+      for (std::size_t b = job * kBlocksPerJob; b < end; ++b) {
+        left_[b] = frontierIn(reader, blocks_[b]);
+        if (box) box->cut(blocks_[b], left_[b]);
+      }
     });
   }
 
-  std::vector<Frontier> clusters(std::size_t min_size) {
-    std::vector<Frontier> found;
+  std::vector<Frontier> clusters() {
+    std::vector<Found> found;
     for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
       for (std::size_t z = 0; z < kBlockEdge; ++z) {
         while (left_[b][z] != 0) {
           Layers seed{};
           seed[z] = left_[b][z] & (~left_[b][z] + 1);  // the lowest bit
           const std::size_t size = takeCluster(b, seed);
-          if (size >= min_size) found.push_back(makeFrontier(size));
+          if (size >= min_size_) found.push_back(makeFrontier(size));
           for (const std::uint32_t part : parts_) cluster_[part] = {};
         }
       }
     }
-    std::sort(found.begin(), found.end(), [](const Frontier& a, const Frontier& b) {
-      if (a.voxels.size() != b.voxels.size()) return a.voxels.size() > b.voxels.size();
-      return a.voxels.front() < b.voxels.front();
+    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+      if (a.frontier.size != b.frontier.size) return a.frontier.size > b.frontier.size;
+      return a.first < b.first;
     });
-    return found;
+    std::vector<Frontier> frontiers;
+    frontiers.reserve(found.size());
+    for (Found& each : found) frontiers.push_back(std::move(each.frontier));
+    return frontiers;
   }
 
  private:
+  struct Found {
+    Frontier frontier;
+    VoxelIndex first;  ///< of its voxels, in the order of GridIndex
+  };
+
   static std::uint64_t unknownIn(const BlockStates* block, std::size_t z) {
     return block ? ~(block->layers[z].occupied | block->layers[z].free) : kAll;
   }
@@ -97,7 +164,7 @@ class FrontierFinder {
         left_[b][z] &= ~grown[z];
         cluster_[b][z] |= grown[z];
       }
-      spread(blocks_[b].first, grown);
+      spread(blocks_[b], grown);
     }
     return size;
   }
@@ -179,15 +246,55 @@ class FrontierFinder {
     return any == 0;
   }
 
+  /// The voxels in cluster_.
+  Found makeFrontier(std::size_t size) {
+    Found found;
+    found.frontier.size = size;
+    // The sum of indices, which is exact in any order.
+    std::array<std::int64_t, 3> sum{};
+    std::optional<VoxelIndex> first;
+    for (const std::uint32_t b : parts_) {
+      const VoxelIndex corner = GridGeometry::voxelOf(blocks_[b], 0);
+      for (std::size_t z = 0; z < kBlockEdge; ++z) {
+        const std::uint64_t layer = cluster_[b][z];
+        if (layer == 0) continue;
+        const std::int64_t count = __builtin_popcountll(layer);
+        sum[0] += count * corner.x + sumOfDigits(layer, kDigitsX);
+        sum[1] += count * corner.y + sumOfDigits(layer, kDigitsY);
+        sum[2] += count * (corner.z + static_cast<std::int32_t>(z));
+        const VoxelIndex lowest =
+            GridGeometry::voxelOf(blocks_[b], static_cast<int>(64 * z) + __builtin_ctzll(layer));
+        if (!first || lowest < *first) first = lowest;
+      }
+    }
+    found.first = *first;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const auto total = static_cast<double>(sum[static_cast<std::size_t>(axis)]);
+      found.frontier.centre[axis] =
+          (total / static_cast<double>(size) + 0.5) * states_.geometry().resolution();
+    }
+    if (with_voxels_) found.frontier.voxels = voxelsOfCluster(size);
+    return found;
+  }
+
+  // The bits of a layer whose x or y has the lowest, the middle and the highest binary digit.
+  static constexpr std::array<std::uint64_t, 3> kDigitsX = {0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc,
+                                                            0xf0f0f0f0f0f0f0f0},
+                                                kDigitsY = {0xff00ff00ff00ff00, 0xffff0000ffff0000,
+                                                            0xffffffff00000000};
+  /// The sum of the x or y of a layer's voxels within their block.
+  static std::int64_t sumOfDigits(std::uint64_t layer, const std::array<std::uint64_t, 3>& digits) {
+    return __builtin_popcountll(layer & digits[0]) + 2 * __builtin_popcountll(layer & digits[1]) +
+           4 * __builtin_popcountll(layer & digits[2]);
+  }
+
   /// The voxels in cluster_, in the order of GridIndex.
-  Frontier makeFrontier(std::size_t size) {
+  std::vector<VoxelIndex> voxelsOfCluster(std::size_t size) {
     std::sort(parts_.begin(), parts_.end());  // blocks_ is sorted, too
-    Frontier frontier;
-    frontier.centre.setZero();
-    frontier.voxels.reserve(size);
+    std::vector<VoxelIndex> voxels;
+    voxels.reserve(size);
     const auto differs = [this](std::size_t n, auto coordinate) {
-      return n == parts_.size() ||
-             blocks_[parts_[n]].first.*coordinate != blocks_[parts_[n - 1]].first.*coordinate;
+      return n == parts_.size() || blocks_[parts_[n]].*coordinate != blocks_[parts_[n - 1]].*coordinate;
     };
     for (std::size_t slab = 0, next_slab = 0; slab < parts_.size(); slab = next_slab) {
       while (!differs(++next_slab, &BlockIndex::z)) {
@@ -197,27 +304,26 @@ class FrontierFinder {
           while (++next_row < next_slab && !differs(next_row, &BlockIndex::y)) {
           }
           for (std::size_t y = 0; y < kBlockEdge; ++y) {
-            for (std::size_t n = row; n < next_row; ++n) appendRow(parts_[n], y, z, frontier);
+            for (std::size_t n = row; n < next_row; ++n) appendRow(parts_[n], y, z, voxels);
           }
         }
       }
     }
-    frontier.centre /= static_cast<double>(size);
-    return frontier;
+    return voxels;
   }
 
-  void appendRow(std::uint32_t b, std::size_t y, std::size_t z, Frontier& frontier) const {
+  void appendRow(std::uint32_t b, std::size_t y, std::size_t z, std::vector<VoxelIndex>& voxels) const {
     for (std::uint64_t row = cluster_[b][z] >> kBlockEdge * y & 0xff; row != 0; row &= row - 1) {
       const auto offset = static_cast<int>(64 * z + kBlockEdge * y) + __builtin_ctzll(row);
-      const VoxelIndex voxel = GridGeometry::voxelOf(blocks_[b].first, offset);
-      frontier.voxels.push_back(voxel);
-      frontier.centre += states_.geometry().voxelCentre(voxel);
+      voxels.push_back(GridGeometry::voxelOf(blocks_[b], offset));
     }
   }
 
   const StateMap& states_;
-  std::vector<std::pair<BlockIndex, const Block*>> blocks_;
-  GridTable position_;  ///< of each block in blocks_
+  bool with_voxels_;
+  std::size_t min_size_;
+  std::vector<BlockIndex> blocks_;  ///< that overlap the box
+  GridTable position_;              ///< of each block in blocks_
   // Of each block:
   std::vector<Layers> left_;     ///< frontier voxels that no cluster has taken
   std::vector<Layers> cluster_;  ///< voxels of the present cluster
@@ -229,8 +335,12 @@ class FrontierFinder {
 
 }  // namespace
 
+std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules) {
+  return FrontierFinder(states, rules).clusters();
+}
+
 std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size) {
-  return FrontierFinder(states).clusters(min_size);
+  return frontiers(states, FrontierRules{min_size, true, std::nullopt});
 }
 
 }  // namespace bki_mapping

@@ -312,12 +312,13 @@ class Sections(WithMap):
 
 
 class Frontiers(WithMap):
-    def clusters(self):
+    def clusters(self, among=True):
+        """`among`: which voxels count."""
         free, unknown = self.voxels.states == bki.FREE, self.voxels.is_unknown()
         beside = np.zeros_like(free)
         for axis, step in itertools.product(range(3), (-1, 1)):
             beside |= np.roll(unknown, step, axis)  # nothing is known at the margins
-        left = {tuple(index) for index in self.voxels.indices[free & beside]}
+        left = {tuple(index) for index in self.voxels.indices[free & beside & among]}
         steps = [np.array(step) for step in itertools.product((-1, 0, 1), repeat=3)]
         found = []
         while left:
@@ -342,6 +343,16 @@ class Frontiers(WithMap):
             np.testing.assert_allclose(found['centre'], [(np.mean(c, axis=0) + 0.5) * self.voxels.edge for c in kept], atol=1e-9)
             np.testing.assert_array_equal(self.map.frontiers(min_size=least), found)
         self.assertEqual(self.map.frontiers(10**9).shape, (0,))
+
+    def test_box(self):
+        lower, upper = np.array([-1.0, -1.7, -0.5]), np.array([1.3, 1.5, 1.1])
+        indices, edge = self.voxels.indices, self.voxels.edge
+        inside = ((indices + 1) * edge > lower).all(axis=-1) & (indices * edge < upper).all(axis=-1)
+        expected = self.clusters(inside)
+        self.assertNotEqual(expected, self.clusters())
+        found, voxels = self.map.frontiers(return_voxels=True, lower=lower, upper=upper)
+        np.testing.assert_array_equal(voxels, np.concatenate(expected))
+        np.testing.assert_array_equal(self.map.frontiers(lower=lower, upper=upper), found)
 
 
 class Distances(WithMap):
@@ -651,6 +662,10 @@ class WrongInput(WithMap):
                 ("the section's heights are inside out; give min_z below max_z", lambda: vertical((1, 1), (2, 1), 1, 0)),
                 ('min_size must be an integer, 0 or more', lambda: map_.frontiers(-1)),
                 ('min_size must be an integer, 0 or more', lambda: map_.frontiers(1.5)),
+                ('the box is inside out; give a min below its max', lambda: map_.frontiers(lower=(0, 2, 0), upper=(1, 1, 1))),
+                ('the box has a coordinate that is not finite', lambda: map_.frontiers(lower=(0, 0, 0), upper=(1, 1, math.inf))),
+                ("the box reaches beyond the map's grid", lambda: map_.frontiers(lower=(0, 0, 0), upper=(1, 1, 1e10))),
+                ('the box has only one corner; give lower and upper', lambda: map_.frontiers(lower=(0, 0, 0))),
                 ('the region has a coordinate that is not finite; give finite ones', lambda: field((0, 0, math.nan), (1, 1, 1))),
                 ('the region is inside out; give a min below its max', lambda: field((0, 2, 0), (1, 1, 1))),
                 ('the region has 3334 x 3334 x 334 voxels; make it smaller', lambda: field((0, 0, 0), (1e3, 1e3, 1e2))),

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
 #include <map>
 #include <random>
@@ -348,8 +349,10 @@ TEST(Section, ShowsTheVoxelsAtItsCells) {
   });
 }
 
-/// Clusters of frontier voxels, found voxel by voxel.
-std::set<std::set<GridIndex>> slowFrontiers(const SemanticMap& map, const QueryMapKind& kind) {
+/// Clusters of frontier voxels, found voxel by voxel. @param counts whether a voxel counts.
+std::set<std::set<GridIndex>> slowFrontiers(
+    const SemanticMap& map, const QueryMapKind& kind,
+    const std::function<bool(const VoxelIndex&)>& counts = [](const VoxelIndex&) { return true; }) {
   const auto stateOf = [&](int x, int y, int z) {
     return viewWithoutEntropy(map, VoxelIndex{{x, y, z}}).state;
   };
@@ -358,7 +361,7 @@ std::set<std::set<GridIndex>> slowFrontiers(const SemanticMap& map, const QueryM
   };
   std::set<GridIndex> left;
   forEachVoxel(kind, [&](const VoxelIndex& v) {
-    if (stateOf(v.x, v.y, v.z) != VoxelState::kFree) return;
+    if (stateOf(v.x, v.y, v.z) != VoxelState::kFree || !counts(v)) return;
     if (unknown(v.x - 1, v.y, v.z) || unknown(v.x + 1, v.y, v.z) || unknown(v.x, v.y - 1, v.z) ||
         unknown(v.x, v.y + 1, v.z) || unknown(v.x, v.y, v.z - 1) || unknown(v.x, v.y, v.z + 1)) {
       left.insert(v);
@@ -382,6 +385,76 @@ std::set<std::set<GridIndex>> slowFrontiers(const SemanticMap& map, const QueryM
   return clusters;
 }
 
+void expectSameFrontiers(const std::vector<Frontier>& a, const std::vector<Frontier>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t f = 0; f < a.size(); ++f) {
+    ASSERT_EQ(a[f].size, b[f].size);
+    ASSERT_EQ(a[f].centre, b[f].centre);
+  }
+}
+
+std::set<std::set<GridIndex>> clustersOf(const std::vector<Frontier>& found) {
+  std::set<std::set<GridIndex>> clusters;
+  for (const Frontier& each : found) clusters.insert({each.voxels.begin(), each.voxels.end()});
+  return clusters;
+}
+
+TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
+  QueryMapKind kind;
+  kind.blocks = 2;
+  kind.unknown = 0.04;
+  const SemanticMap map = queryMap(39, kind);
+  const StateMap states(map, 2);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> coordinate(-5.0, 5.0);
+  int boxes_with_any = 0;
+  for (int n = 0; n < 12; ++n) {
+    Eigen::AlignedBox3d box;
+    for (int corner = 0; corner < 2; ++corner) {
+      box.extend(Eigen::Vector3d(coordinate(random), coordinate(random), coordinate(random)));
+    }
+    if (n == 0) box = {Eigen::Vector3d(-2.0, -0.5, 0.0), Eigen::Vector3d(2.0, 0.25, 0.25)};  // along faces
+    FrontierRules rules;
+    rules.box = box;
+    const auto found = frontiers(states, rules);
+    boxes_with_any += !found.empty();
+    EXPECT_EQ(clustersOf(found), slowFrontiers(map, kind, [&](const VoxelIndex& v) {
+                const Eigen::Array3d low = 0.25 * Eigen::Array3d(v.x, v.y, v.z), high = low + 0.25;
+                return (high > box.min().array()).all() && (low < box.max().array()).all();
+              }));
+    rules.with_voxels = false;
+    const auto outlines = frontiers(states, rules);
+    expectSameFrontiers(outlines, found);
+    for (const Frontier& each : outlines) EXPECT_TRUE(each.voxels.empty());
+  }
+  EXPECT_GT(boxes_with_any, 6);
+  FrontierRules all;
+  all.box.emplace(Eigen::Vector3d::Constant(-1e5), Eigen::Vector3d::Constant(1e5));
+  expectSameFrontiers(frontiers(states, all), frontiers(states));
+}
+
+TEST(Frontiers, RefuseBoxesThatAreNone) {
+  const SemanticMap map = queryMap(39);
+  const StateMap states(map, 1);
+  const auto sentence = [&](const Eigen::Vector3d& min, const Eigen::Vector3d& max) -> std::string {
+    FrontierRules rules;
+    rules.box.emplace(min, max);
+    try {
+      frontiers(states, rules);
+    } catch (const std::invalid_argument& fault) {
+      return fault.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(sentence({0, 2, 0}, {1, 1, 1}), "the box is inside out; give a min below its max");
+  EXPECT_EQ(sentence({0, kNan, 0}, {1, 1, 1}),
+            "the box has a coordinate that is not finite; give finite ones");
+  EXPECT_EQ(sentence({0, 0, 0}, {1, kInfinity, 1}),
+            "the box has a coordinate that is not finite; give finite ones");
+  EXPECT_EQ(sentence({0, 0, 0}, {1, 1e10, 1}),
+            "the box reaches beyond the map's grid; cut it to where the map is");
+}
+
 TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
   for (const double unknown : {0.3, 0.003, 0.97}) {
     QueryMapKind kind;
@@ -391,10 +464,14 @@ TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
     const SemanticMap map = queryMap(38, kind);
     const StateMap states(map, 2);
     const auto found = frontiers(states);
+    FrontierRules without_voxels;
+    without_voxels.with_voxels = false;
+    expectSameFrontiers(frontiers(states, without_voxels), found);
     std::set<std::set<GridIndex>> clusters;
     for (std::size_t f = 0; f < found.size(); ++f) {
       const auto& voxels = found[f].voxels;
       ASSERT_TRUE(std::is_sorted(voxels.begin(), voxels.end()));
+      ASSERT_EQ(found[f].size, voxels.size());
       clusters.insert({voxels.begin(), voxels.end()});
       Eigen::Vector3d centre = Eigen::Vector3d::Zero();
       for (const VoxelIndex& voxel : voxels) centre += map.geometry().voxelCentre(voxel);

@@ -106,10 +106,10 @@ class MapReference:
         """Distances to the centres of voxels, with the voxels, the nearest first."""
         return sorted((math.dist(point, self.centre(voxel)), voxel) for voxel in voxels)
 
-    def frontiers(self):
-        """Sets of voxels, the largest first."""
+    def frontiers(self, counts=lambda voxel: True):
+        """Sets of voxels, the largest first. `counts`: whether a voxel counts."""
         sides = [tuple(sign * (axis == a) for a in range(3)) for axis in range(3) for sign in (1, -1)]
-        left = {voxel for voxel, state in self.state.items() if state == FREE and
+        left = {voxel for voxel, state in self.state.items() if state == FREE and counts(voxel) and
                 any(not self.is_known(tuple(a + b for a, b in zip(voxel, side))) for side in sides)}
         clusters = []
         while left:

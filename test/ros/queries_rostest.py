@@ -212,6 +212,12 @@ class Queries(MapperTest):
         few = self.answer('get_frontiers', min_size=least)
         self.assertEqual((list(few.size), few.voxels), ([len(c) for c in expected if len(c) >= least], []))
         self.assertEqual(len(self.answer('get_frontiers', max_count=1).centre), 1)
+        corners = {'min': Point(-4.5, -6.5, -3.5), 'max': Point(7.5, 5.0, 2.5)}
+        boxed = truth.frontiers(lambda voxel: -5 <= voxel[0] <= 7 and -7 <= voxel[1] <= 4 and -4 <= voxel[2] <= 2)
+        answer = self.answer('get_frontiers', with_voxels=True, **corners)
+        self.assertEqual(list(answer.size), [len(cluster) for cluster in boxed])
+        self.assertEqual({truth.voxel_at(xyz(p)) for p in answer.voxels}, set().union(*boxed))
+        self.assertNotEqual(list(answer.size), [len(cluster) for cluster in expected])
 
     def distance(self, truth, voxel, obstacles):
         """Signed, between centres, as docs/queries.md has it. `obstacles`: a set of voxels."""
@@ -305,6 +311,8 @@ class Queries(MapperTest):
             ('get_section', {'start': Point(-5e4, -5e4, 0), 'end': Point(5e4, 5e4, 0)}, r'\d+ cells; make it smaller'),
             ('get_section', {'start': Point(-1e7, 0, 0), 'end': Point(1e7, 0, 0)}, '20000001 cells; make it smaller, 4000000 are'),
             ('get_section', {'vertical': True, 'start': here, 'end': Point(0, 0, 5)}, 'the same; give two that differ'),
+            ('get_frontiers', {'min': Point(1, 1, 1), 'max': Point(2, 0, 2)}, 'the box is inside out; give'),
+            ('get_frontiers', {'max': Point(2, NAN, 2)}, 'not finite; give'),
             ('get_distances', {'points': [here]}, 'max_distance is not a number > 0; give'),
             ('get_distances', {'points': [here], 'max_distance': INF}, r'has inf voxels; lower'),
             ('get_distances', {'points': [here, Point(1e6, 0, 0)], 'max_distance': 5.0}, r'voxels; lower max_distance'),

@@ -1,7 +1,8 @@
 /// @file Frontiers: where known free space ends, and exploration goes on.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "bki_mapping/query/state_map.h"
@@ -13,12 +14,25 @@ namespace bki_mapping {
 /// edge or a corner belong to the same cluster.
 struct Frontier {
   Eigen::Vector3d centre;          ///< mean of the centres of its voxels [m]
-  std::vector<VoxelIndex> voxels;  ///< in the order of GridIndex
+  std::size_t size;                ///< number of its voxels
+  std::vector<VoxelIndex> voxels;  ///< in the order of GridIndex; empty unless FrontierRules::with_voxels
 };
 
-/// All frontiers of a map, the largest first; of equal size, by the first voxel. Takes some 50 ns for each
-/// block and 25 ns for each frontier voxel.
-/// @param min_size least number of voxels; smaller frontiers are left out.
-std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size = 1);
+/// Which frontiers to look for.
+struct FrontierRules {
+  std::size_t min_size = 1;  ///< least number of voxels; smaller frontiers are left out
+  bool with_voxels = true;   ///< without, the search takes a fraction of the time
+  /// Map frame [m]: only frontier voxels that it overlaps count, as if there were no others. A voxel beyond
+  /// it still decides whether one inside is a frontier voxel. Without: the whole map.
+  std::optional<Eigen::AlignedBox3d> box;
+};
+
+/// The frontiers of a map, the largest first; of equal size, by the first voxel. Takes some 50 ns for each
+/// block in the box, and 25 ns for each
+/// of their voxels if these are listed.
+/// @throws std::invalid_argument if the box is not finite, inside out, or reaches beyond the grid.
+std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules = {});
+/// Those of the whole map, with their voxels.
+std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size);
 
 }  // namespace bki_mapping

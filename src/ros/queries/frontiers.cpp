@@ -1,6 +1,6 @@
 #include "bki_mapping/query/frontiers.h"
 
-#include <algorithm>
+#include <Eigen/Geometry>
 #include <stdexcept>
 
 #include "queries.h"
@@ -9,11 +9,16 @@
 namespace bki_mapping::ros_interface {
 
 void query(const QueriedMap& map, const GetFrontiers::Request& asked, GetFrontiers::Response& answer) {
-  std::vector<Frontier> found = frontiers(map.states, std::max(1u, asked.min_size));
+  FrontierRules rules;
+  rules.min_size = asked.min_size;
+  rules.with_voxels = asked.with_voxels;
+  const Eigen::AlignedBox3d box(toVector(asked.min), toVector(asked.max));
+  if (!box.min().isZero(0.0) || !box.max().isZero(0.0)) rules.box = box;
+  std::vector<Frontier> found = frontiers(map.states, rules);
   if (asked.max_count > 0 && found.size() > asked.max_count) found.resize(asked.max_count);
   if (asked.with_voxels) {
     std::size_t voxels = 0;
-    for (const Frontier& frontier : found) voxels += frontier.voxels.size();
+    for (const Frontier& frontier : found) voxels += frontier.size;
     if (voxels > GetFrontiers::Request::MOST_VOXELS) {
       throw std::invalid_argument("the frontiers have " + std::to_string(voxels) + " voxels, of which " +
                                   std::to_string(GetFrontiers::Request::MOST_VOXELS) +
@@ -24,8 +29,7 @@ void query(const QueriedMap& map, const GetFrontiers::Request& asked, GetFrontie
   answer.header = map.header;
   for (const Frontier& frontier : found) {
     answer.centre.push_back(fromVector(frontier.centre));
-    answer.size.push_back(static_cast<std::uint32_t>(frontier.voxels.size()));
-    if (!asked.with_voxels) continue;
+    answer.size.push_back(static_cast<std::uint32_t>(frontier.size));
     for (const VoxelIndex& voxel : frontier.voxels) {
       answer.voxels.push_back(fromVector(map.states.geometry().voxelCentre(voxel)));
     }

@@ -262,10 +262,19 @@ const std::vector<QueryKind>& queryKinds() {
                          asked.start = xyz(-edge, -edge, -edge);
                          asked.end = xyz(edge, edge, edge);
                        }),
-      kind<GetFrontiers>("frontiers", "any least size and count", true,
+      kind<GetFrontiers>("frontiers", "any least size and count, with and without a box", true,
                          [](GetFrontiers::Request& asked, Dice& dice) {
                            asked.min_size = dice.oneOf<std::uint32_t>({100, 1000, 4294967295u});
                            asked.max_count = dice.oneOf<std::uint32_t>({0, 1, 4294967295u});
+                           if (dice.oneIn(2)) return;
+                           asked.min = xyz(dice.between(-10.0, 0.0), dice.between(-10.0, 0.0), -1.0);
+                           asked.max = xyz(dice.between(0.1, 10.0), dice.between(0.1, 10.0), 2.0);
+                         }),
+      kind<GetFrontiers>("frontiers_wrong", "a box that is inside out, not finite, or beyond the grid", false,
+                         [](GetFrontiers::Request& asked, Dice& dice) {
+                           asked.min = xyz(1.0, 1.0, 1.0);
+                           asked.max = xyz(2.0, dice.oneOf<double>({0.0, 1e300}), 2.0);
+                           if (dice.oneIn(2)) asked.max = nowhere(dice);
                          }),
       kind<GetDistances>("distances", "points, with and without unknown space as obstacle", true,
                          [](GetDistances::Request& asked, Dice& dice) {
