@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -85,6 +87,37 @@ TEST(CheckSpace, AllShapesOfACallCountTogether) {
   asked.radii = {0.1};
   asked.poses.resize(CheckSpace::Request::MOST_SHAPES + 1);
   EXPECT_THROW(query(map, asked, answer), std::invalid_argument);
+}
+
+TEST(GetNearestObstacles, ACallEndsInTime) {
+  // Each point takes a look at every voxel, because all have some evidence for a car, and none is one.
+  const ClassTable classes = table();
+  SemanticMap map(GridGeometry(1.0), 0.001, 5);
+  const std::vector<EvidenceUnits> much(kBlockVoxels, unitsOf(5.0)), little(kBlockVoxels, unitsOf(1.0));
+  for (int n = 0; n < 8000; ++n) {
+    Block& block = map.getOrAllocate({{n % 20, n / 20 % 20, n / 400}});
+    block.add(2, much.data());
+    block.add(3, little.data());
+  }
+  const QueriedMap queried(std_msgs::Header(), std::move(map), classes);
+  GetNearestObstacles::Request asked;
+  GetNearestObstacles::Response answer;
+  asked.points.resize(GetNearestObstacles::Request::MOST_POINTS);
+  asked.classes = {"car"};
+  asked.max_distance = 4.0;
+  query(queried, asked, answer);
+  EXPECT_EQ(answer.distance.size(), asked.points.size());
+  asked.max_distance = 0.0;
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    query(queried, asked, answer = {});
+    ADD_FAILURE() << "the call took as long as it liked";
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_STREQ(fault.what(), "the call takes more than 5 s; set max_distance, or split it");
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  EXPECT_GE(took.count(), GetNearestObstacles::Request::MOST_SECONDS);
+  EXPECT_LT(took.count(), GetNearestObstacles::Request::MOST_SECONDS + 5.0);
 }
 
 TEST(GetFrontiers, ListedVoxelsAreLimited) {
