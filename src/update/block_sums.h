@@ -4,11 +4,9 @@
 #include <vector>
 
 #include "bki_mapping/map/block.h"
+#include "update/voxel_mask.h"
 
 namespace bki_mapping {
-
-/// One bit for each voxel of a block.
-using VoxelMask = std::bitset<kBlockVoxels>;
 
 /// Sums of k, or of w k, over the points or beams of a scan, as one plane for each class. Keeps its memory
 /// when cleared.

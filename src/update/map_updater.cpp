@@ -4,9 +4,9 @@
 #include <atomic>
 
 #include "core/stopwatch.h"
+#include "update/voxel_sums.h"
 
 namespace bki_mapping {
-
 void MapUpdater::setTasks(const ScanEvidence& scan) {
   tasks_.resize(3);
   task_count_ = 0;
@@ -179,24 +179,14 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
 
 void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker) {
   SumCounts& counts = workers_[worker].voids;
-  const std::int64_t change = withdraws ? -units : units;
-  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
-       ++j) {
+  const auto add = withdraws ? withdrawFromVoxels : addToVoxels;
+  const std::uint32_t* const end = group_jobs_.end(group.position);
+  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
+    if (j + 1 != end && voids_.voidsOf(j[1]).any()) jobs_[j[1]].block->prefetch();
     const VoxelMask& voids = voids_.voidsOf(*j);
     if (voids.none()) continue;
-    jobs_[*j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
-      EvidenceUnits any = 0;
-      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-        if (voids[v]) {
-          const std::int64_t sum = plane[v] + change, most = kMostUnits;
-          counts.saturated += sum > most && plane[v] < most;
-          counts.negative += withdraws && plane[v] >= 0 && sum < 0;
-          plane[v] = static_cast<EvidenceUnits>(std::clamp(sum, -most, most));
-        }
-        any |= plane[v];
-      }
-      return any != 0;
-    });
+    jobs_[*j].block->change(kFreeClass,
+                            [&](EvidenceUnits* plane) { return add(bitsOf(voids), units, plane, counts); });
   }
 }
 

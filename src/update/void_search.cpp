@@ -1,37 +1,33 @@
 #include "update/void_search.h"
 
-#include <array>
+#include <cstdint>
 
 #include "parallel/chunks.h"
 
 namespace bki_mapping {
 namespace {
 
-/// The two faces of a block along an axis.
-struct Faces {
-  std::size_t stride;  ///< from voxel to voxel along the axis, as in GridGeometry::offsetInBlock
-  VoxelMask first, last;
-};
+constexpr std::size_t kLast = kBlockEdge - 1;
+constexpr std::uint64_t kColumn = 0x0101010101010101;  ///< the voxels of a layer with x = 0
+constexpr std::uint64_t kRow = 0xff;                   ///< those with y = 0
+constexpr int kAcrossX = kBlockEdge - 1, kAcrossY = kBlockEdge * (kBlockEdge - 1);
 
-Faces facesAlong(std::size_t axis) {
-  Faces faces = {axis == 0   ? std::size_t{1}
-                 : axis == 1 ? std::size_t{kBlockEdge}
-                             : kBlockEdge * kBlockEdge,
-                 {},
-                 {}};
-  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-    faces.first[v] = v / faces.stride % kBlockEdge == 0;
-    faces.last[v] = v / faces.stride % kBlockEdge == kBlockEdge - 1;
+/// The voxels of `mask` whose two neighbours along the axis are members, too. @param previous, next the
+/// members in the two blocks beside it.
+LayerBits erode(std::size_t axis, const LayerBits& previous, const LayerBits& mask, const LayerBits& next) {
+  LayerBits eroded;
+  for (std::size_t z = 0; z <= kLast; ++z) {
+    std::uint64_t below = z == 0 ? previous[kLast] : mask[z - 1], above = z == kLast ? next[0] : mask[z + 1];
+    if (axis == 0) {
+      below = (mask[z] & ~(kColumn << kAcrossX)) << 1 | (previous[z] >> kAcrossX & kColumn);
+      above = (mask[z] & ~kColumn) >> 1 | (next[z] & kColumn) << kAcrossX;
+    } else if (axis == 1) {
+      below = mask[z] << kBlockEdge | (previous[z] >> kAcrossY & kRow);
+      above = mask[z] >> kBlockEdge | (next[z] & kRow) << kAcrossY;
+    }
+    eroded[z] = mask[z] & below & above;
   }
-  return faces;
-}
-
-/// The voxels of `mask` whose two neighbours along the axis are members, too.
-VoxelMask erode(const VoxelMask& previous, const VoxelMask& mask, const VoxelMask& next, const Faces& faces) {
-  const std::size_t across = (kBlockEdge - 1) * faces.stride;
-  const VoxelMask below = (mask & ~faces.last) << faces.stride | (previous & faces.last) >> across;
-  const VoxelMask above = (mask & ~faces.first) >> faces.stride | (next & faces.first) << across;
-  return mask & below & above;
+  return eroded;
 }
 
 GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
@@ -42,25 +38,25 @@ GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
 }  // namespace
 
 void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
-  static const std::array<Faces, 3> kFaces = {facesAlong(0), facesAlong(1), facesAlong(2)};
-  const VoxelMask none;
-  for (std::size_t b = 0; b < seen_.size(); ++b) masks_[b] = seen_[b].crossed | seen_[b].fixed;
   const Chunks chunks(seen_.size());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::swap(before_, masks_);
+    const auto before = [&](std::size_t b) {
+      return axis > 0 ? before_[b] : seen_[b].crossed | seen_[b].fixed;
+    };
     pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
       for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-        masks_[b] = before_[b];
-        if (before_[b].none()) continue;
-        const auto beside = [&](int step) -> const VoxelMask& {
+        masks_[b] = before(b);
+        if (masks_[b].none()) continue;
+        const auto beside = [&](int step) -> LayerBits {
           const std::uint32_t position = blocks.find(neighbour(blocks.members()[b], axis, step));
-          return position == kNoPosition ? none : before_[position];
+          return position == kNoPosition ? LayerBits{} : bitsOf(before(position));
         };
-        masks_[b] = erode(beside(-1), before_[b], beside(1), kFaces[axis]);
+        masks_[b] = maskOf(erode(axis, beside(-1), bitsOf(masks_[b]), beside(1)));
+        if (axis == 2) masks_[b] &= seen_[b].crossed;
       }
     });
   }
-  for (std::size_t b = 0; b < seen_.size(); ++b) masks_[b] &= seen_[b].crossed;
 }
 
 }  // namespace bki_mapping

@@ -1,0 +1,35 @@
+/// @file Sets of voxels of one block.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "bki_mapping/core/types.h"
+
+namespace bki_mapping {
+
+/// One bit for each voxel of a block, by GridGeometry::offsetInBlock.
+using VoxelMask = std::bitset<kBlockVoxels>;
+
+/// The same as one word for each layer along z, for loops over words: bit v of word n is voxel 64 n + v.
+using LayerBits = std::array<std::uint64_t, kBlockEdge>;
+
+static_assert(kBlockEdge * kBlockEdge == 64 && sizeof(VoxelMask) == sizeof(LayerBits) &&
+                  std::is_trivially_copyable_v<VoxelMask> && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+              "a VoxelMask must be copied bit by bit here");
+
+inline LayerBits bitsOf(const VoxelMask& mask) {
+  LayerBits bits;
+  std::memcpy(&bits, &mask, sizeof(bits));
+  return bits;
+}
+inline VoxelMask maskOf(const LayerBits& bits) {
+  VoxelMask mask;
+  std::memcpy(static_cast<void*>(&mask), &bits, sizeof(bits));
+  return mask;
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,53 @@
+#include "update/voxel_sums.h"
+
+#include <algorithm>
+
+namespace bki_mapping {
+namespace {
+
+void addTo(EvidenceUnits units, EvidenceUnits& sum, SumCounts& counts) {
+  const EvidenceUnits most = kMostUnits - units;
+  counts.saturated += sum > most && sum < kMostUnits;
+  sum = std::min(sum, most) + units;
+}
+void withdrawFrom(EvidenceUnits units, EvidenceUnits& sum, SumCounts& counts) {
+  counts.negative += sum >= 0 && sum < units;
+  sum = std::max(sum, units - kMostUnits) - units;
+}
+
+/// Changes some voxels of a plane. @return whether any evidence in those voxels is not 0.
+template <void (*kChange)(EvidenceUnits units, EvidenceUnits& sum, SumCounts& counts)>
+bool changeVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane, SumCounts& counts) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  EvidenceUnits any = 0;
+  for (std::uint64_t bits : voxels) {
+    if (bits == ~std::uint64_t{0}) {  // as most layers are; this loop becomes vectors
+      SumCounts of_layer;
+      for (int v = 0; v < kLayer; ++v) {
+        kChange(units, plane[v], of_layer);
+        any |= plane[v];
+      }
+      counts += of_layer;
+    } else {
+      for (; bits != 0; bits &= bits - 1) {
+        EvidenceUnits& sum = plane[__builtin_ctzll(bits)];
+        kChange(units, sum, counts);
+        any |= sum;
+      }
+    }
+    plane += kLayer;
+  }
+  return any != 0;
+}
+
+}  // namespace
+
+bool addToVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane, SumCounts& counts) {
+  return changeVoxels<addTo>(voxels, units, plane, counts);
+}
+bool withdrawFromVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane,
+                        SumCounts& counts) {
+  return changeVoxels<withdrawFrom>(voxels, units, plane, counts);
+}
+
+}  // namespace bki_mapping

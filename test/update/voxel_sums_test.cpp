@@ -1,0 +1,56 @@
+// Evidence added to many voxels at once equals a plain loop over the voxels, also where whole layers change.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "update/voxel_sums.h"
+
+namespace bki_mapping {
+namespace {
+
+TEST(VoxelSums, EqualAPlainLoop) {
+  std::mt19937 random(3);
+  const EvidenceUnits edges[] = {0, 1, -1, 70, kMostUnits, -kMostUnits, kMostUnits - 1, 1 - kMostUnits};
+  std::size_t saturated = 0, negative = 0;
+  for (int n = 0; n < 300; ++n) {
+    LayerBits voxels;
+    for (std::uint64_t& layer : voxels) {
+      layer = random() % 3 == 0   ? 0
+              : random() % 2 == 0 ? ~std::uint64_t{0}
+                                  : random() * std::uint64_t{random()};
+    }
+    std::vector<EvidenceUnits> before(kBlockVoxels);
+    for (EvidenceUnits& each : before) {
+      each = n % 2 == 0 ? edges[random() % std::size(edges)] : static_cast<EvidenceUnits>(random() % 9);
+    }
+    const auto units = static_cast<EvidenceUnits>(1 + random() % 70);
+    const VoxelMask mask = maskOf(voxels);
+    ASSERT_EQ(bitsOf(mask), voxels);
+    for (const bool withdraws : {false, true}) {
+      std::vector<EvidenceUnits> expected = before, plane = before;
+      SumCounts of_loop, counts;
+      bool any = false;
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        ASSERT_EQ(mask[v], (voxels[v / 64] >> v % 64 & 1) != 0);
+        if (!mask[v]) continue;
+        const std::int64_t sum = std::int64_t{before[v]} + (withdraws ? -units : units), most = kMostUnits;
+        of_loop.saturated += sum > most && before[v] < most;
+        of_loop.negative += withdraws && before[v] >= 0 && sum < 0;
+        expected[v] = static_cast<EvidenceUnits>(std::clamp(sum, -most, most));
+        any |= expected[v] != 0;
+      }
+      const auto change = withdraws ? withdrawFromVoxels : addToVoxels;
+      EXPECT_EQ(change(voxels, units, plane.data(), counts), any);
+      ASSERT_EQ(plane, expected);
+      ASSERT_EQ(counts.saturated, of_loop.saturated);
+      ASSERT_EQ(counts.negative, of_loop.negative);
+      saturated += counts.saturated;
+      negative += counts.negative;
+    }
+  }
+  EXPECT_GT(saturated, 0u);
+  EXPECT_GT(negative, 0u);
+}
+
+}  // namespace
+}  // namespace bki_mapping
