@@ -73,6 +73,22 @@ Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
   return figures;
 }
 
+Json dynamicsJson(const DynamicsQuality& d) {
+  return {{"static_points", d.static_points},
+          {"static_kept", d.static_kept},
+          {"moving_points", d.moving_points},
+          {"moving_removed", d.moving_removed},
+          {"floor_voxels", d.floor_voxels},
+          {"floor_holes", d.holes()},
+          {"sa", d.staticAccuracy()},
+          {"sa_ground", d.groundAccuracy()},
+          {"sa_standing", d.standingAccuracy()},
+          {"sa_other", d.otherAccuracy()},
+          {"da", d.dynamicAccuracy()},
+          {"aa", d.accuracy()},
+          {"ha", d.harmonicAccuracy()}};
+}
+
 /// One decimal; "-" for a fraction of nothing.
 std::string figureText(double figure) {
   if (!std::isfinite(figure)) return "-";
@@ -192,6 +208,13 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   if (quality.cloud) addCloud(*quality.cloud, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
              " of moving objects; median " + figureText(quality.median_ms) + " ms a scan");
+  for (const JudgedMap& judged : quality.judged) {
+    const DynamicsQuality& with = judged.dynamics;
+    table.text("with " + judged.settings + ": SA " + figureText(100.0 * with.staticAccuracy()) +
+               ", standing " + figureText(100.0 * with.standingAccuracy()) + ", holes " +
+               figureText(100.0 * with.holes()) + ", DA " + figureText(100.0 * with.dynamicAccuracy()) +
+               ", AA " + figureText(100.0 * with.accuracy()));
+  }
   if (quality.labels_are_ids) {
     table.text("class ids do not say what moves, so DA and AA are unknown and all points count as static");
   } else if (d.moving_points == 0) {
@@ -207,22 +230,9 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
 }
 
 std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
-  const DynamicsQuality& d = quality.dynamics;
   const SemanticQuality& s = quality.semantics;
-  Json figures = {{"static_points", d.static_points},
-                  {"static_kept", d.static_kept},
-                  {"moving_points", d.moving_points},
-                  {"moving_removed", d.moving_removed},
-                  {"floor_voxels", d.floor_voxels},
-                  {"floor_holes", d.holes()},
-                  {"sa", d.staticAccuracy()},
-                  {"sa_ground", d.groundAccuracy()},
-                  {"sa_standing", d.standingAccuracy()},
-                  {"sa_other", d.otherAccuracy()},
-                  {"da", d.dynamicAccuracy()},
-                  {"aa", d.accuracy()},
-                  {"ha", d.harmonicAccuracy()},
-                  {"miou_map", s.map.meanIou()},
+  Json figures = dynamicsJson(quality.dynamics);
+  figures.update({{"miou_map", s.map.meanIou()},
                   {"miou_input", s.input.meanIou()},
                   {"miou_map_present", s.map_of_present.meanIou()},
                   {"miou_input_present", s.input_of_present.meanIou()},
@@ -236,7 +246,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"sparsification_error", s.sparsification_error},
                   {"median_ms", quality.median_ms},
                   {"labels_not_in_table", quality.unknown_labels},
-                  {"classes", Json::array()}};
+                  {"classes", Json::array()}});
   for (const SemanticClass& c : classes.classes()) {
     const auto voxels = quality.voxels_by_class.find(c.id);
     figures["voxels_by_class"][c.name] = voxels == quality.voxels_by_class.end() ? 0 : voxels->second;
@@ -249,6 +259,10 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
   figures["probability_reliability"] = reliabilityJson(s.probability);
   figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
   figures["occupancy_reliability"] = reliabilityJson(quality.occupancy);
+  for (const JudgedMap& judged : quality.judged) {
+    figures["judged"].push_back(dynamicsJson(judged.dynamics));
+    figures["judged"].back()["settings"] = judged.settings;
+  }
   if (quality.cloud) figures["cloud"] = cloudJson(*quality.cloud);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";

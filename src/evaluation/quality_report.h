@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/dynamics_evaluation.h"
@@ -12,8 +13,15 @@
 
 namespace bki_mapping::tools {
 
+/// The same map, with its states decided by other settings.
+struct JudgedMap {
+  std::string settings;  ///< as given
+  DynamicsQuality dynamics;
+};
+
 struct MapQuality {
   DynamicsQuality dynamics;
+  std::vector<JudgedMap> judged;
   SemanticQuality semantics;
   Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
   std::optional<CloudQuality> cloud;               ///< compared with a ground-truth cloud

@@ -53,6 +53,8 @@ po::options_description options() {
       "cloud-distance",
       tools::realOption("--cloud-distance", 0.0, 10.0)->value_name("M")->default_value(0.05),
       "distance within which points of the two clouds match [m]")(
+      "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
+      "also give SA and DA of the same map with other free_gain settings; repeatable")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
       "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -189,8 +191,31 @@ void drawErrors(const std::string& picture, const std::string& rows) {
   tools::draw("plot_errors.py", {table, picture});
 }
 
+/// Other settings by which to decide the states of the same map.
+struct Judgement {
+  std::string settings;
+  MapperConfig config;
+};
+
+/// @throws std::invalid_argument if settings change more than decisions.
+std::vector<Judgement> judgements(const po::variables_map& given, const MapperConfig& config) {
+  std::vector<Judgement> all;
+  if (!given.count("judge")) return all;
+  for (const std::string& settings : given["judge"].as<std::vector<std::string>>()) {
+    std::istringstream names(settings);
+    for (std::string name; std::getline(names, name, ',');) {
+      if (name.rfind("free_gain/", 0) == 0) continue;
+      throw std::invalid_argument("--judge " + settings +
+                                  " changes more than decisions; give it settings of free_gain only");
+    }
+    all.push_back({settings, tools::withSettings(config, "--judge", settings)});
+  }
+  return all;
+}
+
 int evaluate(const po::variables_map& given) {
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
+  const std::vector<Judgement> others = judgements(given, mapper.config());
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
   const LabelNoise label_noise{given["label-noise"].as<double>(),
@@ -249,12 +274,17 @@ int evaluate(const po::variables_map& given) {
   tools::MapQuality quality = evaluation.compare(mapper.map());
   quality.median_ms = quantile(times, 0.5);
   quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
+  const std::string errors = given.count("errors") ? evaluation.errorRows(mapper.map()) : "";
+  for (const Judgement& other : others) {
+    mapper.reconfigure(other.config);
+    quality.judged.push_back({other.settings, evaluation.dynamics.compare(mapper.map(), evaluation.taken())});
+  }
   std::cout << tools::qualityTable(quality, mapper.classes());
   if (given.count("json")) {
     writeTextFile(given["json"].as<std::string>(), tools::qualityJson(quality, mapper.classes()));
   }
   if (given.count("errors")) {
-    drawErrors(given["errors"].as<std::string>(), evaluation.errorRows(mapper.map()));
+    drawErrors(given["errors"].as<std::string>(), errors);
   }
   return 0;
 }

@@ -130,20 +130,30 @@ po::options_description mapperOptions() {
   return options;
 }
 
+namespace {
+
+/// Adds a setting NAME=VALUE. @param option that gives it, for errors.
+void addSetting(const std::string& option, const std::string& setting,
+                std::map<std::string, std::string>& values) {
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos) {
+    throw std::invalid_argument(option + " " + setting + " has no '='; write " + option + " name=value");
+  }
+  const std::string name = setting.substr(0, equals);
+  if (!values.emplace(name, setting.substr(equals + 1)).second) {
+    throw std::invalid_argument(option + " " + name + " is given twice; keep one");
+  }
+}
+
+}  // namespace
+
 MapperConfig mapperConfig(const po::variables_map& given) {
   MapperConfig config;
   if (given.count("config")) setParameters(config, loadParameterFile(given["config"].as<std::string>()));
   std::map<std::string, std::string> values;
   if (given.count("set")) {
     for (const std::string& setting : given["set"].as<std::vector<std::string>>()) {
-      const std::size_t equals = setting.find('=');
-      if (equals == std::string::npos) {
-        throw std::invalid_argument("--set " + setting + " has no '='; write --set name=value");
-      }
-      const std::string name = setting.substr(0, equals);
-      if (!values.emplace(name, setting.substr(equals + 1)).second) {
-        throw std::invalid_argument("--set " + name + " is given twice; keep one");
-      }
+      addSetting("--set", setting, values);
     }
   }
   if (given.count("threads") && !values.emplace("threads", given["threads"].as<std::string>()).second) {
@@ -151,6 +161,14 @@ MapperConfig mapperConfig(const po::variables_map& given) {
   }
   setParameters(config, values);
   for (const std::string& warning : settingWarnings(config)) std::cerr << "warning: " << warning << "\n";
+  return config;
+}
+
+MapperConfig withSettings(MapperConfig config, const std::string& option, const std::string& settings) {
+  std::map<std::string, std::string> values;
+  std::istringstream in(settings);
+  for (std::string setting; std::getline(in, setting, ',');) addSetting(option, setting, values);
+  setParameters(config, values);
   return config;
 }
 

@@ -55,6 +55,9 @@ po::options_description mapperOptions();
 /// The configuration that these options give. Prints a warning to standard error for questionable settings.
 /// @throws std::invalid_argument.
 MapperConfig mapperConfig(const po::variables_map& given);
+/// Replaces some of the settings. @param option that gives them, for errors. @param settings NAME=VALUE,...
+/// @throws std::invalid_argument.
+MapperConfig withSettings(MapperConfig config, const std::string& option, const std::string& settings);
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 
 /// Options of all programs that read a sequence: --sequence, --labels, --first, --scans.

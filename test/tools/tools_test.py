@@ -141,6 +141,22 @@ class Tools(unittest.TestCase):
         self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
         self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
 
+    def test_a_map_is_judged_by_other_gains(self):
+        gains = ('free_gain/dynamic=30', 'free_gain/static=0.1,free_gain/dynamic=30,free_gain/persistence=2')
+        judged = self.evaluation(more=[word for each in gains for word in ('--judge', each)])['judged']
+        table = self.table
+        self.assertEqual([each.pop('settings') for each in judged], list(gains))
+        for given, figures in zip(gains, judged):
+            self.assertIn(f'with {given}: SA ', table)
+            mapped = self.evaluation(*given.split(','))
+            self.assertEqual(figures, {name: mapped[name] for name in figures})
+        self.assertNotEqual(judged[0]['sa'], judged[1]['sa'])
+        sequence = ('--sequence', self.drive)
+        self.fails('changes more than decisions', 'evaluate_map', *sequence, '--judge', 'free_gain/static=1,scan_limit/free=1')
+        self.fails("has no '='", 'evaluate_map', *sequence, '--judge', 'free_gain/static')
+        self.fails('given twice', 'evaluate_map', *sequence, '--judge', 'free_gain/static=1,free_gain/static=2')
+        self.fails('free_gain/', 'evaluate_map', *sequence, '--judge', 'free_gain/dynamics=1')
+
     def cloud_figures(self, drive, *more):
         result = call('evaluate_map', '--sequence', drive, '--late', '1', '--cloud', '--json', self.path('figures.json'), *more)
         self.assertEqual((result.returncode, result.stderr), (0, ''))
