@@ -49,6 +49,13 @@ LEFT_OUT = {
     **dict.fromkeys(('build-examples/plan_path street.bkm semantic_kitti 2 -5.3 0 48 8 0 > path.csv',
                      'python3 examples/draw_path.py street.bkm path.csv --output path.png'), 'path_test runs them'),
     'rosrun octomap_server octomap_server_node ~/street.bt _frame_id:=map': 'not in Debian',
+    **dict.fromkeys(('sbatch --ntasks=64 scripts/map_city.sbatch drives/city.yaml --output city',
+                     'export DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES=1000',
+                     'dask-ssh --hostfile hosts.txt --nworkers 16 --nthreads 1 --remote-python '
+                     '"env PYTHONPATH=$PYTHONPATH /usr/bin/python3"',
+                     'scripts/map_city drives/city.yaml --output city --scheduler tcp://FIRST_HOST:8786'),
+                    'needs a cluster; city_test starts a scheduler and workers'),
+    'scripts/prove_city': 'takes a quarter of an hour; city_test tries the same with six drives',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.

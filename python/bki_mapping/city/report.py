@@ -122,7 +122,7 @@ def draw(folder, index):
     high = numpy.max([box['max'][:2] for _, box in boxes], axis=0)
     pixel = max(*(high - low) / LARGEST, 0.05)  # [m]
     size = numpy.maximum(numpy.ceil((high - low) / pixel).astype(int), 1)
-    canvas = numpy.ones((size[1], size[0], 3))  # rows from below
+    canvas = numpy.full((size[1], size[0], 3), 255, numpy.uint8)  # rows from below
     for path, box in boxes:
         picture = image.imread(path)[::-1, :, :3]
         begin, end = (((numpy.array(box[side][:2]) - low) / pixel).round().astype(int) for side in ('min', 'max'))
@@ -130,7 +130,7 @@ def draw(folder, index):
         width, height = end - begin
         rows = numpy.arange(height) * picture.shape[0] // height
         columns = numpy.arange(width) * picture.shape[1] // width
-        canvas[begin[1]:end[1], begin[0]:end[0]] = picture[rows][:, columns]
+        canvas[begin[1]:end[1], begin[0]:end[0]] = (picture[rows][:, columns] * 255).round()
     figure, axes = pyplot.subplots(figsize=(10, 10 * max(0.3, min(3.0, size[1] / size[0]))), dpi=150)
     axes.imshow(canvas, origin='lower', extent=(low[0], low[0] + size[0] * pixel, low[1], low[1] + size[1] * pixel),
                 interpolation='antialiased')
