@@ -228,7 +228,7 @@ class Made(unittest.TestCase):
             self.addCleanup(process.terminate)
             return process
 
-        dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place)
+        scheduler = dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place)
         end = time.monotonic() + 60
         while not place.exists() and time.monotonic() < end:
             time.sleep(0.05)
@@ -243,6 +243,17 @@ class Made(unittest.TestCase):
         dask('worker', address, *options, PYTHONPATH=str(SOURCE / 'python'))
         self.finish(self.start(city, '--scheduler', address, '--resume'))
         self.expect_equal(['d1', 'd2'])
+        # The scheduler is killed while the worker maps.
+        city = self.describe(DRIVES)
+        process = self.start(city, '--scheduler', address, '--resume')
+        end = time.monotonic() + 60
+        while not list(self.output.glob('pieces/d[3456]/*')) and time.monotonic() < end:
+            time.sleep(0.01)
+        scheduler.kill()
+        self.assertIn('map_city: the Dask scheduler has gone; start it', self.finish(process, 1))
+        self.assertLess(len(list(self.output.glob('pieces/*/*.bkm'))), 18)
+        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.expect_equal(DRIVES)
 
     def test_a_picture_and_the_costs_are_reported(self):
         text = self.finish(self.start(self.describe(['d1', 'd2', 'd3']), '--workers', '2'))
