@@ -32,8 +32,8 @@ po::options_description options() {
       "drive", text("ID"),
       "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
       "poses", text("FILE"),
-      "poses in the frame of the map, one line for each scan as in poses.txt; default: poses.txt, relative to "
-      "its first pose")(
+      "poses in the frame of the map, in the layout of poses.txt; "
+      "default: poses.txt, relative to its first pose")(
       "include", text("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
       "points", text("FILE.pcd"),

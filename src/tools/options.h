@@ -20,8 +20,8 @@ namespace bki_mapping::tools {
 
 namespace po = boost::program_options;
 
-/// Parses a command line of named options; adds --help and --version. An unknown option is refused by name, with the most
-/// similar known one.
+/// Parses a command line of named options; adds --help and --version. An unknown option is refused by name,
+/// with the most similar known one.
 /// @param positional name under which the words that belong to no option are found, as a vector of strings;
 /// "": there must be none.
 /// @return nullptr if the help or the version was printed. @throws std::invalid_argument in one sentence.
