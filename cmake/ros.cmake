@@ -1,7 +1,7 @@
 # The ROS shell: nodelet, node and the programs that speak ROS.
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
-    cloud_conversion.cpp
+    city_loader.cpp cloud_conversion.cpp
     color_reader.cpp
     distance_section_config.cpp
     input_config.cpp

@@ -197,14 +197,14 @@ if(CATKIN_ENABLE_TESTING)
   set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
-    test/ros/body_box_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
+    test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
     test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
     test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
     test/ros/query_latency_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_tests(costmap grid_copy)
-  bki_mapping_unit_tests(ros cloud_conversion query_services recent_map scan_account scan_reader sensor_trajectory server_config)
+  bki_mapping_unit_tests(ros cloud_conversion kept_city query_services recent_map scan_account scan_reader sensor_trajectory server_config)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
   foreach(name body_box filters)
@@ -221,6 +221,7 @@ if(CATKIN_ENABLE_TESTING)
     add_test(NAME follower_rostest COMMAND sh -c "echo 'SKIPPED: needs the Python module' >&2; exit 77")
     set_tests_properties(follower_rostest PROPERTIES SKIP_RETURN_CODE 77)
   endif()
+  add_rostest(test/ros/city.test)
   add_rostest(test/ros/killed.test)
   add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)

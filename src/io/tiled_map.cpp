@@ -54,8 +54,9 @@ struct TiledMap::State {
   explicit State(const std::string& given) : path(given) {
     std::error_code unknown;
     const std::filesystem::path as_path(given);
-    if (as_path.filename().empty()) path = as_path.parent_path().string();  // a slash at the end
-    if (as_path.filename() == "index.json") {
+    if (as_path.filename().empty()) {  // a slash at the end: a folder
+      path = as_path.parent_path().string();
+    } else if (as_path.filename() == "index.json") {
       path = as_path.parent_path().empty() ? "." : as_path.parent_path().string();
     } else if (!std::filesystem::is_directory(given, unknown)) {
       map_file = true;
@@ -174,21 +175,36 @@ struct TiledMap::State {
     return info->resolution;
   }
 
-  std::vector<Found> find(const Eigen::AlignedBox3d& box) {
+  /// The first and the last tile of a box.
+  std::optional<std::pair<GridIndex, GridIndex>> tilesOf(const Eigen::AlignedBox3d& box) {
     if (box.min().hasNaN() || box.max().hasNaN())
       throw std::invalid_argument("a corner of the box is not a number");
-    std::vector<Found> found;
-    const auto range = tilesHolding(box, GridGeometry(resolution()));
-    if (!range) return found;
+    return tilesHolding(box, GridGeometry(resolution()));
+  }
+  std::vector<std::size_t> filesIn(const Eigen::AlignedBox3d& box) {
+    std::vector<std::size_t> files;
+    const auto range = tilesOf(box);
+    if (!range) return files;
     const auto& [first, last] = *range;
     for (std::size_t n = 0; n < (map_file ? 1 : index.regions.size()); ++n) {
       const auto [low, high] = cornersOf(n);
-      if (low.x > last.x || high.x < first.x || low.y > last.y || high.y < first.y) continue;
-      for (const TileEntry& entry : file(n).tilesIn(first, last)) found.push_back({n, entry});
+      const bool apart = low.x > last.x || high.x < first.x || low.y > last.y || high.y < first.y;
+      if (!apart) files.push_back(n);
+    }
+    return files;
+  }
+  std::vector<TileEntry> tilesIn(const Eigen::AlignedBox3d& box, std::size_t n) {
+    const auto range = tilesOf(box);
+    return range ? file(n).tilesIn(range->first, range->second) : std::vector<TileEntry>();
+  }
+  std::vector<Found> find(const Eigen::AlignedBox3d& box) {
+    std::vector<Found> found;
+    for (const std::size_t n : filesIn(box)) {
+      for (const TileEntry& entry : tilesIn(box, n)) found.push_back({n, entry});
     }
     return found;
   }
-  std::vector<Found> find(std::vector<GridIndex> wanted) {
+  std::vector<Found> find(const std::vector<GridIndex>& wanted) {
     std::vector<std::pair<std::size_t, GridIndex>> by_file;
     for (const GridIndex& tile : wanted) {
       if (map_file) {
@@ -270,8 +286,8 @@ std::int32_t TiledMap::regionTiles() const {
 const std::vector<std::string>& TiledMap::driveNames() const {
   return state_->index.drives;
 }
-bool TiledMap::holdsDrive(const std::string& id) const {
-  return state_->index.pieces.count(id) > 0;
+const std::set<std::string>& TiledMap::driveIds() const {
+  return state_->index.pieces;
 }
 std::uint64_t TiledMap::tileCount() const {
   return state_->tiles;
@@ -316,6 +332,14 @@ std::vector<TileEntry> TiledMap::tilesIn(const Eigen::AlignedBox3d& box) {
   std::vector<TileEntry> entries;
   for (const Found& found : state_->find(box)) entries.push_back(found.entry);
   return entries;
+}
+
+std::vector<std::size_t> TiledMap::filesIn(const Eigen::AlignedBox3d& box) {
+  return state_->filesIn(box);
+}
+
+std::vector<TileEntry> TiledMap::tilesIn(const Eigen::AlignedBox3d& box, std::size_t file) {
+  return state_->tilesIn(box, file);
 }
 
 TiledMap::Reading TiledMap::reading() const {

@@ -7,23 +7,33 @@
 #include <cstdint>
 #include <future>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "bki_mapping/store/map_keeper.h"
+#include "ros/city_loader.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
 
-/// Keeps the map of a mapper in the window, and in the map file if there is one. For the mapping thread.
+/// Keeps the map of a mapper in the window, and in the map file if there is one. If the map file is a city,
+/// loads what is near the sensor from it, and keeps the map in a file of the mapper's own, or only in memory;
+/// the map is then the sum of the tiles that were loaded, each once, and of all scans. For the mapping
+/// thread.
 class KeptMap {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Opens the map file, and loads it if there is no window or the map is read-only.
+  /// Opens the map file, and loads it if there is no window or the map is read-only. A city that cannot be
+  /// used becomes a fault(), and mapping goes on without it.
   /// @param name of the drive that begins, for people.
   /// @throws MapFileError; std::invalid_argument if settings contradict each other.
   KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name);
+
+  /// @throws std::invalid_argument if settings contradict each other.
+  static void checkSettings(const ServerConfig& config);
 
   // These return the blocks that changed, for the publishers.
   /// Notes what a scan changed, and moves the window. @param stamp of the scan [ns].
@@ -54,10 +64,14 @@ class KeptMap {
   /// map.
   Saving saveTo(const std::string& path);
 
+  /// Whether tiles of a city that are near the sensor are still missing; update() adds them.
+  bool isLoading() const { return city_ && has_pose_ && (arrived_ || !city_->complete()); }
   bool hasFile() const { return keeper_ != nullptr; }
+  /// The file that the map is kept in; hasFile() must be true.
+  const std::string& filePath() const { return keeper_->path(); }
   bool readOnly() const { return read_only_; }
-  /// What is wrong with the map file at the moment, in one sentence; "" if nothing is.
-  std::string fault() const { return keeper_ ? keeper_->fault() : ""; }
+  /// What is wrong with the map file or the city at the moment, in one sentence; "" if nothing is.
+  std::string fault() const;
   /// Wall time up to which the map file has everything that was added; 0: nothing was saved yet.
   ros::WallTime saved() const { return saved_; }
   /// Saves and closes the map file. @return what was lost, and why; "" if nothing was.
@@ -69,6 +83,11 @@ class KeptMap {
  private:
   DriveRecord newDrive() const;
   void requireWritable() const;
+  void openCity(const std::string& path);
+  /// Adds the tiles that have been read from the city. @return the blocks that changed; none with a keeper,
+  /// which reports them itself.
+  std::vector<GridIndex> addFromCity(const ServerConfig& config);
+  void add(StoredMap& tiles, std::vector<GridIndex>& changed);
 
   SemanticMapper& mapper_;
   std::string frame_, name_;
@@ -77,6 +96,12 @@ class KeptMap {
   DriveRecord drive_;                ///< without a keeper
   std::vector<DriveRecord> drives_;  ///< of maps that were added, without a keeper
   std::unique_ptr<MapKeeper> keeper_;
+  std::unique_ptr<CityLoader> city_;
+  std::string city_fault_;                    ///< why there is no city_, although map_file names one
+  std::optional<StoredMap> arrived_;          ///< tiles from the city that are not in the map yet
+  std::set<std::string> city_drives_;         ///< ids of the drives that have been added with such tiles
+  std::vector<Eigen::AlignedBox3d> cleared_;  ///< boxes that are cleared in tiles that come later, too
+  bool has_pose_ = false, said_loaded_ = false;
   bool unsaved_ = false;  ///< something has been added since the last save
   std::future<void> saving_;
   ros::WallTime saving_since_, saved_;

@@ -73,7 +73,7 @@ MappingServer::~MappingServer() {
   say(ledger_.summary(waiting_.size()));
   if (!kept_->hasFile()) return;
   const std::string lost = kept_->close();
-  say(lost.empty() ? "The map is saved in " + config_.map_file : lost);
+  say(lost.empty() ? "The map is saved in " + kept_->filePath() : lost);
 }
 
 void MappingServer::subscribe() {
@@ -95,6 +95,7 @@ void MappingServer::subscribe() {
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
+  KeptMap::checkSettings(server);
   mapper_->reconfigure(mapper);
   config_ = server;
   const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
@@ -234,7 +235,7 @@ void MappingServer::reportFault() {
   const std::string fault = kept_->fault();
   if (fault == last_fault_) return;
   if (fault.empty()) {
-    ROS_INFO("%s can be written again", config_.map_file.c_str());
+    ROS_INFO("%s is in order again", config_.map_file.c_str());
   } else {
     ROS_ERROR("%s", fault.c_str());
   }

@@ -3,6 +3,7 @@
 
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/io/tiled_map.h"
 #include "ros/mapping_server.h"
 #include "ros/queued_call.h"
 #include "ros/service_answer.h"
@@ -21,6 +22,14 @@ void checkPath(const std::string& path) {
   if (path.find('\0') != std::string::npos) {  // the file system would cut the path there
     throw std::invalid_argument("path '" + path + "' must not hold a zero byte");
   }
+}
+
+/// @throws std::invalid_argument if a file to be written lies in a city.
+void refuseCity(const std::string& path) {
+  const std::string city = cityAround(path);
+  if (city.empty()) return;
+  throw std::invalid_argument("path '" + path + "' is in the city " + city +
+                              ", which only map_city may change; save the map elsewhere");
 }
 
 }  // namespace
@@ -117,6 +126,7 @@ void MappingServer::saveMapFile(const std::string& path) {
 bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& response) {
   answer(response, [&] {
     checkPath(request.path);
+    refuseCity(request.path);
     if (isMapFileName(request.path)) {
       saveMapFile(request.path);
       return "wrote " + request.path;

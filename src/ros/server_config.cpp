@@ -91,9 +91,20 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "the sensor comes back; poses of the trajectory outside it are removed. Set it to bound memory on "
           "long drives; 0 keeps everything in memory."),
       textParameter(
-          "map_file", &C::map_file, "an absolute path that ends in .bkm", Changes::kAtStart,
+          "map_file", &C::map_file, "an absolute path that ends in .bkm, or of the folder of a city",
+          Changes::kAtStart,
           "Map file that the mapper continues: loaded at the start, and saved every save_period and "
-          "at the end. It is created if missing. Without it, the map ends with the mapper."),
+          "at the end. It is created if missing. Without it, the map ends with the mapper. The folder of a "
+          "city of map_city is never changed: the mapper loads what is near the sensor, and keeps its map in "
+          "own_map_file."),
+      textParameter("own_map_file", &C::own_map_file, "an absolute path that ends in .bkm", Changes::kAtStart,
+                    "New map file for a mapper whose map_file is a city: keeps what it loads from the city "
+                    "and what it maps. Without it, both end with the mapper; window needs it."),
+      realParameter("map_load_radius", &C::map_load_radius, NumberRange::above(0.0).slider(1.0, 1e4), "m",
+                    Changes::kWhileMapping,
+                    "Distance from the sensor, along each axis, up to which the mapper loads a city in "
+                    "map_file; with window, at most half of it. Raise it to plan farther ahead, lower it to "
+                    "save memory."),
       truthParameter("read_only", &C::read_only, Changes::kAtStart,
                      "Publish the map in map_file, and take no clouds. Set true for a finished map."),
       realParameter("save_period", &C::save_period, NumberRange::atLeast(0.0).slider(0.0, 3600.0), "s",

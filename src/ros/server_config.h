@@ -28,7 +28,9 @@ struct ServerConfig {
   QueuePolicy queue_policy = QueuePolicy::kDropOldest;
   OnTimeJump on_time_jump = OnTimeJump::kKeep;
   double window = 0.0;             ///< edge of the cube around the sensor that is kept in memory [m]; 0: all
-  std::string map_file;            ///< where the map is kept; "": nowhere
+  std::string map_file;            ///< where the map is kept, or the folder of a city; "": nowhere
+  std::string own_map_file;        ///< where the map is kept if map_file is a city; "": nowhere
+  double map_load_radius = 60.0;   ///< distance up to which tiles of a city are loaded [m]
   bool read_only = false;          ///< whether map_file is published and not changed
   double save_period = 60.0;       ///< [s]; 0: map_file is saved only at the end
   double diagnostic_period = 1.0;  ///< [s]

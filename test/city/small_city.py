@@ -11,16 +11,6 @@ def program(folder, name, *arguments):
     subprocess.run([str(pathlib.Path(folder) / name), *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
 
 
-def simulate(programs, folder, seed, shift, scans=SCANS):
-    """Writes a drive whose poses are moved into the frame of the city."""
-    program(programs, 'simulate_drive', '--output', folder, '--scans', scans, '--seed', seed, '--beams', 16, '--columns', 400)
-    poses = [[float(number) for number in line.split()] for line in (folder / 'poses.txt').read_text().splitlines()]
-    for pose in poses:
-        pose[3] += shift[0]
-        pose[7] += shift[1]
-    (folder / 'poses.txt').write_text(''.join(' '.join(map(repr, pose)) + '\n' for pose in poses))
-
-
 def write_city(programs, pieces, city, region_tiles):
     """Writes the regions of some map files, and the index."""
     city = pathlib.Path(city)
@@ -48,13 +38,15 @@ def write_city(programs, pieces, city, region_tiles):
     return index
 
 
-def make(programs, folder, shifts=((0, 0), (35, -20)), region_tiles=2, settings=()):
-    """Writes the city `city`, the map `whole.bkm`, the maps `d1.bkm`... and their sequences `d1`... Returns the index."""
+def make(programs, folder, shifts=((0, 0), (35.1, -20.1)), region_tiles=2):
+    """Writes the city `city` of some drives, moved by x, y [m], and their map `whole.bkm`. Returns the index."""
     folder = pathlib.Path(folder)
     maps = []
-    for seed, shift in enumerate(shifts, 1):
-        simulate(programs, folder / f'd{seed}', seed, shift)
-        maps.append(folder / f'd{seed}.bkm')
-        program(programs, 'map_sequence', '--sequence', folder / f'd{seed}', '--output', maps[-1], *settings)
+    for seed, (x, y) in enumerate(shifts, 1):
+        drive, mapped, moved = (folder / f'{name}{seed}{end}' for name, end in (('d', ''), ('mapped', '.bkm'), ('moved', '.bkm')))
+        program(programs, 'simulate_drive', '--output', drive, '--scans', SCANS, '--seed', seed, '--beams', 16, '--columns', 400)
+        program(programs, 'map_sequence', '--sequence', drive, '--output', mapped)
+        program(programs, 'merge_maps', mapped, '--transform', f'{mapped}={x},{y},0,0', '--output', moved)
+        maps.append(moved)
     program(programs, 'merge_maps', *maps, '--output', folder / 'whole.bkm')
     return write_city(programs, maps, folder / 'city', region_tiles)

@@ -203,8 +203,7 @@ TEST_F(City, NoOtherFileIsOpened) {
   EXPECT_EQ(city.reading().tiles, regions_[4].tiles);
   ASSERT_EQ(read.drives.size(), 1u);
   EXPECT_EQ(read.drives[0].id, "a#000000+2");
-  EXPECT_TRUE(city.holdsDrive("a#000000+2"));
-  EXPECT_FALSE(city.holdsDrive("b"));
+  EXPECT_EQ(city.driveIds(), std::set<std::string>{"a#000000+2"});
   // One voxel more, and the neighbours are needed.
   tall.max().x() += 0.3;
   EXPECT_NE(sentenceOf([&] { city.readBox(tall); }), "");
@@ -299,6 +298,8 @@ TEST_F(City, AHostileIndexIsRefusedInOneSentence) {
   std::filesystem::remove(folder_ / "index.json");
   EXPECT_NE(refusal().find("holds no index.json, which map_city writes last"), std::string::npos);
   EXPECT_NE(sentenceOf([&] { TiledMap(folder_ / "nothing"); }).find("cannot be opened"), std::string::npos);
+  EXPECT_NE(sentenceOf([&] { TiledMap(folder_ / "nothing/"); }).find("holds no index.json"),
+            std::string::npos);
 }
 
 TEST_F(City, RegionsOfOtherMapsAreRefused) {

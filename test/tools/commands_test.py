@@ -56,6 +56,7 @@ LEFT_OUT = {
                      'scripts/map_city drives/city.yaml --output city --scheduler tcp://FIRST_HOST:8786'),
                     'needs a cluster; city_test starts a scheduler and workers'),
     'scripts/prove_city': 'takes a quarter of an hour; city_test tries the same with six drives',
+    'roslaunch bki_mapping mapping.launch map_file:=~/city/ classes:=semantic_kitti': 'city_rostest starts such a node',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,8 @@ class TiledMap {
   std::int32_t regionTiles() const;
   /// The names of the drives in the index of a city, sorted; of a map file none.
   const std::vector<std::string>& driveNames() const;
-  /// Whether a drive with this id (DriveRecord::id), which in a city is a piece of a drive, is in the map.
-  bool holdsDrive(const std::string& id) const;
+  /// The ids (DriveRecord::id) of the drives in the map; in a city they are pieces of drives.
+  const std::set<std::string>& driveIds() const;
   /// The number of tiles in the whole map, and of the files that hold them.
   std::uint64_t tileCount() const;
   std::size_t fileCount() const;
@@ -77,6 +78,10 @@ class TiledMap {
   StoredMap readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit = 0);
   /// The tiles with voxels in a box that the map has, sorted by file. Reads no content of tiles.
   std::vector<TileEntry> tilesIn(const Eigen::AlignedBox3d& box);
+  /// The files that may have tiles of a box, as positions in regions(); 0 for a map file. Opens none of them.
+  std::vector<std::size_t> filesIn(const Eigen::AlignedBox3d& box);
+  /// The tiles with voxels in a box that one of these files has.
+  std::vector<TileEntry> tilesIn(const Eigen::AlignedBox3d& box, std::size_t file);
 
   /// What has been read since the map was opened.
   struct Reading {
