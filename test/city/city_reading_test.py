@@ -70,7 +70,9 @@ class CityReading(unittest.TestCase):
         self.assertEqual(len(rows), len(points))
         self.assertEqual({row['state'] for row in rows[:300]} - {'occluded', 'occupied'}, {'unknown', 'free'})
         self.assertEqual({row['state'] for row in rows[300:350]}, {'occupied'})
-        self.assertTrue(all(row['nearest_class'] == row['class'] and float(row['nearest_distance']) < 1e-4 for row in rows[300:350]))
+        for row in rows[300:350]:
+            self.assertEqual(row['nearest_class'], row['class'])
+            self.assertLess(float(row['nearest_distance']), 1e-4)
         found = 0
         for point, row in zip(points, rows):
             self.assertAlmostEqual(float(row['x']), point[0], delta=1e-9 * abs(point[0]))

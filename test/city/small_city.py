@@ -43,8 +43,9 @@ def make(programs, folder, shifts=((0, 0), (35.1, -20.1)), region_tiles=2):
     folder = pathlib.Path(folder)
     maps = []
     for seed, (x, y) in enumerate(shifts, 1):
-        drive, mapped, moved = (folder / f'{name}{seed}{end}' for name, end in (('d', ''), ('mapped', '.bkm'), ('moved', '.bkm')))
-        program(programs, 'simulate_drive', '--output', drive, '--scans', SCANS, '--seed', seed, '--beams', 16, '--columns', 400)
+        drive, mapped, moved = folder / f'd{seed}', folder / f'mapped{seed}.bkm', folder / f'moved{seed}.bkm'
+        program(programs, 'simulate_drive', '--output', drive, '--scans', SCANS, '--seed', seed, '--beams', 16,
+                '--columns', 400)
         program(programs, 'map_sequence', '--sequence', drive, '--output', mapped)
         program(programs, 'merge_maps', mapped, '--transform', f'{mapped}={x},{y},0,0', '--output', moved)
         maps.append(moved)

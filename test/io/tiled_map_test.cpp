@@ -204,8 +204,14 @@ TEST_F(City, NoOtherFileIsOpened) {
   ASSERT_EQ(read.drives.size(), 1u);
   EXPECT_EQ(read.drives[0].id, "a#000000+2");
   EXPECT_EQ(city.driveIds(), std::set<std::string>{"a#000000+2"});
-  // One voxel more, and the neighbours are needed.
-  tall.max().x() += 0.3;
+  // Up to the centres of the next voxels no other file is needed; with them, it is.
+  for (Eigen::Index axis : {0, 1}) {
+    tall.min()[axis] -= 0.29;
+    tall.max()[axis] += 0.29;
+  }
+  EXPECT_EQ(contentOf(city.readBox(tall).map), contentOf(read.map));
+  EXPECT_EQ(city.reading().files, 1u);
+  tall.max().x() += 0.02;
   EXPECT_NE(sentenceOf([&] { city.readBox(tall); }), "");
   EXPECT_EQ(contentOf(city.readBox(column).map), contentOf(read.map)) << "a failed call changes nothing";
 }

@@ -43,8 +43,8 @@ class CityMap(unittest.TestCase):
             inside &= (voxels[name] >= BOX[0, axis]) & (voxels[name] <= BOX[1, axis])
         self.assertTrue(0 < inside.sum() < len(voxels))
         city = bki.open_city(self.folder / 'city')
-        for part in (city.load(BOX), city.load((BOX[1].tolist(), BOX[0].tolist())), bki.load(self.folder / 'whole.bkm', box=BOX),
-                     bki.load(str(self.folder / 'city'), box=BOX)):
+        for part in (city.load(BOX), city.load((BOX[1].tolist(), BOX[0].tolist())),
+                     bki.load(self.folder / 'whole.bkm', box=BOX), bki.load(str(self.folder / 'city'), box=BOX)):
             found = part.voxels('occupied,free,occluded')
             for name in ('x', 'y', 'z', 'state', 'label'):
                 self.assertTrue(np.array_equal(found[name], voxels[inside][name]), name)
@@ -61,7 +61,7 @@ class CityMap(unittest.TestCase):
         self.assertTrue(np.array_equal(city.load_at(few).states(few), self.whole.states(few)))
         self.assertLessEqual(city.tiles_read - before, 1)
         with concurrent.futures.ThreadPoolExecutor(4) as pool:  # calls wait for each other
-            maps = list(pool.map(lambda n: city.load_at(points[50 * n:50 * n + 50]).states(points[50 * n:50 * n + 50]), range(40)))
+            maps = list(pool.map(lambda some: city.load_at(some).states(some), np.split(points, 40)))
         self.assertTrue(np.array_equal(np.concatenate(maps), self.whole.states(points)))
 
     def test_what_a_city_says_of_itself(self):
