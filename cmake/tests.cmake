@@ -204,6 +204,18 @@ if(CATKIN_ENABLE_TESTING)
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_tests(costmap grid_copy)
+  # The layer itself, with a stand-in for costmap_2d, which Debian does not have.
+  add_library(semantic_layer_for_test MODULE src/costmap/semantic_layer.cpp)
+  target_include_directories(semantic_layer_for_test SYSTEM PRIVATE test/costmap/stand_in)
+  target_link_libraries(semantic_layer_for_test PRIVATE bki_mapping_costmap ${catkin_LIBRARIES})
+  bki_mapping_test_options(semantic_layer_for_test)
+  add_executable(semantic_layer_test test/costmap/semantic_layer_test.cpp)
+  target_include_directories(semantic_layer_test SYSTEM PRIVATE test/costmap/stand_in)
+  target_link_libraries(semantic_layer_test PRIVATE GTest::gtest ${catkin_LIBRARIES})
+  target_compile_definitions(semantic_layer_test PRIVATE BKI_MAPPING_LAYER="$<TARGET_FILE:semantic_layer_for_test>")
+  bki_mapping_test_options(semantic_layer_test)
+  add_dependencies(semantic_layer_test semantic_layer_for_test)
+  add_rostest(test/costmap/semantic_layer.test)
   bki_mapping_unit_tests(ros cloud_conversion kept_city query_services recent_map scan_account scan_reader sensor_trajectory server_config)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
