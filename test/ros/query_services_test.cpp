@@ -94,8 +94,8 @@ TEST(GetNearestObstacles, ACallEndsInTime) {
   const ClassTable classes = table();
   SemanticMap map(GridGeometry(1.0), 0.001, 5);
   const std::vector<EvidenceUnits> much(kBlockVoxels, unitsOf(5.0)), little(kBlockVoxels, unitsOf(1.0));
-  for (int n = 0; n < 8000; ++n) {
-    Block& block = map.getOrAllocate({{n % 20, n / 20 % 20, n / 400}});
+  for (int n = 0; n < 1000; ++n) {
+    Block& block = map.getOrAllocate({{n % 10, n / 10 % 10, n / 100}});
     block.add(2, much.data());
     block.add(3, little.data());
   }
