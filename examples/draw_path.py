@@ -46,10 +46,20 @@ def draw_robot(axes, path, every):
         axes.plot(*(ROBOT @ turn.T + [pose['x'], pose['y']]).T, color='black', linewidth=0.6)
 
 
+def draw_movers(axes, path, movers):
+    """What moves, and a line to the robot at that time."""
+    for m in movers:
+        half = np.array([m['half_length'], m['half_width']])
+        axes.add_patch(plt.Rectangle(np.array([m['x'], m['y']]) - half, *(2 * half), fill=False, color='red', linewidth=0.8))
+        robot = path[np.abs(path['time'] - m['time']).argmin()]
+        axes.plot([robot['x'], m['x']], [robot['y'], m['y']], color='red', linewidth=0.3)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('map', help='map file (.bkm)')
     parser.add_argument('path', help='path, as plan_path writes it')
+    parser.add_argument('--movers', help='what moved near the robot, as navigation_test writes it')
     parser.add_argument('--output', default='path.png')
     given = parser.parse_args()
 
@@ -72,6 +82,8 @@ def main():
     axes[0].plot(path['x'][[0, -1]], path['y'][[0, -1]], '--', color='black', linewidth=0.8)
     axes[0].plot(path['x'], path['y'], color='black', linewidth=1.5)
     draw_robot(axes[0], path, 20)
+    if given.movers:
+        draw_movers(axes[0], path, np.atleast_1d(np.genfromtxt(given.movers, delimiter=',', names=True)))
     for c in map_.classes:
         if c.id in floor['label'][known] or c.id in body['label'][obstacles]:
             axes[0].scatter([], [], marker='s', color=np.array(c.color) / 255, label=c.name)

@@ -1,10 +1,13 @@
-// A robot that drives as examples/plan_path.cpp plans on the map of a simulated street hits nothing of the
-// street.
+// A robot that drives as examples/plan_path.cpp plans on the map of a simulated street hits nothing that
+// stands in the street. A robot that maps, looks out for what moves, and plans while it drives hits nothing
+// at all. With BKI_MAPPING_DRIVE, the name of a folder, its drive is written there.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -16,6 +19,7 @@
 #include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/mapping/parameters.h"
+#include "examples/planner.h"
 #include "simulation/lidar.h"
 #include "temporary_folder.h"
 
@@ -38,18 +42,24 @@ class Navigation : public testing::Test {
     config.lidar.columns = 900;
     drive_ = std::make_unique<Drive>(config);
     folder_ = std::make_unique<TemporaryFolder>();
-    MapperConfig settings;
-    setParameters(settings, loadParameterFile(kTables + "presets/robot.yaml"));
-    SemanticMapper mapper(settings, std::make_shared<const ClassTable>(
-                                        loadClassTable(kTables + "classes/semantic_kitti.yaml")));
     DriveRecord record;
     record.id = "simulated";
+    const auto mapper = mapped(&record);
+    saveMap(mapFile(), mapInfoOf(*mapper, "map"), {record}, mapper->map());
+  }
+  /// A mapper that has mapped the drive.
+  static std::unique_ptr<SemanticMapper> mapped(DriveRecord* record = nullptr) {
+    MapperConfig settings;
+    setParameters(settings, loadParameterFile(kTables + "presets/robot.yaml"));
+    auto mapper = std::make_unique<SemanticMapper>(
+        settings,
+        std::make_shared<const ClassTable>(loadClassTable(kTables + "classes/semantic_kitti.yaml")));
     for (std::size_t i = 0; i < drive_->size(); ++i) {
       const SequenceFrame frame = drive_->frame(i);
-      mapper.integrate(frame.scan());
-      record.addScan(frame.stamp, mapper.map().geometry(), mapper.touchedBlocks());
+      mapper->integrate(frame.scan());
+      if (record) record->addScan(frame.stamp, mapper->map().geometry(), mapper->touchedBlocks());
     }
-    saveMap(mapFile(), mapInfoOf(mapper, "map"), {record}, mapper.map());
+    return mapper;
   }
   static void TearDownTestSuite() {
     drive_.reset();
@@ -110,16 +120,18 @@ class Navigation : public testing::Test {
     return path;
   }
 
-  /// The label of what the robot hits at a pose on the true street. Only what stands counts: the preset
-  /// clears what moves, and leaves it to sensors.
-  static std::optional<std::uint32_t> hitAt(const Pose& pose) {
+  /// The label of what the robot hits at a pose on the true street. @param time [s]; nullopt: only what
+  /// stands counts, because the preset clears what moves, and leaves it to sensors.
+  static std::optional<std::uint32_t> hitAt(const Pose& pose, std::optional<double> time = std::nullopt) {
     const Eigen::Isometry3d T_world_map = drive_->T_world_sensor(0);
     const Eigen::Vector3d centre = T_world_map * Eigen::Vector3d(pose.x, pose.y, 0.0);
     Scene near{drive_->scene().ground, {}};
     for (const Shape& shape : drive_->scene().shapes) {
       const bool moves = !shape.velocity.isZero() || !shape.legs.empty();
       const double reach = shape.half.head<2>().norm() + kHalfLength + kHalfWidth;
-      if (!moves && (shape.centre - centre).head<2>().norm() < reach) near.shapes.push_back(shape);
+      if (moves && !time) continue;
+      if ((shape.centreAt(time.value_or(0.0)) - centre).head<2>().norm() < reach)
+        near.shapes.push_back(shape);
     }
     const double c = std::cos(pose.yaw), s = std::sin(pose.yaw);
     for (double forward = -kHalfLength; forward <= kHalfLength; forward += 0.04) {
@@ -127,7 +139,7 @@ class Navigation : public testing::Test {
         Eigen::Vector3d point = T_world_map * Eigen::Vector3d(pose.x + c * forward - s * left,
                                                               pose.y + s * forward + c * left, 0.0);
         for (point.z() = 0.02; point.z() <= 1.1; point.z() += 0.06) {
-          if (const auto label = near.labelAt(point, 0.0)) return label;
+          if (const auto label = near.labelAt(point, time.value_or(0.0))) return label;
         }
       }
     }
@@ -223,6 +235,140 @@ TEST_F(Navigation, RefusesPlacesWhereTheRobotCannotStand) {
         << goal;
   }
   EXPECT_EQ(say("2 -5.3 0"), "plan_path: give a map file, a class table, and X Y YAW of start and goal\n");
+}
+
+/// A robot that maps the street while it drives, with a lidar on a mast, and plans anew when it must.
+class DrivingRobot {
+ public:
+  /// @param sees_movers whether it plans around what its last scans hit of classes that can move.
+  DrivingRobot(const Drive& drive, std::unique_ptr<SemanticMapper> mapper, const planner::Pose& start,
+               double time, bool sees_movers)
+      : drive_(drive), mapper_(std::move(mapper)), at_(start), time_(time), sees_movers_(sees_movers) {
+    lidar_.columns = 720;
+    lidar_.lowest = -1.0;
+  }
+
+  const SemanticMapper& mapper() const { return *mapper_; }
+  const planner::Pose& at() const { return at_; }
+  double time() const { return time_; }
+
+  /// Scans, and decides where to go.
+  void look(const planner::Pose& goal) {
+    scan();
+    const SemanticMap map = mapper_->snapshot();
+    const Eigen::AlignedBox3d area(Eigen::Vector3d(-5.0, -9.0, -2.5), Eigen::Vector3d(45.0, 12.0, 1.0));
+    const planner::Street street(map, mapper_->classes(), area);
+    if (isStillGood(street)) return;
+    way_.clear();
+    try {
+      way_ = planner::plan(street, at_, goal, sees_movers_ ? &movers_ : nullptr, 2.5, 6000);
+      way_.erase(way_.begin());
+    } catch (const std::runtime_error&) {  // it waits
+    }
+  }
+  /// Goes on by one pose of its way, or waits as long as that takes.
+  void move() {
+    if (!way_.empty()) {
+      at_ = way_.front();
+      way_.erase(way_.begin());
+    }
+    time_ += planner::kPeriod / planner::kSpeed;
+  }
+
+ private:
+  void scan() {
+    Eigen::Isometry3d T_map_robot = Eigen::Isometry3d::Identity();
+    T_map_robot.translation() = Eigen::Vector3d(at_.x(), at_.y(), 0.0);
+    T_map_robot.linear() = Eigen::AngleAxisd(at_.z(), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    SequenceFrame frame = simulation::scan(drive_.scene(), lidar_, drive_.T_world_sensor(0) * T_map_robot,
+                                           time_, 1000 + scans_++);
+    frame.T_map_sensor = T_map_robot;
+    frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(time_ * 1e9));
+    mapper_->integrate(frame.scan());
+    std::vector<Eigen::Vector2d> hits;
+    for (std::size_t n = 0; n < frame.points.size(); ++n) {
+      const auto id = mapper_->classes().classOfRaw(frame.labels[n]);
+      if (!id || !mapper_->classes().find(*id)->dynamic) continue;
+      hits.emplace_back((T_map_robot * frame.points[n].cast<double>()).head<2>());
+    }
+    movers_.update(hits, time_);
+  }
+  bool isStillGood(const planner::Street& street) const {
+    double after = 0.0;
+    for (const planner::Pose& pose : way_) {
+      after += planner::kPeriod / planner::kSpeed;
+      if (!street.isDrivable(pose) || (sees_movers_ && !movers_.areClearOf(pose, after))) return false;
+    }
+    return !way_.empty();
+  }
+
+  const Drive& drive_;
+  std::unique_ptr<SemanticMapper> mapper_;
+  planner::Pose at_;
+  double time_;
+  bool sees_movers_;
+  LidarConfig lidar_;
+  planner::Movers movers_;
+  std::vector<planner::Pose> way_;
+  std::uint64_t scans_ = 0;
+};
+
+struct DrivenPose {
+  planner::Pose at;
+  double time;
+  std::optional<std::uint32_t> hit;
+};
+
+/// Writes map, way, and what moved near the robot, for examples/draw_path.py.
+void writeDrive(const std::string& folder, const SemanticMapper& mapper, const Drive& drive,
+                const std::vector<DrivenPose>& driven) {
+  saveMap(folder + "/driven.bkm", mapInfoOf(mapper, "map"), {}, mapper.map());
+  std::ofstream path(folder + "/driven.csv"), movers(folder + "/movers.csv");
+  path << "x,y,z,yaw,time\n";
+  movers << "x,y,half_length,half_width,time\n";
+  const Eigen::Isometry3d T_map_world = drive.T_world_sensor(0).inverse();
+  for (std::size_t n = 0; n < driven.size(); ++n) {
+    const DrivenPose& pose = driven[n];
+    path << pose.at.x() << "," << pose.at.y() << ",-1.73," << pose.at.z() << "," << pose.time << "\n";
+    if (n % 10 != 0) continue;
+    for (const Shape& shape : drive.scene().shapes) {
+      if (shape.velocity.isZero() && shape.legs.empty()) continue;
+      const Eigen::Vector3d centre = T_map_world * shape.centreAt(pose.time);
+      if ((centre.head<2>() - pose.at.head<2>()).norm() > 6.0) continue;
+      movers << centre.x() << "," << centre.y() << "," << shape.half.x() << "," << shape.half.y() << ","
+             << pose.time << "\n";
+    }
+  }
+}
+
+// It starts on a sidewalk on which people walk, crosses a road with traffic, and ends on the other sidewalk.
+TEST_F(Navigation, DrivesThroughTrafficAndHitsNothing) {
+  const planner::Pose start(2.0, -5.3, 0.0), goal(30.0, 8.0, 0.0);
+  const auto drive = [&](bool sees_movers) {
+    std::vector<DrivenPose> driven;
+    DrivingRobot robot(*drive_, mapped(), start, 6.0, sees_movers);
+    while (robot.time() < 120.0 && (robot.at() - goal).head<2>().norm() >= 0.6) {
+      robot.look(goal);
+      for (int n = 0; n < 3; ++n) {
+        robot.move();
+        const planner::Pose& at = robot.at();
+        driven.push_back({at, robot.time(), hitAt({at.x(), at.y(), 0.0, at.z(), 0.0}, robot.time())});
+      }
+    }
+    const char* const folder = std::getenv("BKI_MAPPING_DRIVE");
+    if (folder && sees_movers) writeDrive(folder, robot.mapper(), *drive_, driven);
+    return driven;
+  };
+  const auto hits = [](const std::vector<DrivenPose>& driven) {
+    return std::count_if(driven.begin(), driven.end(), [](const DrivenPose& p) { return p.hit.has_value(); });
+  };
+  const std::vector<DrivenPose> driven = drive(true);
+  EXPECT_LT((driven.back().at - goal).head<2>().norm(), 0.6) << "it arrives";
+  for (const DrivenPose& pose : driven) {
+    ASSERT_FALSE(pose.hit) << "label " << *pose.hit << " at " << pose.at.transpose() << ", " << pose.time
+                           << " s";
+  }
+  EXPECT_GT(hits(drive(false)), 0) << "there is nothing that it must wait for or drive around";
 }
 
 }  // namespace
