@@ -25,7 +25,7 @@ def line(count):
     return [Point(0.1 * n, 0.05 * n, 0.2) for n in range(count)]
 
 
-REQUESTS = {
+REQUESTS = {  # by the name of the service, and more words
     'query_points': (srv.QueryPoints, {'points': line(100)}),
     'cast_rays': (srv.CastRays, {'origins': [Point(0, 0, 1.0)], 'lengths': [20.0],
                                  'directions': [Vector3(50 - n, n, -2) for n in range(100)]}),
@@ -35,6 +35,7 @@ REQUESTS = {
     'get_section': (srv.GetSection, {'start': Point(-15, -15, 0.5), 'end': Point(15, 15, 0.5)}),
     'get_distances': (srv.GetDistances, {'points': line(100), 'classes': GROUND, 'all_but': True, 'max_distance': 3.0}),
     'get_frontiers': (srv.GetFrontiers, {'min_size': 20, 'max_count': 100}),
+    'get_frontiers in a box': (srv.GetFrontiers, {'min_size': 20, 'min': Point(-15, -15, -5), 'max': Point(15, 15, 5)}),
 }
 
 
@@ -78,7 +79,7 @@ class QueryLatency(unittest.TestCase):
 
     def test_answers_come_soon_and_scans_hardly_wait(self):
         with Mapping() as mapping:
-            proxies = {name: rospy.ServiceProxy(f'/mapping/{name}', kind, persistent=True)
+            proxies = {name: rospy.ServiceProxy(f'/mapping/{name.split()[0]}', kind, persistent=True)
                        for name, (kind, _) in REQUESTS.items()}
             for proxy in proxies.values():
                 proxy.wait_for_service(TIMEOUT)
