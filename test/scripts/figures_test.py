@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
 import matplotlib  # noqa: E402
 matplotlib.use('Agg')
 
-from figures import complexity, frontier, method, plane, tradeoff  # noqa: E402
+from figures import complexity, frontier, leave_one_out, method, plane, tradeoff  # noqa: E402
 from figures.programs import Programs  # noqa: E402
 
 
@@ -52,6 +52,28 @@ class Figures(unittest.TestCase):
         self.assertGreater(crowding('uniform, 5 per beam'), 5)
         free = {row['representation']: int(row['free_voxels']) for row in self.rows('figure2.csv')}
         self.assertGreater(free['lines, uniform'], 1.3 * free['linear, 5 per beam'])
+
+    def test_the_drive_left_out_has_no_say(self):
+        def figures(sa, parked, da):
+            return {'sa': sa, 'sa_standing': parked, 'da': da, 'aa': 0.0, 'floor_holes': 0.0}
+        good, bad = figures(1.0, 0.95, 0.95), figures(1.0, 0.95, 0.5)
+        figures_of = {'a': {'x': bad, 'y': good, 'z': good}, 'b': {'x': good, 'y': figures(1.0, 0.5, 0.9), 'z': good},
+                      'c': {'x': figures(1.0, None, 1.0), 'y': figures(0.98, 1.0, 1.0), 'z': figures(1.0, 1.0, None)}}
+        rows, best = leave_one_out.left_out(figures_of)
+        self.assertEqual([(drive, setting) for drive, setting, _ in rows], [('x', 'a'), ('y', 'c'), ('z', 'a')])
+        self.assertEqual(best, 'a')
+        self.assertIs(rows[0][2], bad)  # on x, the choice of the others is bad, which only leaving out shows
+        self.assertIn('| x | a | 100.0 | 95.0 | 0.0 | 50.0 | 0.0 |', leave_one_out.table(rows))
+
+    def test_leave_one_out_measures_each_setting(self):
+        gains = leave_one_out.judgements()[:2]
+        preset = os.path.join(SOURCE, 'config', 'presets', 'robot.yaml')
+        figures_of = leave_one_out.measured(self.programs, {'drive': self.drive, 'again': self.drive}, preset,
+                                            [0.6], gains)
+        self.assertEqual(list(figures_of), ['scan_limit/void=0.6,' + gain for gain in gains])
+        for figures in figures_of.values():
+            self.assertEqual(figures['drive'], figures['again'])
+            self.assertGreater(figures['drive']['sa'], 0.5)
 
     def test_tradeoff_and_views(self):
         modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}

@@ -60,6 +60,8 @@ LEFT_OUT = {
                     'needs a cluster; city_test starts a scheduler and workers'),
     'scripts/prove_city': 'takes a quarter of an hour; city_test tries the same with six drives',
     'roslaunch bki_mapping mapping.launch map_file:=~/city/ classes:=semantic_kitti': 'city_rostest starts such a node',
+    'PYTHONPATH=scripts python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04':
+        'takes long; figures_test measures a small case',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
 # Slow parts of commands and their replacements. Everything else is run as written.

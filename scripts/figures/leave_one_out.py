@@ -1,0 +1,89 @@
+"""Tunes on all drives but one, and judges on the one left out.
+
+For each drive, chooses the setting whose worst drive among the others is best, and prints what it does on that drive. The
+figure of a drive is sqrt(parked DA), which takes parked cars as seriously as ghosts; where SA is below 99 %, it is 0.
+"""
+import argparse
+import itertools
+import math
+import os
+
+from .programs import Programs
+from .tables import markdown
+
+GAINS = {'dynamic': (20, 50, 150, 500), 'living': (3e4, 3e5), 'static': (0.0005, 0.002),
+         'persistence': (0.03, 0.05, 0.08, 0.12)}
+SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
+             'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
+             'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
+             'crowd': {'scene': 'crowd', 'scans': 200}}
+LEAST_SA = 0.99
+
+
+def judgements():
+    """All settings of free_gain, as --judge of evaluate_map takes them."""
+    return [','.join(f'free_gain/{name}={value:g}' for name, value in zip(GAINS, values))
+            for values in itertools.product(*GAINS.values())]
+
+
+def figure_of(figures):
+    """What a setting is worth on a drive; 1 at best. Drives on which nothing that can move stands have no `parked`."""
+    if figures['sa'] < LEAST_SA:
+        return 0.0
+    parked = 1.0 if figures['sa_standing'] is None else figures['sa_standing']
+    return math.sqrt(parked * (1.0 if figures['da'] is None else figures['da']))
+
+
+def chosen(figures_of, drives):
+    """The setting whose worst drive is best; of equals, the first. figures_of[setting][drive] are figures."""
+    return max(figures_of, key=lambda setting: min(figure_of(figures_of[setting][drive]) for drive in drives))
+
+
+def left_out(figures_of):
+    """For each drive, what was chosen on the others, and its figures there; and what is chosen on all."""
+    drives = list(next(iter(figures_of.values())))
+    rows = []
+    for drive in drives:
+        setting = chosen(figures_of, [other for other in drives if other != drive])
+        rows.append((drive, setting, figures_of[setting][drive]))
+    return rows, chosen(figures_of, drives)
+
+
+def table(rows):
+    def percent(value):
+        return '' if value is None else f'{100 * value:.1f}'
+    return markdown(['left out', 'setting', 'SA', 'parked', 'holes', 'DA', 'AA'],
+                    [[drive, setting] + [percent(figures[name]) for name in ('sa', 'sa_standing', 'floor_holes', 'da', 'aa')]
+                     for drive, setting, figures in rows])
+
+
+def measured(programs, sequences, preset, voids, gains=None):
+    """figures_of, with one pass over each sequence for each value of scan_limit/void, which changes evidence."""
+    judged = [word for gain in gains or judgements() for word in ('--judge', gain)]
+    figures_of = {}
+    for void in voids:
+        for name, sequence in sequences.items():
+            figures = programs.evaluate(sequence, {'scan_limit/void': void}, ['--config', preset, *judged])
+            for each in figures['judged']:
+                figures_of.setdefault(f'scan_limit/void={void:g},' + each['settings'], {})[name] = each
+    return figures_of
+
+
+def main():
+    parser = argparse.ArgumentParser(prog='figures.leave_one_out', description=__doc__)
+    parser.add_argument('--programs', default='build/devel/lib/bki_mapping', help='folder with the programs of the package')
+    parser.add_argument('--presets', default='config/presets', help='folder with the presets')
+    parser.add_argument('--scratch', required=True, help='folder for simulated drives')
+    parser.add_argument('--void', type=float, nargs='+', default=[0.6], help='values of scan_limit/void to compare')
+    parser.add_argument('--sequence', action='append', default=[],
+                        help="further sequence in SemanticKITTI's layout; repeatable")
+    given = parser.parse_args()
+    programs = Programs(given.programs, os.path.abspath(given.scratch))
+    sequences = {name: programs.simulate(name, **options) for name, options in SIMULATED.items()}
+    sequences.update({os.path.basename(os.path.abspath(path)): path for path in given.sequence})
+    rows, best = left_out(measured(programs, sequences, os.path.join(given.presets, 'robot.yaml'), given.void))
+    print(table(rows) + f'\nchosen on all: {best}')
+
+
+if __name__ == '__main__':
+    main()
