@@ -68,6 +68,14 @@ say_progress() {
   done
 }
 
+# Configures a build; a new one is for Ninja, which keeps all cores busy. $1: build folder; then arguments of cmake.
+configure_build() {
+  local folder=$1 generator=()
+  shift
+  if [ ! -f "$folder/CMakeCache.txt" ]; then generator=(-G Ninja); fi
+  cmake -S "$root" -B "$folder" "${generator[@]}" "$@"
+}
+
 # Builds and says how far it is. $1: build folder; then targets, or none for all.
 build_targets() {
   local folder=$1 targets=()
@@ -76,7 +84,7 @@ build_targets() {
     cmake "$folder" -DBKI_MAPPING_CHOSEN="$(IFS=';' && echo "$*")" >/dev/null
     targets=(--target bki_mapping_chosen)
   fi
-  cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | say_progress ||
+  NINJA_STATUS='[%p] ' cmake --build "$folder" -j"$(nproc)" "${targets[@]}" 2>&1 | tee "$folder/build.log" | say_progress ||
     { grep -E -A 12 '(error|warning):' "$folder/build.log" | head -60; tail -20 "$folder/build.log"; return 1; } >&2
 }
 
