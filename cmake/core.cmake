@@ -81,3 +81,6 @@ bki_mapping_core_room(store SOURCES
   LINK bki_mapping_mapping)
 target_compile_definitions(bki_mapping_store PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 target_link_libraries(bki_mapping_store PRIVATE SQLite::SQLite3 ZLIB::ZLIB)
+bki_mapping_join(bki_mapping_store)
+# The linkage of a private class counts as the main file's only there.
+set_source_files_properties(src/store/map_keeper.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

@@ -21,6 +21,7 @@ target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree)
+bki_mapping_join(bki_mapping_io bki_mapping_simulation bki_mapping_evaluation)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation bki_mapping_query Boost::program_options)
 target_compile_definitions(bki_mapping_tools PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 
