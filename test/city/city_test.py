@@ -2,103 +2,25 @@
 """A city made by map_city equals one run of map_sequence over all its scans, to the bit, whatever happens meanwhile."""
 import contextlib
 import json
-import math
 import os
-import pathlib
 import random
 import shutil
 import signal
 import socket
-import sqlite3
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-try:
-    import distributed  # noqa: F401
-    import numpy
-    import psutil
-except ImportError:
-    print('SKIPPED: needs python3-distributed', file=sys.stderr)
-    sys.exit(77)
+from harness import BIN, DRIVES, SOURCE, MadeCity
 
-SOURCE = pathlib.Path(os.environ['BKI_MAPPING_SOURCE_DIR'])
-BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
-sys.path.insert(0, str(SOURCE / 'python'))
-from bki_mapping.city import bags, report, work  # noqa: E402
-from bki_mapping.city.description import Bag, CityError, read_city  # noqa: E402
-from bki_mapping.city.plan import pieces_of, sums_of  # noqa: E402
-
-DRIVES = [f'd{n}' for n in range(1, 7)]
-SCANS = 5
-CITY = ('--blocks', 2, '--block-edge', 70, '--scans', SCANS, '--rate', 1, '--beams', 32, '--columns', 900)
+import psutil
+from bki_mapping.city import report, work
+from bki_mapping.city.description import CityError, read_city
+from bki_mapping.city.plan import pieces_of, sums_of
 
 
-def program(name, *arguments):
-    subprocess.run([str(BIN / name), *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
-
-
-def tiles_of(*paths):
-    """The content of all tiles of some map files, which must have none in common."""
-    tiles = {}
-    for path in paths:
-        with contextlib.closing(sqlite3.connect(path)) as database:
-            for z, y, x, content in database.execute('SELECT z, y, x, content FROM tile WHERE part = 0'):
-                assert (z, y, x) not in tiles, (path, z, y, x)
-                tiles[z, y, x] = content
-    return tiles
-
-
-class Made(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder)
-        program('simulate_city', '--output', cls.folder / 'made', '--drives', len(DRIVES), *CITY)
-        for number, name in enumerate(DRIVES):
-            (cls.folder / f'made/drive_{number:04d}').rename(cls.folder / name)
-        cls.wholes = {}
-
-    def whole(self, names):
-        """The map of some drives by map_sequence, one scan after another. Made once."""
-        path = self.folder / ('whole-' + '-'.join(names) + '.bkm')
-        if not path.exists():
-            resume = ()
-            for name in names:
-                program('map_sequence', '--sequence', self.folder / name, '--poses', self.folder / name / 'poses.txt',
-                        '--output', path, *resume)
-                resume = ('--resume', path)
-        return tiles_of(path)
-
-    def describe(self, names, **more):
-        path = self.folder / f'{self.id().split(".")[-1]}.yaml'
-        text = {'drives': [{'sequence': name} for name in names], 'piece_scans': 2, 'region_tiles': 2, **more}
-        path.write_text(json.dumps(text))  # JSON is YAML
-        return path
-
-    def start(self, city, *arguments, programs=BIN):
-        self.output = self.folder / self.id().split('.')[-1]
-        return subprocess.Popen([sys.executable, str(SOURCE / 'scripts/map_city'), str(city), '--output', str(self.output),
-                                 '--programs', str(programs), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                universal_newlines=True, env={**os.environ, 'PYTHONPATH': str(SOURCE / 'python')})
-
-    def finish(self, process, status=0):
-        text = process.communicate(timeout=240)[0]
-        self.assertEqual(process.returncode, status, text)
-        return text
-
-    def expect_equal(self, names):
-        index = json.loads((self.output / 'index.json').read_text())
-        regions = [self.output / region['file'] for region in index['regions']]
-        self.assertEqual(sorted((self.output / 'regions').iterdir()), sorted(regions))
-        self.assertGreater(len(regions), 4)
-        found, whole = tiles_of(*regions), self.whole(sorted(names))
-        self.assertEqual(len(set(found) ^ set(whole)), 0, 'tiles in one of the two only')
-        self.assertEqual([index for index in whole if found[index] != whole[index]], [], 'tiles that differ')
-        return index
-
+class Made(MadeCity):
     def test_kills_change_no_bit(self):
         """Two workers are killed while they map, then all of it with the scheduler; it is continued, with another one
         killed."""
@@ -321,129 +243,6 @@ class Made(unittest.TestCase):
         with open(table, 'a') as file:
             file.write('# changed\n')
         self.assertFalse(set(files()) & set(before))
-
-    def ros(self):
-        """The modules that bags need; skips the test where they are missing."""
-        try:
-            import rosbag
-            import rospy
-            import tf2_ros  # noqa: F401
-            from geometry_msgs.msg import TransformStamped
-            from sensor_msgs.msg import PointCloud2, PointField
-            from tf2_msgs.msg import TFMessage
-        except ImportError as error:
-            print(f'SKIPPED: {self.id()} needs ROS: {error}', file=sys.stderr)
-            self.skipTest(str(error))
-        return rosbag, rospy, TransformStamped, PointCloud2, PointField, TFMessage
-
-    def write_bag(self, path, name, label=7):
-        """Writes a sequence as a bag: the sensor on a vehicle, whose pose changes linearly between transforms 0.5 s apart."""
-        rosbag, rospy, TransformStamped, PointCloud2, PointField, TFMessage = self.ros()
-        poses = numpy.loadtxt(self.folder / name / 'poses.txt').reshape(-1, 3, 4)
-
-        def transform(parent, child, stamp, translation, yaw=0.0):
-            made = TransformStamped()
-            made.header.frame_id, made.child_frame_id, made.header.stamp = parent, child, rospy.Time.from_sec(stamp)
-            made.transform.translation.x, made.transform.translation.y, made.transform.translation.z = translation
-            made.transform.rotation.z, made.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-            return made
-
-        with rosbag.Bag(str(path), 'w', compression='lz4') as bag:
-            bag.write('/tf_static', TFMessage([transform('base', 'lidar', 0.0, (0.0, 0.0, 1.5))]), rospy.Time(99))
-            for number, pose in enumerate(poses):
-                stamp = 100.0 + number
-                points = numpy.fromfile(self.folder / name / f'velodyne/{number:06d}.bin', '<f4').reshape(-1, 4)
-                labels = numpy.fromfile(self.folder / name / f'labels/{number:06d}.label', '<u4')
-                rows = numpy.zeros(len(points), numpy.dtype({
-                    'names': ['x', 'y', 'z', 'intensity', 'label'], 'formats': ['<f4', '<f4', '<f4', '<f4', '<u2'],
-                    'offsets': [0, 4, 8, 16, 24], 'itemsize': 26}))
-                for column, field in enumerate(('x', 'y', 'z', 'intensity')):
-                    rows[field] = points[:, column]
-                rows['label'] = labels
-                cloud = PointCloud2(height=1, width=len(points), point_step=26, row_step=26 * len(points), data=rows.tobytes())
-                cloud.fields = [PointField(field, offset, kind, 1) for field, offset, kind in (
-                    ('x', 0, label), ('y', 4, 7), ('z', 8, 7), ('intensity', 16, 7), ('label', 24, 4))]
-                cloud.header.frame_id, cloud.header.stamp = 'lidar', rospy.Time.from_sec(stamp)
-                at = pose[:, 3] - [0, 0, 1.5]
-                yaw = math.atan2(pose[1, 0], pose[0, 0])
-                for shift in (-0.25, 0.25):  # the cloud is between the two
-                    if number < len(poses) - 1:  # and the last one is later than all transforms
-                        bag.write('/tf', TFMessage([transform('city', 'base', stamp + shift, at + [shift, 0, 0], yaw)]),
-                                  rospy.Time.from_sec(stamp))
-                bag.write('/points', cloud, rospy.Time.from_sec(stamp))
-        return poses
-
-    def test_bags_are_drives(self):
-        path = self.folder / 'monday.bag'
-        poses = self.write_bag(path, 'd2')
-        city = self.describe([])
-        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
-            {'sequence': 'd1'}, {'bag': 'monday.bag', 'cloud_topic': '/points', 'frame': 'city'}]}))
-        text = self.finish(self.start(city, '--workers', '2'))
-        self.assertIn(f"drive 'monday': 1 of {SCANS} clouds have no transform to 'city' and are left out", text)
-        index = json.loads((self.output / 'index.json').read_text())
-        drive = index['drives'][1]
-        self.assertEqual((drive['name'], drive['bag']), ('monday', str(path)))
-        written = pathlib.Path(drive['sequence'])
-        for number in range(SCANS - 1):
-            for each in (f'velodyne/{number:06d}.bin', f'labels/{number:06d}.label'):
-                self.assertEqual((written / each).read_bytes(), (self.folder / 'd2' / each).read_bytes(), each)
-        found = numpy.loadtxt(written / 'poses.txt').reshape(-1, 3, 4)
-        numpy.testing.assert_allclose(found, poses[:SCANS - 1], atol=1e-9)
-        self.assertEqual((written / 'times.txt').read_text(), ''.join(f'{n}.000000000\n' for n in range(SCANS - 1)))
-        # The city is that of the sequence d1 and of the written one.
-        (self.folder / 'written').symlink_to(written)
-        self.expect_equal(['d1', 'written'])
-        # Nothing is written or mapped again.
-        self.finish(self.start(city, '--workers', '2', '--resume'))
-        self.assertIn('| write bags as sequences | 1 | 0 | ', (self.output / 'report.md').read_text())
-        self.assertIn('| 0 | 0.0 |', (self.output / 'report.md').read_text())
-
-    def test_wrong_bags_are_left_out_with_a_sentence(self):
-        self.ros()
-        path = self.folder / 'wrong.bag'
-        self.write_bag(path, 'd2', label=9)
-
-        def refused(sentence, bag=Bag(path, '/points', 'city', 'label', True)):
-            with self.assertRaisesRegex(CityError, sentence):
-                bags.extract(bag, self.folder / f'out{time.monotonic_ns()}')
-        refused("the field 'x' of /points is no number")
-        self.write_bag(path, 'd2')
-        good = Bag(path, '/points', 'city', 'label', True)
-        refused('wrong.bag has no clouds at /cloud; it has clouds at: /points', good._replace(cloud_topic='/cloud'))
-        refused("no cloud of /points has a transform to 'earth' .*; record tf", good._replace(frame='earth'))
-        refused("have no field 'class', but intensity, label, x, y, z; give label_field, or labelled: false",
-                good._replace(label_field='class'))
-        bags.extract(good._replace(label_field='class', labelled=False), self.folder / 'unlabelled')
-        self.assertEqual(set((self.folder / 'unlabelled/labels/000000.label').read_bytes()), {0})
-        content = path.read_bytes()
-        for length in (0, 5, 5000, len(content) // 2):
-            path.write_bytes(content[:length])
-            refused('wrong.bag (cannot be read|has no index)')
-        path.write_bytes(b'#ROSBAG V2.0\n' + bytes(range(256)) * 50)
-        refused('wrong.bag (cannot be read|has no index)')
-        city = self.describe([])
-        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
-            {'sequence': 'd1'}, *({'bag': name, 'cloud_topic': '/points'} for name in ('wrong.bag', 'missing.bag'))]}))
-        text = self.finish(self.start(city, '--workers', '2'), 1)
-        self.assertRegex(text, "drive 'wrong' is left out: .*wrong.bag (cannot be read|has no index)")
-        self.assertRegex(text, "drive 'missing' is left out: .*missing.bag does not exist")
-        self.expect_equal(['d1'])
-
-    def test_a_real_bag_without_labels_and_tf(self):
-        path = pathlib.Path(os.environ.get('BKI_MAPPING_TEST_DATA', '')) / 'bags/luminar_no_label_no_tf.bag'
-        if not path.exists():
-            print(f'SKIPPED: {self.id()} needs BKI_MAPPING_TEST_DATA with bags/{path.name}', file=sys.stderr)
-            self.skipTest('no real bag')
-        self.ros()
-        bag = Bag(path, '/luminar_pointcloud', 'map', 'label', False)
-        with self.assertRaisesRegex(CityError, "no cloud of /luminar_pointcloud has a transform to 'map'"):
-            bags.extract(bag, self.folder / 'real1')
-        # In the frame of its clouds, no tf is needed.
-        self.assertEqual(bags.extract(bag._replace(frame='luminar_lidar'), self.folder / 'real2'), (5, 0))
-        program('map_sequence', '--sequence', self.folder / 'real2', '--classes', 'occupancy',
-                '--output', self.folder / 'real.bkm')
-        self.assertGreater(len(tiles_of(self.folder / 'real.bkm')), 10)
 
     def test_sums_are_trees(self):
         files = [f'piece {n}' for n in range(300)]

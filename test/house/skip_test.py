@@ -30,6 +30,7 @@ class Skips(unittest.TestCase):
 
     def test_without_real_data(self):
         self.assertEqual(self.outcome('real_data_test'), 'skipped')
+        self.assertEqual(self.outcome('city_real_bag_test'), 'skipped')
         self.assertEqual(self.outcome('real_data_test', BKI_MAPPING_TEST_DATA='/no/such'), 'failed')
         if 'real_bag_rostest' in self.tests:
             self.assertEqual(self.outcome('real_bag_rostest'), 'skipped')
