@@ -181,8 +181,8 @@ class Builder:
                 found = future.result()
             except Exception as error:  # not of a task, which returns its faults
                 if self.client.status != 'running':
-                    raise CityError('the Dask scheduler has gone; start it and its workers again, and run the same command with '
-                                    '--resume') from None
+                    raise CityError('the Dask scheduler has gone; start it and its workers again, and run the same command '
+                                    'with --resume') from None
                 self.client.cancel(list(futures))
                 raise CityError(unfit_worker(self.client) or f'a task failed ({type(error).__name__}: {error}); run the '
                                 'same command with --resume') from None
