@@ -58,7 +58,6 @@ LEFT_OUT = {
                      '"env PYTHONPATH=$PYTHONPATH /usr/bin/python3"',
                      'scripts/map_city drives/city.yaml --output city --scheduler tcp://FIRST_HOST:8786'),
                     'needs a cluster; city_test starts a scheduler and workers'),
-    'scripts/prove_city': 'takes a quarter of an hour; city_test tries the same with six drives',
     'roslaunch bki_mapping mapping.launch map_file:=~/city/ classes:=semantic_kitti': 'city_rostest starts such a node',
     'PYTHONPATH=scripts python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04':
         'takes long; figures_test measures a small case',

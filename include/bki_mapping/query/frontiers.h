@@ -28,7 +28,7 @@ struct FrontierRules {
 };
 
 /// The frontiers of a map, the largest first; of equal size, by the first voxel. Takes some 50 ns for each
-/// block in the box, and 25 ns for each frontier voxel if voxels are listed.
+/// block in the box, and for each frontier voxel 25 ns, or two thirds of that if voxels are not listed.
 /// @throws std::invalid_argument if the box is not finite, inside out, or reaches beyond the grid.
 std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules = {});
 /// Those of the whole map, with their voxels.

@@ -78,7 +78,7 @@ def write(folder, index, costs, elapsed, picture):
     lines = ['# City', '', f"{len(index['drives'])} drives in {len(regions)} regions; {total['occupied']} occupied and "
              f"{total['free']} free voxels; {megabytes(sum(region['bytes'] for region in regions))} MB.", '']
     if picture is not None:
-        lines += [picture or '![The city from above, with the ways of the drives](city.png)', '']
+        lines += [picture or '![The city from above, with the trajectories of the drives](city.png)', '']
     if index['left_out']:
         lines += ['## Drives left out', '', '| drive | reason |', '|---|---|']
         lines += [f'| {cell(name)} | {cell(why)} |' for name, why in index['left_out'].items()] + ['']
@@ -106,7 +106,7 @@ def cell(text):
 
 
 def draw(folder, index):
-    """Draws city.png: the pictures of the regions and the ways of the drives. Returns a sentence if that is not possible,
+    """Draws city.png: the pictures of the regions and the trajectories of the drives. Returns a sentence if that is not possible,
     or ''."""
     try:
         import matplotlib
