@@ -97,7 +97,7 @@ std::string regionFile(const Json& region, const std::string& what) {
   const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
     return c != '/' && static_cast<unsigned char>(c) >= ' ' && c != '\x7f';
   });
-  if (file.compare(0, folder.size(), folder) != 0 || !plain || name.front() == '.' ||
+  if (file.compare(0, folder.size(), folder) != 0 || !plain || name.empty() || name.front() == '.' ||
       std::filesystem::path(name).extension() != ".bkm") {
     throw Fault("the file of " + what + ", '" + file + "', is not regions/NAME.bkm");
   }

@@ -127,6 +127,10 @@ struct TiledMap::State {
       differs("it has " + std::to_string(entries.size()) + " tiles with " + std::to_string(blocks) +
               " blocks, not " + std::to_string(region.tiles) + " with " + std::to_string(region.blocks));
     }
+    for (const DriveRecord& drive : file.drives()) {
+      if (index.pieces.count(drive.id) == 0)
+        differs("it holds drive '" + drive.id + "', which the index does not list");
+    }
     if (index.resolution && *index.resolution != file.info().resolution) {
       differs("its resolution is " + numberText(file.info().resolution) + " m, not " +
               numberText(*index.resolution) + " m");
@@ -348,7 +352,8 @@ TiledMap::Reading TiledMap::reading() const {
 
 std::string cityAround(const std::string& path) {
   std::error_code unknown;
-  std::filesystem::path folder = std::filesystem::weakly_canonical(path, unknown);
+  std::filesystem::path folder =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(path, unknown), unknown);
   while (!folder.empty()) {
     if (std::filesystem::is_regular_file(folder / "index.json", unknown) &&
         std::filesystem::is_directory(folder / "regions", unknown)) {

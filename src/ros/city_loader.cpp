@@ -5,9 +5,8 @@
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
-
-#include "bki_mapping/core/named_parameter.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -78,7 +77,23 @@ std::optional<StoredMap> CityLoader::update(const Wanted& wanted) {
     complete_ = false;
     sensor_ = wanted.sensor;
     radius_ = wanted.radius;
-    job_ = std::async(std::launch::async, [this, wanted] { return read(work_, wanted); });
+    const auto read_all = [this, wanted] {
+      try {
+        return read(work_, wanted);
+      } catch (const std::exception& error) {  // as when memory is short
+        Result result;
+        result.fault = "no more of the city is loaded here: " + std::string(error.what());
+        result.complete = true;  // until the sensor moves
+        return result;
+      }
+    };
+    try {
+      job_ = std::async(std::launch::async, read_all);
+    } catch (const std::system_error& error) {
+      fault_ = "no more of the city is loaded here, because no thread can be started: " +
+               std::string(error.what());
+      complete_ = true;
+    }
   }
   return arrived;
 }
@@ -122,9 +137,10 @@ CityLoader::Result CityLoader::read(Work& work, const Wanted& wanted) {
   for (const auto& [distance, tile] : waiting) {
     const auto more = static_cast<double>(memoryOf(tile));
     if (work.overhead * (bytes + more) > wanted.room) {
-      result.full = "the city is not loaded farther than " + numberText(std::floor(distance)) +
-                    " m from the sensor, because memory_limit is reached; set own_map_file and window, lower "
-                    "map_load_radius, or raise memory_limit";
+      result.full =
+          "the city is not loaded as far as map_load_radius, because memory_limit is reached; set "
+          "own_map_file "
+          "and window, lower map_load_radius, or raise memory_limit";
       result.complete = true;  // until the sensor moves
       break;
     }

@@ -206,6 +206,8 @@ std::vector<GridIndex> KeptMap::addFromCity(const ServerConfig& config) {
       city_fault_ =
           "the computer's memory does not hold what was read from the city, and some of its tiles are "
           "missing; lower map_load_radius and start again";
+    } catch (const std::exception& error) {
+      city_fault_ = error.what();
     }
     arrived_.reset();
   }
@@ -281,12 +283,17 @@ void KeptMap::addMap(StoredMap map, bool replace) {
 std::vector<GridIndex> KeptMap::clearBox(const Eigen::AlignedBox3d& box) {
   requireWritable();
   unsaved_ = true;
-  if (city_) cleared_.push_back(box);
+  const auto contains = [&](const Eigen::AlignedBox3d& each) { return each.contains(box); };
+  if (city_ && std::none_of(cleared_.begin(), cleared_.end(), contains)) {
+    const auto inside = [&](const Eigen::AlignedBox3d& each) { return box.contains(each); };
+    cleared_.erase(std::remove_if(cleared_.begin(), cleared_.end(), inside), cleared_.end());
+    cleared_.push_back(box);
+  }
   return keeper_ ? keeper_->clearBox(box) : mapper_.clearBox(box);
 }
 
 std::string KeptMap::fault() const {
-  const std::string of_file = keeper_ ? keeper_->fault() : "";
+  const std::string of_file = fileFault();
   if (!of_file.empty()) return of_file;
   return city_fault_.empty() && city_ ? city_->fault() : city_fault_;
 }

@@ -72,6 +72,8 @@ class KeptMap {
   bool readOnly() const { return read_only_; }
   /// What is wrong with the map file or the city at the moment, in one sentence; "" if nothing is.
   std::string fault() const;
+  /// The same of the map file only, which a city cannot keep from being saved.
+  std::string fileFault() const { return keeper_ ? keeper_->fault() : ""; }
   /// Wall time up to which the map file has everything that was added; 0: nothing was saved yet.
   ros::WallTime saved() const { return saved_; }
   /// Saves and closes the map file. @return what was lost, and why; "" if nothing was.

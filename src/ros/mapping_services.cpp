@@ -117,7 +117,7 @@ void MappingServer::saveMapFile(const std::string& path) {
   });
   if (parts->snapshot) return saveMap(path, parts->saving.info, parts->saving.drives, parts->snapshot->map);
   while (parts->saving.done.wait_for(kFaultPoll) != std::future_status::ready) {
-    const std::string fault = QueuedCall<std::string>::ask(queue_, [this] { return kept_->fault(); });
+    const std::string fault = QueuedCall<std::string>::ask(queue_, [this] { return kept_->fileFault(); });
     if (!fault.empty()) throw MapFileError(fault);
   }
   parts->saving.done.get();

@@ -186,7 +186,8 @@ class PointQuery {
           << a.occupancy << "," << a.class_probability << "," << a.probability << "," << a.variance;
       if (with_nearest && a.nearest) {
         out << "," << a.nearest->distance << "," << nameOf(classes, a.nearest->label);
-        for (const double coordinate : grid_.voxelCentre(a.nearest->voxel)) out << "," << coordinate;
+        for (const double coordinate : grid_.voxelCentre(a.nearest->voxel))
+          out << "," << numberText(coordinate);
       } else if (with_nearest) {
         out << ",,,,,";
       }

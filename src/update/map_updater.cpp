@@ -7,6 +7,7 @@
 #include "update/voxel_sums.h"
 
 namespace bki_mapping {
+
 void MapUpdater::setTasks(const ScanEvidence& scan) {
   tasks_.resize(3);
   task_count_ = 0;

@@ -238,6 +238,15 @@ TEST_F(KeptCity, WithABrokenCityMappingGoesOn) {
   EXPECT_TRUE(has(fault, "regions/0_0.bkm is not a map")) << fault;
   EXPECT_LT(part, whole);
   EXPECT_GT(part, sumOf(scans, {}).size()) << "the other regions are loaded";
+  {
+    ServerConfig config = config_;
+    config.own_map_file = folder_ / "own.bkm";
+    Robot robot(config);
+    robot.map(scans[0]);
+    robot.settle();
+    EXPECT_NE(robot.kept.fault(), "");
+    EXPECT_EQ(robot.kept.fileFault(), "") << "nothing keeps the map from being saved";
+  }
   std::filesystem::remove(city() + "/regions/0_0.bkm");
   EXPECT_TRUE(has(faultOf(), "regions/0_0.bkm is missing"));
   MapInfo other = info_;
