@@ -210,6 +210,7 @@ if(CATKIN_ENABLE_TESTING)
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   bki_mapping_unit_tests(costmap grid_copy)
   # The layer itself, with a stand-in for costmap_2d, which Debian does not have.
+  #catkin_lint: ignore ambiguous_include_path
   add_library(semantic_layer_for_test MODULE src/costmap/semantic_layer.cpp)
   target_include_directories(semantic_layer_for_test SYSTEM PRIVATE test/costmap/stand_in)
   target_link_libraries(semantic_layer_for_test PRIVATE bki_mapping_costmap ${catkin_LIBRARIES})
