@@ -75,6 +75,8 @@ def extract(bag: Bag, folder):
     for path in folder.rglob('*'):
         if path.is_file():
             os.utime(path, ns=(stamp, stamp))
+            with open(path, 'rb') as file:
+                os.fsync(file.fileno())  # the name of the folder says that all of it is there
     return len(poses), missing
 
 
