@@ -12,11 +12,11 @@ import sys
 import time
 import unittest
 
-from harness import BIN, DRIVES, SOURCE, MadeCity
+from harness import BIN, DRIVES, SOURCE, MadeCity, tiles_of
 
 import psutil
 from bki_mapping.city import report, work
-from bki_mapping.city.description import CityError, read_city
+from bki_mapping.city.description import Bag, CityError, Drive, read_city
 from bki_mapping.city.plan import pieces_of, sums_of
 
 
@@ -31,10 +31,11 @@ class Made(MadeCity):
             """Kills a worker that runs one of the programs, with it or without."""
             end = time.monotonic() + 60
             while time.monotonic() < end and process.poll() is None:
-                for found in psutil.Process(process.pid).children(recursive=True):
+                children = psutil.Process(process.pid).children(recursive=True)
+                for found in children:
                     with contextlib.suppress(psutil.Error):
                         worker = found.parent()
-                        if found.name() in ('map_sequence', 'merge_maps', 'inspect_map') and worker.pid != process.pid:
+                        if found.name() in ('map_sequence', 'merge_maps', 'inspect_map') and worker in children:
                             if drawn.random() < 0.5:
                                 found.kill()
                             worker.kill()
@@ -131,6 +132,10 @@ class Made(MadeCity):
         with self.assertRaisesRegex(work.Fault, 'cannot be started on') as raised:
             work.prepare(setup._replace(programs=str(self.folder)))
         self.assertTrue(raised.exception.of_worker)
+        bag = self.folder / 'unseen.bag'
+        found = work.write_bag(setup, Drive('unseen', bag, 'labels', bag, Bag(bag, '/points', 'map', 'label', True)))
+        self.assertIn(f'{socket.gethostname()} does not see {bag}; mount it', found['fault'])
+        self.assertTrue(found['of_worker'])
         self.addCleanup(setattr, work, 'SIGHT', work.SIGHT)
         work.SIGHT = 0.3
         with self.assertRaisesRegex(work.Fault, f'{socket.gethostname()} does not see {self.folder}; mount it') as raised:
@@ -152,7 +157,7 @@ class Made(MadeCity):
 
         scheduler = dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place)
         end = time.monotonic() + 60
-        while not place.exists() and time.monotonic() < end:
+        while not (place.exists() and place.stat().st_size) and time.monotonic() < end:
             time.sleep(0.05)
         address = json.loads(place.read_text())['address']
         city = self.describe(['d1', 'd2'])
@@ -199,6 +204,67 @@ class Made(MadeCity):
         self.assertIn('| map pieces | 9 | 0 | 0.0 |', (self.output / 'report.md').read_text())
         self.assertNotIn('city.png', (self.output / 'report.md').read_text())
 
+    def test_regions_of_another_size_are_other_files(self):
+        for region_tiles in (2, 4, 2):
+            city = self.describe(['d1'], piece_scans=100, region_tiles=region_tiles)  # all regions are made of one piece
+            self.finish(self.start(city, '--workers', '2', '--resume', '--no-picture'))
+            self.expect_equal(['d1'], least=2)
+
+    def test_a_damaged_piece_is_mapped_anew(self):
+        city = self.describe(['d1', 'd2'])
+        self.finish(self.start(city, '--workers', '2', '--no-picture'))
+        pieces = sorted(self.output.glob('pieces/*/*.bkm'))
+        good = [tiles_of(piece) for piece in pieces[:2]]
+        pieces[0].write_bytes(b'no database' * 1000)
+        pieces[1].write_bytes(b'')
+        self.finish(self.start(city, '--workers', '2', '--resume', '--no-picture'))
+        self.assertIn('| map pieces | 6 | 2 | ', (self.output / 'report.md').read_text())
+        self.assertTrue([tiles_of(piece) for piece in pieces[:2]] == good)
+        self.expect_equal(['d1', 'd2'])
+
+    def test_drives_without_points_make_no_city(self):
+        shutil.copytree(self.folder / 'd1', self.folder / 'void')
+        for path in (*self.folder.glob('void/velodyne/*'), *self.folder.glob('void/labels/*')):
+            path.write_bytes(b'')
+        text = self.finish(self.start(self.describe(['void']), '--workers', '1'), 1)
+        self.assertIn('map_city: the drives hold no voxel; check', text)
+        self.assertFalse((self.output / 'index.json').exists())
+
+    def test_one_run_at_a_time(self):
+        city = self.describe(['d1', 'd2'])
+        first = self.start(city, '--workers', '1', '--no-picture')
+        end = time.monotonic() + 60
+        while not list(self.output.glob('.run.*')) and time.monotonic() < end:
+            time.sleep(0.01)
+        first.send_signal(signal.SIGSTOP)
+        try:
+            text = self.finish(self.start(city, '--workers', '1', '--resume', '--no-picture'), 1)
+        finally:
+            first.send_signal(signal.SIGCONT)
+        self.assertRegex(text, f'map_city: another map_city works in {self.output}; wait until it has ended')
+        # The workers outlive a killed map_city for a moment, and do not hold its lock.
+        self.addCleanup(first.stdout.close)
+        children = psutil.Process(first.pid).children(recursive=True)
+        self.addCleanup(lambda: [child.kill() for child in children if child.is_running()])
+        for child in children:
+            child.suspend()
+        first.kill()
+        first.wait()
+        self.finish(self.start(city, '--workers', '2', '--resume', '--no-picture'))
+        self.expect_equal(['d1', 'd2'])
+
+    def test_a_program_that_is_killed_once_is_asked_again(self):
+        programs = self.folder / 'killed_once'
+        programs.mkdir()
+        script = programs / 'map_sequence'
+        script.write_text(f'#!/bin/sh\n[ -e "$0.killed" ] || {{ : >"$0.killed"; kill -9 $$; }}\nexec {BIN}/map_sequence "$@"\n')
+        script.chmod(0o755)
+        self.assertEqual(work.identity_of(programs, ()), work.identity_of(BIN, ()))
+        script.write_text('#!/bin/sh\nkill -9 $$\n')
+        with self.assertRaisesRegex(work.Fault, 'was ended 3 times by signal 9') as raised:
+            work.identity_of(programs, ())
+        self.assertTrue(raised.exception.of_worker)
+
     def test_wrong_descriptions_are_refused(self):
         path = self.folder / 'wrong.yaml'
         for text, sentence in (
@@ -215,6 +281,8 @@ class Made(MadeCity):
                 ('drives: [{bag: d1.bag, labels: x}]', "'labels' in "),
                 ('drives: [{bag: d1.bag, cloud_topic: /c, labelled: 3}]', 'labelled in '),
                 ('{drives: [{sequence: d1}], piece_scans: 0}', 'piece_scans in '),
+                ('drives: [{sequence: d1, name: .a}]', 'begin with another character than a dot'),
+                ('{drives: [{sequence: d1}], set: {threads: 4}}', 'has threads, but each task uses one core'),
                 ('{drives: [{sequence: d1}], set: 3}', 'is no mapping of parameters'),
                 ('{drives: [{sequence: d1}], classes: 3}', 'classes in '),
                 ('{drives: [{sequence: d1}], config: 3}', 'config in ')):
@@ -233,7 +301,8 @@ class Made(MadeCity):
 
         def files():
             read = read_city(city)
-            return [piece.file for piece in pieces_of(read, read.drives[0])]
+            return [piece.file for piece in pieces_of(read, read.drives[0], identity)]
+        identity = 'bki_mapping 1'
         before = files()
         self.assertEqual(len(before), 3)
         self.assertEqual(files(), before)
@@ -243,14 +312,18 @@ class Made(MadeCity):
         with open(table, 'a') as file:
             file.write('# changed\n')
         self.assertFalse(set(files()) & set(before))
+        before, identity = files(), 'bki_mapping 2'
+        self.assertFalse(set(files()) & set(before))
 
     def test_sums_are_trees(self):
         files = [f'piece {n}' for n in range(300)]
-        levels = sums_of({(0, 0): files, (1, 0): files[:16]})
+        levels = sums_of({(0, 0): files, (1, 0): files[:16]}, 2)
         self.assertEqual([len(level) for level in levels], [19 + 1, 2, 1])
         self.assertEqual([each.file.split('/')[0] for each in levels[0]], ['sums'] * 19 + ['regions'])
         self.assertEqual(sorted(name for each in levels[0][:19] for name in each.inputs), sorted(files))
         self.assertEqual(levels[2][0].inputs, tuple(sorted(each.file for each in levels[1])))
+        other = sums_of({(0, 0): files, (1, 0): files[:16]}, 4)
+        self.assertFalse({each.file for level in levels for each in level} & {each.file for level in other for each in level})
 
 
 if __name__ == '__main__':

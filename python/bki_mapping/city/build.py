@@ -1,5 +1,7 @@
 """Gives the tasks of a city to Dask, and follows them. Only names of files and figures pass through Dask."""
 import contextlib
+import errno
+import fcntl
 import json
 import os
 import pathlib
@@ -18,6 +20,7 @@ from bki_mapping.city.description import City, CityError
 ALLOWED_FAILURES = 1000
 SMALLEST_FREE = 16 << 20  # of a disk [bytes]: below it, a task that failed is taken to have failed for want of space
 NO_SPACE = re.compile('No space left on device|Disk quota exceeded')
+NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}  # of file systems that know none
 WAIT = 60  # for the first worker of a scheduler [s]
 
 
@@ -61,6 +64,20 @@ def workers_of(client, distributed):
     return True
 
 
+@contextlib.contextmanager
+def only_run(folder):
+    """Keeps other runs out of the folder of a city. The lock ends with this process, however that ends; the file stays."""
+    with open(folder / 'lock', 'a') as file:  # which processes that are started do not inherit
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CityError(f'another map_city works in {folder}; wait until it has ended, or name another folder') from None
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+        yield
+
+
 class Builder:
     def __init__(self, city: City, folder, programs, client, say=print, draw=True):
         self.city, self.folder, self.programs, self.client, self.say = city, pathlib.Path(folder), str(programs), client, say
@@ -72,6 +89,10 @@ class Builder:
     def build(self):
         """Makes the city. Returns its index. Raises CityError if the disk is full, a worker is not fit, or a step fails for
         other reasons than a drive."""
+        with only_run(self.folder):
+            return self.build_alone()
+
+    def build_alone(self):
         begin = time.time()
         token = self.folder / f'.run.{uuid.uuid4().hex}'
         token.write_text('')
@@ -106,7 +127,9 @@ class Builder:
             if piece.drive.name in mapped:
                 for region in plan.regions_of(map(tuple, found['columns']), self.city.region_tiles):
                     inputs.setdefault(region, []).append(piece.file)
-        levels = plan.sums_of(inputs)
+        if not inputs:
+            raise CityError('the drives hold no voxel; check that their scans have points within the ranges of the parameters')
+        levels = plan.sums_of(inputs, self.city.region_tiles)
         for level in levels:
             self.follow('sum', 'sums', [(each, (work.sum_region, self.setup, self.city.region_tiles, each)) for each in level],
                         must=True)
@@ -114,7 +137,7 @@ class Builder:
         checked = self.follow('check', 'regions', [(each, (work.check_region, self.setup, self.draw, each)) for each in last],
                               must=True, count_of=lambda found: ('tiles', found['tiles']))
         index = {
-            'version': 1, 'region_tiles': self.city.region_tiles, 'resolution': checked[0][1]['resolution'] if checked else None,
+            'version': 1, 'region_tiles': self.city.region_tiles, 'resolution': checked[0][1]['resolution'],
             'drives': [self.drive_entry(drive, [piece for piece, _ in pieces if piece.drive.name == name])
                        for name, drive in sorted(mapped.items())],
             'left_out': dict(sorted(self.broken.items())),
@@ -124,7 +147,7 @@ class Builder:
         for region in index['regions']:
             for name in ('seconds', 'core_seconds', 'made', 'resolution'):
                 region.pop(name)
-        write_whole(self.folder / 'index.json', json.dumps(index, indent=1) + '\n')
+        report.write_whole(self.folder / 'index.json', json.dumps(index, indent=1) + '\n')
         return index
 
     @staticmethod
@@ -142,7 +165,12 @@ class Builder:
 
     def write_bags(self):
         """Writes bags as sequences, unless it was done before. Returns the drives, all with sequences."""
-        bags = [(drive, (work.write_bag, self.setup, drive)) for drive in self.city.drives if drive.bag]
+        bags = []
+        for drive in self.city.drives:
+            if drive.bag and drive.bag.path.exists():
+                bags.append((drive, (work.write_bag, self.setup, drive)))
+            elif drive.bag:
+                self.leave_out(drive, f'{drive.bag.path} does not exist; give the path of a bag')
         drives = {drive.name: drive for drive in self.city.drives if not drive.bag}
         for drive, found in self.follow('bag', 'bags', bags, drive_of=lambda drive: drive):
             if 'fault' in found:
@@ -159,7 +187,8 @@ class Builder:
         tasks = []
         for drive in drives:
             try:
-                tasks += [(piece, (work.map_piece, self.setup, piece)) for piece in plan.pieces_of(self.city, drive)]
+                pieces = plan.pieces_of(self.city, drive, self.setup.identity)
+                tasks += [(piece, (work.map_piece, self.setup, piece)) for piece in pieces]
             except CityError as error:
                 self.leave_out(drive, str(error))
         done = self.follow('map', 'pieces', tasks, drive_of=lambda piece: piece.drive)
@@ -216,7 +245,7 @@ class Builder:
                 path.unlink()
         shutil.rmtree(self.folder / 'sums', ignore_errors=True)
         own = pathlib.Path(self.setup.token)
-        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*', 'bags/.*', 'pictures/.*', '.run.*', '.index.json.*'):
+        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*', 'bags/.*', 'pictures/.*', '.run.*', '.report.md.*'):
             for path in self.folder.glob(pattern):
                 if path.is_dir():
                     shutil.rmtree(path)
@@ -246,9 +275,3 @@ def unfit_worker(client):
     if not sentences:
         return None
     return sentences[0] + '; install the same bki_mapping there, source its setup.bash, and start the worker again'
-
-
-def write_whole(path, text):
-    own = path.with_name(f'.{path.name}.{os.getpid()}')
-    own.write_text(text)
-    os.replace(own, path)

@@ -67,6 +67,8 @@ def read_city(path, add=(), without=()) -> City:
     settings = text.get('set', {})
     if not isinstance(settings, dict):
         raise CityError(f'set in {path} is no mapping of parameters to values')
+    if 'threads' in settings:
+        raise CityError(f'set in {path} has threads, but each task uses one core; leave it out, and use more workers')
     config = text_of(text, 'config', '', path) if 'config' in text else ''
     classes = text_of(text, 'classes', 'semantic_kitti', path)
     if (path.parent / classes).is_file():
@@ -85,8 +87,9 @@ def read_drive(entry, path) -> Drive:
         raise CityError(f'a drive in {path} has no sequence: FOLDER, and no bag: FILE')
     source = pathlib.Path(os.path.normpath((path.parent / source).absolute()))
     name = text_of(entry, 'name', source.stem if is_bag else source.name, path)
-    if name in ('.', '..') or any(c in name for c in '/\0#'):
-        raise CityError(f"'{name}' in {path} is no name for a drive, whose files are named after it; leave out / and #")
+    if name.startswith('.') or any(c in name for c in '/\0#'):
+        raise CityError(f"'{name}' in {path} is no name for a drive, whose files are named after it; leave out / and #, and "
+                        'begin with another character than a dot')
     if not is_bag:
         poses = path.parent / text_of(entry, 'poses', '-', path) if 'poses' in entry else source / 'poses.txt'
         return Drive(name, source, text_of(entry, 'labels', 'labels', path), poses.absolute())
@@ -130,7 +133,8 @@ def scans_of(drive: Drive) -> Dict[int, pathlib.Path]:
     """The files of a sequence's scans by their numbers, sorted. Raises CityError."""
     for folder, suffix in (('velodyne', '.bin'), ('pcd', '.pcd')):
         try:
-            files = [each for each in (drive.folder / folder).iterdir() if each.suffix == suffix and each.stem.isdigit()]
+            files = [each for each in (drive.folder / folder).iterdir()
+                     if each.suffix == suffix and each.stem.isascii() and each.stem.isdigit()]
         except OSError:
             continue
         if files:

@@ -55,13 +55,14 @@ def written_bag(drive: Drive) -> str:
     return f'bags/{drive.name}-{digest(str(drive.bag.path), *drive.bag[1:], stamps_of([drive.bag.path]))}'
 
 
-def pieces_of(city: City, drive: Drive) -> List[Piece]:
-    """Raises CityError if the drive has no scans."""
+def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
+    """identity: what the programs say of themselves, because other versions may make other pieces. Raises CityError if the
+    drive has no scans."""
     files = scans_of(drive)
     numbers = list(files)
     shared = [str(drive.poses), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
     settings = [city.classes, stamps_of([pathlib.Path(city.classes)]),
-                stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings]
+                stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings, identity]
     pieces = []
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
@@ -89,9 +90,9 @@ def regions_of(columns: Iterable[Tuple[int, int]], edge: int) -> List[Region]:
     return sorted({(x // edge, y // edge) for x, y in columns})
 
 
-def sums_of(inputs_by_region: Dict[Region, List[str]], most: int = 16) -> List[List[Sum]]:
+def sums_of(inputs_by_region: Dict[Region, List[str]], edge: int, most: int = 16) -> List[List[Sum]]:
     """The sums of each region as a tree: level by level, of at most `most` files each. The last sum of a region is in
-    `regions`, and the others in `sums`."""
+    `regions`, and the others in `sums`. edge: of the regions, without which an index is no place [tiles]."""
     levels: List[List[Sum]] = []
     waiting = {region: sorted(inputs) for region, inputs in inputs_by_region.items()}
     while waiting:
@@ -101,7 +102,7 @@ def sums_of(inputs_by_region: Dict[Region, List[str]], most: int = 16) -> List[L
             made = []
             for begin in range(0, len(inputs), most):
                 some = tuple(inputs[begin:begin + most])
-                name = f'{region[0]}_{region[1]}-{digest(region, some)}.bkm'
+                name = f'{region[0]}_{region[1]}-{digest(edge, region, some)}.bkm'
                 made.append(Sum(region, some, ('regions/' if last else 'sums/') + name))
             level += made
             if not last:

@@ -1,5 +1,6 @@
 """What people read of a city: progress while it is made, a report, and a picture from above."""
 import collections
+import os
 import pathlib
 import time
 
@@ -94,7 +95,14 @@ def write(folder, index, costs, elapsed, picture):
     lines += ['', '## Regions', '', '| x | y | pieces | tiles | occupied | free | bytes |', '|---|---|---|---|---|---|---|']
     lines += [f"| {r['x']} | {r['y']} | {r['inputs']} | {r['tiles']} | {r['voxels'].get('occupied', 0)} | "
               f"{r['voxels'].get('free', 0)} | {r['bytes']} |" for r in regions]
-    (folder / 'report.md').write_text('\n'.join(lines) + '\n')
+    write_whole(folder / 'report.md', '\n'.join(lines) + '\n')
+
+
+def write_whole(path, text):
+    """Replaces a file, or leaves it as it was."""
+    own = path.with_name(f'.{path.name}.{os.getpid()}')  # a name that a later run removes
+    own.write_text(text)
+    os.replace(own, path)
 
 
 def megabytes(number):
@@ -106,8 +114,8 @@ def cell(text):
 
 
 def draw(folder, index):
-    """Draws city.png: the pictures of the regions and the trajectories of the drives. Returns a sentence if that is not possible,
-    or ''."""
+    """Draws city.png: the pictures of the regions and the trajectories of the drives. Returns a sentence if that is not
+    possible, or ''."""
     try:
         import matplotlib
         matplotlib.use('Agg')
@@ -161,7 +169,8 @@ def way_of(drive):
         if not (folder / 'velodyne').is_dir():
             heads = [path.open('rb').read(4096).split(b'VIEWPOINT')[1].split()[:3] for path in sorted(folder.glob('pcd/*.pcd'))]
             return numpy.array(heads, float).reshape(-1, 3)
-        numbers = sorted(int(path.stem) for path in (folder / 'velodyne').glob('*.bin') if path.stem.isdigit())
+        numbers = sorted(int(path.stem) for path in (folder / 'velodyne').glob('*.bin')
+                         if path.stem.isascii() and path.stem.isdigit())
         poses = numpy.loadtxt(drive['poses'], ndmin=2).reshape(-1, 3, 4)
         calibration = next(line.split(':')[1].split() for line in (folder / 'calib.txt').read_text().splitlines()
                            if line.startswith('Tr:'))

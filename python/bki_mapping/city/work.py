@@ -1,6 +1,7 @@
 """The tasks that workers do. Each writes to a name of its own and renames, so that it may be done twice, at the same time,
 or be killed. Each returns a dictionary: `file` and what is known of it, or `fault`, a sentence, and with `of_worker` whether
 the worker is to blame, and not what it worked on."""
+import contextlib
 import functools
 import json
 import os
@@ -8,6 +9,7 @@ import pathlib
 import shutil
 import signal
 import socket
+import sqlite3
 import subprocess
 import tempfile
 import time
@@ -17,7 +19,7 @@ from typing import NamedTuple
 from bki_mapping.city import bags, plan
 from bki_mapping.city.description import CityError
 
-VERSION = 2  # of the tasks: a worker whose modules have another cannot do them
+VERSION = 3  # of the tasks: a worker whose modules have another cannot do them
 TRIES = 3  # of a program that a signal ends, as when memory is short
 SIGHT = 10.0  # how long a worker may take to see what another machine has written [s]
 # Signals that come from outside of a program, or from a processor that it was not built for.
@@ -44,10 +46,15 @@ def identity_of(programs, settings):
     text = ''
     for arguments in (['--version'], ['--print-config', *settings]):
         command = [str(pathlib.Path(programs) / 'map_sequence'), *arguments]
-        try:
-            result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
-        except OSError as error:
-            raise not_started(command[0], error.strerror) from None
+        for _ in range(TRIES):
+            try:
+                result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+            except OSError as error:
+                raise not_started(command[0], error.strerror) from None
+            if result.returncode >= 0:
+                break
+        if -result.returncode in OF_WORKER:
+            raise ended(command[0], -result.returncode)
         if result.returncode:
             lines = result.stderr.strip().splitlines()
             if arguments[0] == '--version' or result.returncode in (126, 127):
@@ -60,6 +67,11 @@ def identity_of(programs, settings):
 def not_started(program, why):
     return Fault(f'{program} cannot be started on {socket.gethostname()} ({why}); install the same version of '
                  'bki_mapping there as where map_city runs, or name the folder of its programs with --programs', of_worker=True)
+
+
+def ended(program, number, log=''):
+    return Fault(f'{program} was ended {TRIES} times by signal {number} on {socket.gethostname()}, as when memory is short; '
+                 f'give each worker more of it, or start fewer{log}', of_worker=True)
 
 
 def unseen(folder):
@@ -135,8 +147,7 @@ def run(setup, name, arguments, log):
     if status in (126, 127):
         raise not_started(command[0], lines[-1] if lines else f'status {status}')
     if -status in OF_WORKER:
-        raise Fault(f'{name} was ended {TRIES} times by signal {-status} on {socket.gethostname()}, as when memory is short; '
-                    f'give each worker more of it, or start fewer ({path})', of_worker=True)
+        raise ended(name, -status, f' ({path})')
     raise Fault(lines[-1] if lines else f'{name} ended with status {status}; see {path}')
 
 
@@ -172,7 +183,7 @@ def result_of(setup, file, spent, **more):
 def write_bag(setup, drive):
     """Writes a bag as a sequence."""
     if not drive.bag.path.exists():
-        raise Fault(f'{drive.bag.path} does not exist; give the path of a bag')
+        raise unseen(drive.bag.path)  # map_city has seen it
     begin = time.process_time()
     try:
         made = produce(setup, plan.written_bag(drive), lambda own: bags.extract(drive.bag, own))
@@ -195,15 +206,22 @@ def map_piece(setup, piece):
                  '--drive', piece.id, '--threads', 1, *setup.settings]
     if (drive.folder / 'velodyne').is_dir():
         arguments += ['--poses', drive.poses]
-    try:
-        spent = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
-                                                           f'{drive.name}-{piece.first:06d}.log'))
-    except Fault as fault:
-        if not drive.folder.is_dir():
-            raise unseen(drive.folder) from None
-        raise fault
     path = pathlib.Path(setup.folder) / piece.file
-    return result_of(setup, piece.file, spent, columns=plan.columns_of(path))
+    while True:
+        try:
+            spent = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
+                                                               f'{drive.name}-{piece.first:06d}.log'))
+        except Fault as fault:
+            if not drive.folder.is_dir():
+                raise unseen(drive.folder) from None
+            raise fault
+        try:
+            return result_of(setup, piece.file, spent, columns=plan.columns_of(path))
+        except sqlite3.DatabaseError as error:
+            if spent is not None:  # it is new, so the disk is to blame
+                raise Fault(f'{path} is damaged on {socket.gethostname()} ({error}); remove it', of_worker=True) from None
+            with contextlib.suppress(FileNotFoundError):  # another worker may have removed it
+                path.unlink()
 
 
 @task
