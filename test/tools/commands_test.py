@@ -80,7 +80,8 @@ PARTS = {
     'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise FRACTION',
     'map_sequence --config FILE', 'map_sequence --output', 'map_sequence --points FILE.pcd',
     'map_sequence --report', 'map_sequence --report FILE.json', 'merge_maps --keep-drives',
-    'map_sequence --poses FILE', 'migrate_map OLD.bkm NEW.bkm', 'rosnode kill', 'rosrun bki_mapping map_sequence',
+    'map_sequence --poses FILE', 'migrate_map OLD.bkm NEW.bkm', 'rosnode kill', 'rosrun bki_mapping map_city',
+    'rosrun bki_mapping map_sequence',
     'scripts/test_on SUITE',
 }
 GOES_ON = re.compile(r'(\w+=\S+ )*(roscore|roslaunch(?!.* --ros-args)|rosrun pcl_ros|rviz|rostopic echo)\b')
