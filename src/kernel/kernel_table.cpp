@@ -5,10 +5,10 @@
 
 #include <Eigen/Dense>
 
+#include "core/pi.h"
+
 namespace bki_mapping {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Melkumyan and Ramos (2009), see sparse_kernel.h.
 double formula(double r) {

@@ -7,12 +7,12 @@
 #include <string>
 
 #include "bki_mapping/core/named_parameter.h"
+#include "core/pi.h"
 #include "simulation/street_parts.h"
 
 namespace bki_mapping::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kLane = 1.5;     ///< distance of a lane from the axis of its street [m]
 constexpr double kTurn = 6.0;     ///< radius of turns [m]
 constexpr double kSpeed = 9.0;    ///< of traffic [m/s]

@@ -5,13 +5,12 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
+#include "core/pi.h"
 #include "parallel/counter_random.h"
 #include "parallel/thread_pool.h"
 
 namespace bki_mapping::simulation {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Return {
   double range = 0.0;  ///< [m]; 0: no return

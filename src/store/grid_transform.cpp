@@ -3,12 +3,12 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/pi.h"
 #include "store/box_tiles.h"
 
 namespace bki_mapping {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 /// Tolerance within which a number of voxels or quarter turns counts as whole: larger than the rounding of
 /// decimal fractions of metres, and smaller than any shift that a user intends.
 constexpr double kWhole = 1e-6;
