@@ -21,11 +21,12 @@ function(bki_mapping_room room)
 endfunction()
 
 # A room in which scans are computed.
-# Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same.
+# Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same. Not -O3
+# with a Debug build's sanitizers: with their checks of each pointer, it takes minutes for one file of vector loops.
 function(bki_mapping_core_room room)
   bki_mapping_room(${room} ${ARGN})
   target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math
-    $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> -O3)
+    $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> $<$<NOT:$<CONFIG:Debug>>:-O3>)
   if(room STREQUAL "core")
     bki_mapping_precompile(bki_mapping_core
       <Eigen/Geometry> <algorithm> <array> <bitset> <cmath> <map> <memory> <optional> <stdexcept> <string> <vector>)
