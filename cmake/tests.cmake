@@ -125,6 +125,13 @@ bki_mapping_unit_tests(update sum_kernels void_search voxel_sums)
 bki_mapping_unit_tests(beams beam_index instruction_sets line_setup occlusion)
 bki_mapping_unit_tests(free_space sampling)
 bki_mapping_unit_tests(mapping allocation bounds brute_force laws parameters real_data scan_preprocessor snapshot)
+# The laws with the loops for processors without AVX, which instruction_sets_test compares with brute force.
+foreach(name instruction_sets laws)
+  add_test(NAME ${name}_generic_test COMMAND ${name}_test)
+  set_tests_properties(${name}_generic_test PROPERTIES TIMEOUT ${BKI_MAPPING_TEST_SECONDS} PROCESSORS 2
+    ENVIRONMENT "BKI_MAPPING_INSTRUCTION_SET=generic")
+endforeach()
+set_property(TEST instruction_sets_generic_test APPEND PROPERTY ENVIRONMENT "GTEST_FILTER=*GenericIsAlwaysThere")
 bki_mapping_unit_tests(io class_table cleaned_points grid_export html_export map_export map_picture octomap_export pcd_file sequence tiled_map yaml_file)
 bki_mapping_unit_tests(simulation city_scene navigation simulation)
 add_executable(plan_path_example examples/plan_path.cpp)

@@ -1,5 +1,6 @@
 #include "simd/instruction_sets.h"
 
+#include <cstdlib>
 #include <stdexcept>
 
 namespace bki_mapping {
@@ -10,7 +11,7 @@ struct Named {
   InstructionSet set;
 };
 
-std::vector<Named> available() {
+std::vector<Named> ofThisProcessor() {
   std::vector<Named> sets = {{"generic", InstructionSet::kGeneric}};
 #if defined(__x86_64__)
   // Both built-ins also ask whether the operating system saves the registers.
@@ -26,6 +27,26 @@ std::vector<Named> available() {
   return sets;
 }
 
+/// The sets of this processor up to the one that the environment names.
+std::vector<Named> allowed() {
+  const std::vector<Named> all = ofThisProcessor();
+  const char* const fastest = std::getenv(kInstructionSetVariable);
+  if (!fastest || *fastest == '\0') return all;
+  std::string names;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (std::string(fastest) == all[i].name) return {all.begin(), all.begin() + static_cast<long>(i) + 1};
+    names += (i ? ", " : "") + std::string(all[i].name);
+  }
+  throw std::invalid_argument(
+      "environment variable " + std::string(kInstructionSetVariable) + " is '" + fastest +
+      "', which this processor does not have; unset it, or set it to one of: " + names);
+}
+
+const std::vector<Named>& available() {
+  static const std::vector<Named> sets = allowed();
+  return sets;
+}
+
 }  // namespace
 
 std::vector<std::string> instructionSets() {
@@ -35,7 +56,7 @@ std::vector<std::string> instructionSets() {
 }
 
 InstructionSet instructionSetFor(const std::string& name) {
-  const std::vector<Named> sets = available();
+  const std::vector<Named>& sets = available();
   if (name.empty()) return sets.back().set;
   for (const Named& each : sets) {
     if (each.name == name) return each.set;

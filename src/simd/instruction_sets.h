@@ -8,8 +8,13 @@ namespace bki_mapping {
 
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
 
-/// The names of the instruction sets that this build and this processor have, from the slowest, "generic", to
-/// the fastest.
+/// Environment variable that names the fastest instruction set which a process may use, so that processors
+/// that differ compute the same bits. Read once, when the first map or mapper is made.
+constexpr const char* kInstructionSetVariable = "BKI_MAPPING_INSTRUCTION_SET";
+
+/// The names of the instruction sets that this build and this processor have, and the environment allows,
+/// from the slowest, "generic", to the fastest.
+/// @throws std::invalid_argument if the environment names one that is not there.
 std::vector<std::string> instructionSets();
 
 /// One of instructionSets() by its name; the fastest if the name is empty.

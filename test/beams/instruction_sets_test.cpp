@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <random>
 
@@ -39,6 +40,9 @@ TEST(InstructionSets, GenericIsAlwaysThere) {
   EXPECT_THROW(pointKernelsFor("abacus"), std::invalid_argument);
   EXPECT_EQ(lineKernelsFor("").instruction_set, instructionSets().back());
   EXPECT_EQ(pointKernelsFor("").instruction_set, instructionSets().back());
+  if (const char* const fastest = std::getenv(kInstructionSetVariable)) {
+    EXPECT_EQ(instructionSets().back(), fastest);
+  }
   for (const std::string& set : instructionSets()) {
     EXPECT_EQ(lineKernelsFor(set).instruction_set, set);
     EXPECT_EQ(pointKernelsFor(set).instruction_set, set);

@@ -17,8 +17,9 @@ import unittest
 BIN = os.environ['BKI_MAPPING_BIN']
 
 
-def call(program, *arguments):
-    return subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120)
+def call(program, *arguments, **environment):
+    return subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120,
+                          env={**os.environ, **environment})
 
 
 class Tools(unittest.TestCase):
@@ -36,8 +37,8 @@ class Tools(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder, name)
 
-    def fails(self, words, program, *arguments):
-        result = call(program, *arguments)
+    def fails(self, words, program, *arguments, **environment):
+        result = call(program, *arguments, **environment)
         self.assertEqual(result.returncode, 1, result.stdout)
         self.assertIn(words, result.stderr)
         self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
@@ -128,6 +129,16 @@ class Tools(unittest.TestCase):
         self.table = result.stdout
         with open(self.path('figures.json')) as file:
             return json.load(file)
+
+    def test_the_environment_names_the_fastest_instruction_set(self):
+        map_file = self.path('generic.bkm')
+        command = ('map_sequence', '--sequence', self.drive, '--output', map_file)
+        made = call(*command, BKI_MAPPING_INSTRUCTION_SET='generic')
+        self.assertEqual(made.returncode, 0, made.stderr)
+        os.remove(map_file)
+        self.fails("BKI_MAPPING_INSTRUCTION_SET is 'abacus', which this processor does not have; unset it, or set it to one of: generic",
+                   *command, BKI_MAPPING_INSTRUCTION_SET='abacus')
+        self.assertFalse(os.path.exists(map_file))
 
     def test_evaluation(self):
         hits_alone = self.evaluation('free_space/mode=none')
