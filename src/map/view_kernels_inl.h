@@ -64,14 +64,24 @@ template <bool kPosterior>
     const Mask more = units > found.best;  // of equal evidence, the first class has the smaller id
     found.best = Max(units, found.best);
     found.label = IfThenElse(more, Set(plane.id), found.label);
+    if constexpr (!kPosterior) continue;
     found.gain = IfThenElse(more, Set(plane.gain), found.gain);
     found.decays = IfThenElse(more, Set(-static_cast<int>(plane.decays)), found.decays);
-    if constexpr (!kPosterior) continue;
     found.classes.add(units);
     const FloatVec evidence = evidenceOf(units);
     found.squares.add(evidence * evidence);
   }
   return found;
+}
+
+/// Finds the gains of the likeliest classes.
+[[gnu::always_inline]] inline void findGains(const BlockPlanes& planes, Likeliest& found) {
+  for (std::size_t p = 0; p < planes.count; ++p) {
+    const BlockPlanes::Plane& plane = planes.planes[p];
+    const Mask is_likeliest = found.label == plane.id;
+    found.gain = IfThenElse(is_likeliest, Set(plane.gain), found.gain);
+    found.decays = IfThenElse(is_likeliest, Set(-static_cast<int>(plane.decays)), found.decays);
+  }
 }
 
 /// Lets gains decay where a voxel has evidence for `free`; elsewhere they make no difference. Lane by lane:
@@ -221,9 +231,15 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
   for (int v = 0; v < kBlockVoxels; v += kLanes) {
     const IntVec free = Max(LoadU(planes.free + v), IntVec{});
     Likeliest found = findLikeliest<kPosterior>(planes, v);
-    decay(planes, free, found);
     const Mask is_known = (found.best | free) != 0;
-    const Mask is_occupied = is_known & occupied(found, free);
+    Mask is_occupied = found.best > 0;
+    // Elsewhere the gain makes no difference to the state.
+    const Mask disputed = is_occupied & (free > 0);
+    if (kPosterior || AnyTrue(disputed)) {
+      if constexpr (!kPosterior) findGains(planes, found);
+      decay(planes, free, found);
+      is_occupied &= occupied(found, free);
+    }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
     const IntVec state = (is_known & 1) - is_occupied, label = found.label | ~is_occupied;
     static_assert(kFreeClass == 0xff, "all bits set");

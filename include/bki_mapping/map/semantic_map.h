@@ -2,9 +2,11 @@
 /// voxel: map_query.h.)
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -53,7 +55,11 @@ class SemanticMap {
     if (gain <= 1.0f || gain_persistence_ <= 0.0f) return gain;
     return 1.0f + (gain - 1.0f) * std::exp(-hits / gain_persistence_);
   }
-  void setFreeGain(ClassId id, double gain) { free_gains_[id] = static_cast<float>(gain); }
+  void setFreeGain(ClassId id, double gain) {
+    // Not infinite, whose product with no evidence would be no number.
+    constexpr double kMost = std::numeric_limits<float>::max();
+    free_gains_[id] = static_cast<float>(std::min(gain, kMost));
+  }
   /// @param persistence in units of evidence; 0: gains do not decay.
   void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
 
