@@ -51,7 +51,7 @@ bki_mapping_core_room(update SOURCES
 bki_mapping_core_room(query SOURCES
     class_filter.cpp distance_field.cpp
     distance_kernels.cpp distance_kernels_avx2.cpp distance_kernels_avx512.cpp distance_kernels_generic.cpp
-    frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp section.cpp shapes.cpp state_map.cpp
+    frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp

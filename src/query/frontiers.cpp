@@ -1,302 +1,160 @@
 #include "bki_mapping/query/frontiers.h"
 
 #include <algorithm>
-#include <array>
-#include <stdexcept>
 #include <utility>
 
-#include "query/voxel_rows.h"
+#include "query/region_frontiers.h"
 
 namespace bki_mapping {
 namespace {
 
-constexpr std::size_t kBlocksPerJob = 256;
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-constexpr std::uint64_t kFirstColumn = kAll / 0xff;  ///< the voxels with x = 0 of a layer
+constexpr std::size_t kRegionsPerJob = 8;
 
-/// A set of voxels of a block, by layer.
-using Layers = std::array<std::uint64_t, kBlockEdge>;
-
-/// The voxels that a box overlaps.
-class VoxelBox {
- public:
-  /// @throws std::invalid_argument.
-  VoxelBox(const GridGeometry& geometry, const Eigen::AlignedBox3d& box) {
-    if (!box.min().allFinite() || !box.max().allFinite()) {
-      throw std::invalid_argument("the box has a coordinate that is not finite; give finite ones");
-    }
-    if ((box.min().array() > box.max().array()).any()) {
-      throw std::invalid_argument("the box is inside out; give a min below its max");
-    }
-    if (!geometry.contains(box.min()) || !geometry.contains(box.max())) {
-      throw std::invalid_argument("the box reaches beyond the map's grid; cut it to where the map is");
-    }
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      ranges_[static_cast<std::size_t>(axis)] =
-          overlapped(box.min()[axis] / geometry.resolution(), box.max()[axis] / geometry.resolution());
-    }
-  }
-
-  bool overlaps(const BlockIndex& index) const {
-    return bits(0, index.x) != 0 && bits(1, index.y) != 0 && bits(2, index.z) != 0;
-  }
-  /// Takes the voxels outside the box out of a block's.
-  void cut(const BlockIndex& index, Layers& layers) const {
-    const std::uint64_t x = bits(0, index.x), y = bits(1, index.y), z = bits(2, index.z);
-    std::uint64_t rows = 0;
-    for (std::size_t row = 0; row < kBlockEdge; ++row) {
-      if (y >> row & 1) rows |= x << kBlockEdge * row;
-    }
-    for (std::size_t layer = 0; layer < kBlockEdge; ++layer) layers[layer] &= z >> layer & 1 ? rows : 0;
-  }
-
- private:
-  /// Those of a block's eight layers across an axis that are in the box. @param block its index on the axis.
-  std::uint64_t bits(std::size_t axis, std::int32_t block) const {
-    const std::int64_t first = std::int64_t{block} * kBlockEdge;
-    const std::int64_t begin = std::max<std::int64_t>(0, ranges_[axis].begin - first),
-                       end = std::min<std::int64_t>(kBlockEdge, ranges_[axis].end - first);
-    return begin < end ? ((std::uint64_t{1} << end) - 1) & ~((std::uint64_t{1} << begin) - 1) : 0;
-  }
-
-  std::array<VoxelRange, 3> ranges_;
-};
-
+/// Clusters the frontier voxels of all regions: those of each region, which are kept for the next call, and
+/// of these what is connected across regions.
 class FrontierFinder {
  public:
   FrontierFinder(const StateMap& states, const FrontierRules& rules)
       : states_(states), with_voxels_(rules.with_voxels), min_size_(rules.min_size) {
-    std::optional<VoxelBox> box;
-    if (rules.box) box.emplace(states.geometry(), *rules.box);
-    for (const auto& entry : states.map().entries()) {
-      if (!box || box->overlaps(entry.index)) blocks_.push_back(entry.index);
-    }
-    std::sort(blocks_.begin(), blocks_.end());
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      position_.insert(blocks_[b], static_cast<std::uint32_t>(b));
-    }
-    left_.resize(blocks_.size());
-    cluster_.resize(blocks_.size());
-    reached_.resize(blocks_.size());
-    states.parallelFor((blocks_.size() + kBlocksPerJob - 1) / kBlocksPerJob, [&](std::size_t job) {
-      BlockReader reader(states);
-      const std::size_t end = std::min(blocks_.size(), (job + 1) * kBlocksPerJob);
-      for (std::size_t b = job * kBlocksPerJob; b < end; ++b) {
-        left_[b] = frontierIn(reader, blocks_[b]);
-        if (box) box->cut(blocks_[b], left_[b]);
-      }
+    if (rules.box) box_.emplace(states.geometry(), *rules.box);
+    regions_.resize(states.map().regionCount());
+    first_part_.resize(regions_.size());
+    states.parallelFor((regions_.size() + kRegionsPerJob - 1) / kRegionsPerJob, [&](std::size_t job) {
+      const std::size_t end = std::min(regions_.size(), (job + 1) * kRegionsPerJob);
+      for (std::size_t r = job * kRegionsPerJob; r < end; ++r) regions_[r] = inRegion(r);
     });
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      first_part_[r] = static_cast<std::uint32_t>(parts_.size());
+      if (!regions_[r]) continue;
+      for (std::size_t part = 0; part < regions_[r]->parts().size(); ++part) parts_.add();
+    }
+    for (std::size_t r = 0; r < regions_.size(); ++r) joinWithOthers(r);
   }
 
   std::vector<Frontier> clusters() {
-    std::vector<Found> found;
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-      for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        while (left_[b][z] != 0) {
-          Layers seed{};
-          seed[z] = left_[b][z] & (~left_[b][z] + 1);  // the lowest bit
-          const std::size_t size = takeCluster(b, seed);
-          if (size >= min_size_) found.push_back(makeFrontier(size));
-          for (const std::uint32_t part : parts_) cluster_[part] = {};
-        }
+    std::vector<VoxelSum> sums(parts_.size());
+    forEachPart([&](std::uint32_t part, const VoxelSum& sum) { sums[parts_.rootOf(part)].add(sum); });
+    std::vector<std::uint32_t> found;  // the roots
+    for (std::uint32_t part = 0; part < sums.size(); ++part) {
+      if (sums[part].count > 0 && sums[part].count >= min_size_) found.push_back(part);
+    }
+    std::sort(found.begin(), found.end(), [&](std::uint32_t a, std::uint32_t b) {
+      if (sums[a].count != sums[b].count) return sums[a].count > sums[b].count;
+      return sums[a].first < sums[b].first;
+    });
+    std::vector<Frontier> frontiers(found.size());
+    for (std::size_t f = 0; f < found.size(); ++f) {
+      const VoxelSum& sum = sums[found[f]];
+      frontiers[f].size = sum.count;
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        const auto total = static_cast<double>(sum.sum[static_cast<std::size_t>(axis)]);
+        frontiers[f].centre[axis] =
+            (total / static_cast<double>(sum.count) + 0.5) * states_.geometry().resolution();
       }
     }
-    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
-      if (a.frontier.size != b.frontier.size) return a.frontier.size > b.frontier.size;
-      return a.first < b.first;
-    });
-    std::vector<Frontier> frontiers;
-    frontiers.reserve(found.size());
-    for (Found& each : found) frontiers.push_back(std::move(each.frontier));
+    if (with_voxels_) listVoxels(found, frontiers);
     return frontiers;
   }
 
  private:
-  struct Found {
-    Frontier frontier;
-    VoxelIndex first;  ///< of its voxels, in the order of GridIndex
-  };
+  using Piece = RegionFrontiers::Piece;
 
-  static std::uint64_t unknownIn(const BlockStates* block, std::size_t z) {
-    return block ? ~(block->layers[z].occupied | block->layers[z].free) : kAll;
+  /// The frontiers of a region, or nullptr if it is outside the box. @param r its position in the map.
+  std::shared_ptr<const RegionFrontiers> inRegion(std::size_t r) const {
+    const Region& region = states_.map().regionAt(static_cast<std::uint32_t>(r));
+    if (box_ && !box_->overlapsRegion(region.index())) return nullptr;
+    if (box_ && !box_->containsRegion(region.index())) {
+      return std::make_shared<const RegionFrontiers>(states_, region, &*box_);
+    }
+    const auto position = static_cast<std::uint32_t>(r);
+    if (auto kept = states_.keptFrontiers(position)) return kept;
+    auto made = std::make_shared<const RegionFrontiers>(states_, region, nullptr);
+    states_.keepFrontiers(position, made);
+    return made;
   }
 
-  /// The frontier voxels of a block, found for 64 voxels at once by shifting its neighbours' bits to them.
-  static Layers frontierIn(BlockReader& reader, const BlockIndex& index) {
-    Layers layers{};
-    const BlockStates* const block = reader.find(index);
-    if (!block->any_free) return layers;
-    const auto neighbour = [&](int x, int y, int z) {
-      return reader.find({{index.x + x, index.y + y, index.z + z}});
+  /// Joins the parts of a region with those of regions around it.
+  void joinWithOthers(std::size_t r) {
+    if (!regions_[r]) return;
+    const GridIndex own = states_.map().regionAt(static_cast<std::uint32_t>(r)).index();
+    for (const Piece& piece : regions_[r]->pieces()) {
+      if (!isAtBorder(piece.block)) continue;
+      forEachNextBlock(piece.voxels, [&](int dx, int dy, int dz, const BlockLayers& there) {
+        const BlockIndex next = {{piece.block.x + dx, piece.block.y + dy, piece.block.z + dz}};
+        const GridIndex region = SemanticMap::regionOf(next);
+        if (region == own) return;
+        const std::uint32_t other = states_.map().positionOf(region);
+        if (other == kNoPosition || !regions_[other]) return;
+        regions_[other]->forEachPieceOf(Region::numberOf(next), [&](const Piece& beside) {
+          if (overlap(there, beside.voxels)) {
+            parts_.join(first_part_[r] + piece.part, first_part_[other] + beside.part);
+          }
+        });
+      });
+    }
+  }
+
+  static bool isAtBorder(const BlockIndex& block) {
+    constexpr auto kLast = static_cast<unsigned>(Region::kEdge - 1);
+    const auto at_border = [](std::int32_t index) {
+      const unsigned in_region = static_cast<unsigned>(index) & kLast;
+      return in_region == 0 || in_region == kLast;
     };
-    const BlockStates *const left = neighbour(-1, 0, 0), *const right = neighbour(1, 0, 0),
-                             *const front = neighbour(0, -1, 0), *const back = neighbour(0, 1, 0),
-                             *const below = neighbour(0, 0, -1), *const above = neighbour(0, 0, 1);
-    constexpr int kLast = kBlockEdge - 1, kLastRow = kBlockEdge * kLast;
-    for (std::size_t z = 0; z < kBlockEdge; ++z) {
-      const std::uint64_t unknown = unknownIn(block, z);
-      const std::uint64_t beside_x =
-          (unknown << 1 & ~kFirstColumn) | (unknownIn(left, z) >> kLast & kFirstColumn) |
-          (unknown >> 1 & ~(kFirstColumn << kLast)) | (unknownIn(right, z) << kLast & kFirstColumn << kLast);
-      const std::uint64_t beside_y = unknown << kBlockEdge | unknownIn(front, z) >> kLastRow |
-                                     unknown >> kBlockEdge | unknownIn(back, z) << kLastRow;
-      const std::uint64_t beside_z = (z > 0 ? unknownIn(block, z - 1) : unknownIn(below, kLast)) |
-                                     (z < kLast ? unknownIn(block, z + 1) : unknownIn(above, 0));
-      layers[z] = block->layers[z].free & (beside_x | beside_y | beside_z);
+    return at_border(block.x) || at_border(block.y) || at_border(block.z);
+  }
+
+  /// Calls visit(part, what is known of it).
+  template <typename Visit>
+  void forEachPart(Visit&& visit) const {
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      if (!regions_[r]) continue;
+      std::uint32_t part = first_part_[r];
+      for (const VoxelSum& sum : regions_[r]->parts()) visit(part++, sum);
     }
-    return layers;
   }
 
-  /// Moves all voxels that are connected with a seed from left_ to cluster_, a block at a time: what is
-  /// reached in a block is grown there, and then spreads to the blocks around it.
-  /// @return the number of voxels.
-  std::size_t takeCluster(std::uint32_t first, const Layers& seed) {
-    std::size_t size = 0;
-    parts_.clear();
-    reach(first, seed);
-    while (!to_grow_.empty()) {
-      const std::uint32_t b = to_grow_.back();
-      to_grow_.pop_back();
-      const Layers grown = growIn(left_[b], std::exchange(reached_[b], {}));
-      if (empty(cluster_[b])) parts_.push_back(b);
-      for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        size += static_cast<std::size_t>(__builtin_popcountll(grown[z]));
-        left_[b][z] &= ~grown[z];
-        cluster_[b][z] |= grown[z];
-      }
-      spread(blocks_[b], grown);
-    }
-    return size;
-  }
-
-  /// Notes that voxels of a block, as far as they are left, belong to the cluster.
-  void reach(std::uint32_t b, const Layers& voxels) {
-    const bool waits = !empty(reached_[b]);
-    for (std::size_t z = 0; z < kBlockEdge; ++z) reached_[b][z] |= voxels[z] & left_[b][z];
-    if (!waits && !empty(reached_[b])) to_grow_.push_back(b);
-  }
-
-  /// Reaches the neighbours of voxels in the blocks around theirs.
-  void spread(const BlockIndex& index, const Layers& voxels) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        Layers beside;
-        for (std::size_t z = 0; z < kBlockEdge; ++z) beside[z] = besideY(besideX(voxels[z], dx), dy);
-        if (empty(beside)) continue;
-        for (int dz = -1; dz <= 1; ++dz) {
-          if (dx == 0 && dy == 0 && dz == 0) continue;
-          const Layers there = besideZ(beside, dz);
-          if (empty(there)) continue;
-          const std::uint32_t b = position_.find({index.x + dx, index.y + dy, index.z + dz});
-          if (b != kNoPosition) reach(b, there);
-        }
+  /// @param found the roots of the clusters' parts.
+  void listVoxels(const std::vector<std::uint32_t>& found, std::vector<Frontier>& frontiers) {
+    std::vector<std::uint32_t> frontier_of(parts_.size(), kNoPosition);
+    for (std::size_t f = 0; f < found.size(); ++f) frontier_of[found[f]] = static_cast<std::uint32_t>(f);
+    std::vector<std::vector<const Piece*>> pieces(frontiers.size());
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      if (!regions_[r]) continue;
+      for (const Piece& piece : regions_[r]->pieces()) {
+        const std::uint32_t f = frontier_of[parts_.rootOf(first_part_[r] + piece.part)];
+        if (f != kNoPosition) pieces[f].push_back(&piece);
       }
     }
+    states_.parallelFor(frontiers.size(), [&](std::size_t f) {
+      frontiers[f].voxels.reserve(frontiers[f].size);
+      appendVoxels(pieces[f], frontiers[f].voxels);
+    });
   }
 
-  /// What of `within` is connected with `seed` inside the block.
-  static Layers growIn(const Layers& within, Layers seed) {
-    for (bool grows = true; grows;) {
-      Layers beside;
-      for (std::size_t z = 0; z < kBlockEdge; ++z) beside[z] = besideY(besideX(seed[z], 0), 0);
-      beside = besideZ(beside, 0);
-      grows = false;
-      for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        const std::uint64_t grown = beside[z] & within[z];
-        grows = grows || grown != seed[z];
-        seed[z] = grown;
-      }
-    }
-    return seed;
-  }
-
-  // Voxels and those beside them along an axis: what of these lies in the same block (step 0), or in the next
-  // one in either direction (step 1 or -1).
-  static std::uint64_t besideX(std::uint64_t layer, int step) {
-    constexpr int kLast = kBlockEdge - 1;
-    constexpr std::uint64_t kLastColumn = kFirstColumn << kLast;
-    if (step > 0) return layer >> kLast & kFirstColumn;
-    if (step < 0) return layer << kLast & kLastColumn;
-    return layer | (layer << 1 & ~kFirstColumn) | (layer >> 1 & ~kLastColumn);
-  }
-  static std::uint64_t besideY(std::uint64_t layer, int step) {
-    constexpr int kLastRow = kBlockEdge * (kBlockEdge - 1);
-    if (step > 0) return layer >> kLastRow;
-    if (step < 0) return layer << kLastRow;
-    return layer | layer << kBlockEdge | layer >> kBlockEdge;
-  }
-  static Layers besideZ(const Layers& layers, int step) {
-    constexpr std::size_t kLast = kBlockEdge - 1;
-    Layers beside{};
-    if (step > 0) {
-      beside[0] = layers[kLast];
-    } else if (step < 0) {
-      beside[kLast] = layers[0];
-    } else {
-      for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        beside[z] = layers[z] | (z > 0 ? layers[z - 1] : 0) | (z < kLast ? layers[z + 1] : 0);
-      }
-    }
-    return beside;
-  }
-
-  static bool empty(const Layers& layers) {
-    std::uint64_t any = 0;
-    for (const std::uint64_t layer : layers) any |= layer;
-    return any == 0;
-  }
-
-  /// The voxels in cluster_.
-  Found makeFrontier(std::size_t size) {
-    Found found;
-    found.frontier.size = size;
-    // The sum of indices, which is exact in any order.
-    std::array<std::int64_t, 3> sum{};
-    std::optional<VoxelIndex> first;
-    for (const std::uint32_t b : parts_) {
-      const VoxelIndex corner = GridGeometry::voxelOf(blocks_[b], 0);
-      for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        const std::uint64_t layer = cluster_[b][z];
-        if (layer == 0) continue;
-        const std::int64_t count = __builtin_popcountll(layer);
-        sum[0] += count * corner.x + sumOfDigits(layer, kDigitsX);
-        sum[1] += count * corner.y + sumOfDigits(layer, kDigitsY);
-        sum[2] += count * (corner.z + static_cast<std::int32_t>(z));
-        const VoxelIndex lowest =
-            GridGeometry::voxelOf(blocks_[b], static_cast<int>(64 * z) + __builtin_ctzll(layer));
-        if (!first || lowest < *first) first = lowest;
-      }
-    }
-    found.first = *first;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      const auto total = static_cast<double>(sum[static_cast<std::size_t>(axis)]);
-      found.frontier.centre[axis] =
-          (total / static_cast<double>(size) + 0.5) * states_.geometry().resolution();
-    }
-    if (with_voxels_) found.frontier.voxels = voxelsOfCluster(size);
-    return found;
-  }
-
-  // The bits of a layer whose x or y has the lowest, the middle and the highest binary digit.
-  static constexpr std::array<std::uint64_t, 3> kDigitsX = {0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc,
-                                                            0xf0f0f0f0f0f0f0f0},
-                                                kDigitsY = {0xff00ff00ff00ff00, 0xffff0000ffff0000,
-                                                            0xffffffff00000000};
-  /// The sum of the x or y of a layer's voxels within their block.
-  static std::int64_t sumOfDigits(std::uint64_t layer, const std::array<std::uint64_t, 3>& digits) {
-    return __builtin_popcountll(layer & digits[0]) + 2 * __builtin_popcountll(layer & digits[1]) +
-           4 * __builtin_popcountll(layer & digits[2]);
-  }
-
-  /// The voxels in cluster_, in the order of GridIndex.
-  std::vector<VoxelIndex> voxelsOfCluster(std::size_t size) {
-    std::sort(parts_.begin(), parts_.end());  // blocks_ is sorted, too
-    std::vector<VoxelIndex> voxels;
-    voxels.reserve(size);
-    const auto differs = [this](std::size_t n, auto coordinate) {
-      return n == parts_.size() || blocks_[parts_[n]].*coordinate != blocks_[parts_[n - 1]].*coordinate;
+  /// Appends the voxels of pieces in the order of GridIndex.
+  static void appendVoxels(std::vector<const Piece*>& pieces, std::vector<VoxelIndex>& voxels) {
+    std::sort(pieces.begin(), pieces.end(),
+              [](const Piece* a, const Piece* b) { return a->block < b->block; });
+    struct Part {
+      BlockIndex block;
+      BlockLayers voxels;
     };
-    for (std::size_t slab = 0, next_slab = 0; slab < parts_.size(); slab = next_slab) {
+    std::vector<Part> blocks;  // may have several pieces of the cluster
+    blocks.reserve(pieces.size());
+    for (const Piece* piece : pieces) {
+      if (blocks.empty() || blocks.back().block != piece->block) blocks.push_back({piece->block, {}});
+      for (std::size_t z = 0; z < kBlockEdge; ++z) blocks.back().voxels[z] |= piece->voxels[z];
+    }
+    const auto differs = [&](std::size_t n, auto coordinate) {
+      return n == blocks.size() || blocks[n].block.*coordinate != blocks[n - 1].block.*coordinate;
+    };
+    const auto appendRow = [&](const Part& part, std::size_t y, std::size_t z) {
+      for (std::uint64_t row = part.voxels[z] >> kBlockEdge * y & kFirstRow; row != 0; row &= row - 1) {
+        const auto offset = static_cast<int>(64 * z + kBlockEdge * y) + __builtin_ctzll(row);
+        voxels.push_back(GridGeometry::voxelOf(part.block, offset));
+      }
+    };
+    for (std::size_t slab = 0, next_slab = 0; slab < blocks.size(); slab = next_slab) {
       while (!differs(++next_slab, &BlockIndex::z)) {
       }
       for (std::size_t z = 0; z < kBlockEdge; ++z) {
@@ -304,33 +162,21 @@ class FrontierFinder {
           while (++next_row < next_slab && !differs(next_row, &BlockIndex::y)) {
           }
           for (std::size_t y = 0; y < kBlockEdge; ++y) {
-            for (std::size_t n = row; n < next_row; ++n) appendRow(parts_[n], y, z, voxels);
+            for (std::size_t n = row; n < next_row; ++n) appendRow(blocks[n], y, z);
           }
         }
       }
-    }
-    return voxels;
-  }
-
-  void appendRow(std::uint32_t b, std::size_t y, std::size_t z, std::vector<VoxelIndex>& voxels) const {
-    for (std::uint64_t row = cluster_[b][z] >> kBlockEdge * y & 0xff; row != 0; row &= row - 1) {
-      const auto offset = static_cast<int>(64 * z + kBlockEdge * y) + __builtin_ctzll(row);
-      voxels.push_back(GridGeometry::voxelOf(blocks_[b], offset));
     }
   }
 
   const StateMap& states_;
   bool with_voxels_;
   std::size_t min_size_;
-  std::vector<BlockIndex> blocks_;  ///< that overlap the box
-  GridTable position_;              ///< of each block in blocks_
-  // Of each block:
-  std::vector<Layers> left_;     ///< frontier voxels that no cluster has taken
-  std::vector<Layers> cluster_;  ///< voxels of the present cluster
-  std::vector<Layers> reached_;  ///< voxels that belong to it, and whose neighbours are still to be found
-  // Positions in blocks_:
-  std::vector<std::uint32_t> parts_;    ///< of blocks in which cluster_ has voxels
-  std::vector<std::uint32_t> to_grow_;  ///< of blocks in which reached_ has voxels
+  std::optional<VoxelBox> box_;
+  // By the position of the region in the map:
+  std::vector<std::shared_ptr<const RegionFrontiers>> regions_;  ///< nullptr: outside the box
+  std::vector<std::uint32_t> first_part_;                        ///< of the region in parts_
+  Groups parts_;                                                 ///< of all regions
 };
 
 }  // namespace

@@ -52,7 +52,7 @@ StateMap::RegionStates::~RegionStates() {
 }
 
 std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
-  const Block* const block = map.find(index);
+  const Block* const block = region_->find(Region::numberOf(index));
   if (!block) {
     slot(index).store(kAbsent, std::memory_order_release);
     return kAbsent;
@@ -68,17 +68,37 @@ std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockI
   return decided;
 }
 
-StateMap::StateMap(const SemanticMap& map, int threads) : map_(map), threads_(threads) {
+void StateMap::RegionStates::readAll(const SemanticMap& map) const {
+  std::array<int, Region::kBlocks> numbers;
+  std::array<const Block*, Region::kBlocks> blocks;
+  std::size_t count = 0;
+  for (int number = 0; number < Region::kBlocks; ++number) {
+    const auto& slot = blocks_[static_cast<std::size_t>(number)];
+    if (!region_->has(number) || slot.load(std::memory_order_relaxed) != kNotRead) continue;
+    numbers[count] = number;
+    blocks[count++] = region_->find(number);
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    // Each of these leads to what the next one needs.
+    if (n + 4 < count) __builtin_prefetch(blocks[n + 4]);
+    if (n + 2 < count) __builtin_prefetch(blocks[n + 2]->classes().data());
+    if (n + 1 < count) blocks[n + 1]->prefetch<false>();
+    read(map, region_->blockIndex(numbers[n]));
+  }
+}
+
+StateMap::Known::~Known() {
+  delete states.load(std::memory_order_relaxed);
+}
+
+StateMap::StateMap(const SemanticMap& map, int threads)
+    : map_(map), threads_(threads), regions_(map.regionCount()) {
   constexpr int kMostThreads = 1024;
   if (threads < 0 || threads > kMostThreads) {
     throw std::invalid_argument("the number of threads of a StateMap is " + std::to_string(threads) +
                                 "; give 0 (all cores) to " + std::to_string(kMostThreads));
   }
   const std::vector<GridIndex> regions = map.regions();
-  regions_ = std::vector<std::atomic<RegionStates*>>(regions.size());
-  for (std::size_t r = 0; r < regions.size(); ++r) {
-    region_position_.insert(regions[r], static_cast<std::uint32_t>(r));
-  }
   if (regions.empty()) return;
   GridIndex low = regions.front(), high = low;
   for (const GridIndex& region : regions) {
@@ -90,19 +110,16 @@ StateMap::StateMap(const SemanticMap& map, int threads) : map_(map), threads_(th
   bounds_.max = {high.x * kEdge + kEdge - 1, high.y * kEdge + kEdge - 1, high.z * kEdge + kEdge - 1};
 }
 
-StateMap::~StateMap() {
-  for (const auto& region : regions_) delete region.load(std::memory_order_relaxed);
-}
+StateMap::~StateMap() = default;
 
 const StateMap::RegionStates* StateMap::region(const GridIndex& region) const {
-  const std::uint32_t position = region_position_.find(region);
+  const std::uint32_t position = map_.positionOf(region);
   if (position == kNoPosition) return nullptr;
-  RegionStates* known = regions_[position].load(std::memory_order_acquire);
+  std::atomic<RegionStates*>& slot = regions_[position].states;
+  RegionStates* known = slot.load(std::memory_order_acquire);
   if (known) return known;
-  auto states = std::make_unique<RegionStates>();
-  if (!regions_[position].compare_exchange_strong(known, states.get(), std::memory_order_acq_rel)) {
-    return known;
-  }
+  auto states = std::make_unique<RegionStates>(map_.regionAt(position));
+  if (!slot.compare_exchange_strong(known, states.get(), std::memory_order_acq_rel)) return known;
   return states.release();
 }
 

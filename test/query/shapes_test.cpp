@@ -5,17 +5,16 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <limits>
 #include <map>
 #include <random>
 #include <set>
 #include <stdexcept>
 
-#include "bki_mapping/query/frontiers.h"
 #include "bki_mapping/query/nearest_obstacle.h"
 #include "bki_mapping/query/section.h"
 #include "query/query_map.h"
+#include "query/slow_frontiers.h"
 
 namespace bki_mapping {
 namespace {
@@ -349,54 +348,12 @@ TEST(Section, ShowsTheVoxelsAtItsCells) {
   });
 }
 
-/// Clusters of frontier voxels, found voxel by voxel. @param counts whether a voxel counts.
-std::set<std::set<GridIndex>> slowFrontiers(
-    const SemanticMap& map, const QueryMapKind& kind,
-    const std::function<bool(const VoxelIndex&)>& counts = [](const VoxelIndex&) { return true; }) {
-  const auto stateOf = [&](int x, int y, int z) {
-    return viewWithoutEntropy(map, VoxelIndex{{x, y, z}}).state;
-  };
-  const auto unknown = [&](int x, int y, int z) {
-    return stateOf(x, y, z) == VoxelState::kUnknown || stateOf(x, y, z) == VoxelState::kOccluded;
-  };
-  std::set<GridIndex> left;
-  forEachVoxel(kind, [&](const VoxelIndex& v) {
-    if (stateOf(v.x, v.y, v.z) != VoxelState::kFree || !counts(v)) return;
-    if (unknown(v.x - 1, v.y, v.z) || unknown(v.x + 1, v.y, v.z) || unknown(v.x, v.y - 1, v.z) ||
-        unknown(v.x, v.y + 1, v.z) || unknown(v.x, v.y, v.z - 1) || unknown(v.x, v.y, v.z + 1)) {
-      left.insert(v);
-    }
-  });
-  std::set<std::set<GridIndex>> clusters;
-  while (!left.empty()) {
-    std::set<GridIndex> cluster, open = {*left.begin()};
-    left.erase(left.begin());
-    while (!open.empty()) {
-      const GridIndex from = *open.begin();
-      open.erase(open.begin());
-      cluster.insert(from);
-      for (int n = 0; n < 27; ++n) {
-        const GridIndex to = {from.x + n % 3 - 1, from.y + n / 3 % 3 - 1, from.z + n / 9 - 1};
-        if (left.erase(to)) open.insert(to);
-      }
-    }
-    clusters.insert(cluster);
-  }
-  return clusters;
-}
-
 void expectSameFrontiers(const std::vector<Frontier>& a, const std::vector<Frontier>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t f = 0; f < a.size(); ++f) {
     ASSERT_EQ(a[f].size, b[f].size);
     ASSERT_EQ(a[f].centre, b[f].centre);
   }
-}
-
-std::set<std::set<GridIndex>> clustersOf(const std::vector<Frontier>& found) {
-  std::set<std::set<GridIndex>> clusters;
-  for (const Frontier& each : found) clusters.insert({each.voxels.begin(), each.voxels.end()});
-  return clusters;
 }
 
 TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
@@ -418,7 +375,7 @@ TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
     rules.box = box;
     const auto found = frontiers(states, rules);
     boxes_with_any += !found.empty();
-    EXPECT_EQ(clustersOf(found), slowFrontiers(map, kind, [&](const VoxelIndex& v) {
+    EXPECT_EQ(clustersOf(found), slowFrontiers(map, [&](const VoxelIndex& v) {
                 const Eigen::Array3d low = 0.25 * Eigen::Array3d(v.x, v.y, v.z), high = low + 0.25;
                 return (high > box.min().array()).all() && (low < box.max().array()).all();
               }));
@@ -482,7 +439,7 @@ TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
                   (before.size() == voxels.size() && before.front() < voxels.front()));
     }
     EXPECT_EQ(clusters.size(), found.size());
-    EXPECT_EQ(clusters, slowFrontiers(map, kind));
+    EXPECT_EQ(clusters, slowFrontiers(map));
     const auto large = frontiers(states, 5);
     EXPECT_EQ(large.size(), std::size_t(std::count_if(found.begin(), found.end(),
                                                       [](const auto& f) { return f.voxels.size() >= 5; })));

@@ -123,11 +123,14 @@ class Block {
     return saturated;
   }
 
-  /// Prefetches the first cache lines of the planes for writing; the hardware prefetcher then follows.
+  /// Prefetches the first cache lines of the planes; the hardware prefetcher then follows.
+  template <bool kForWriting = true>
   void prefetch() const {
     constexpr int kUnitsPerLine = 64 / sizeof(EvidenceUnits), kLines = 8;
     for (std::size_t p = 0; p < classes_.size(); ++p) {
-      for (int line = 0; line < kLines; ++line) __builtin_prefetch(plane(p) + kUnitsPerLine * line, 1);
+      for (int line = 0; line < kLines; ++line) {
+        __builtin_prefetch(plane(p) + kUnitsPerLine * line, kForWriting ? 1 : 0);
+      }
     }
   }
 

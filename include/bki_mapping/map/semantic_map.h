@@ -100,6 +100,10 @@ class SemanticMap {
   /// The regions in which the map has blocks, in unspecified order.
   std::vector<GridIndex> regions() const;
   bool hasRegion(const GridIndex& region) const { return region_position_.find(region) != kNoPosition; }
+  std::size_t regionCount() const { return regions_.size(); }
+  /// The position of a region, below regionCount(), or kNoPosition. Holds until the map is next changed.
+  std::uint32_t positionOf(const GridIndex& region) const { return region_position_.find(region); }
+  const Region& regionAt(std::uint32_t position) const { return *regions_[position].region; }
   /// Moves the blocks of a region to a map of their own, which has the same settings. Copies no block.
   /// @return an empty map if this one has no such region. @throws std::bad_alloc; the map is then unchanged.
   SemanticMap takeRegion(const GridIndex& region);

@@ -9,11 +9,11 @@
 #include <mutex>
 #include <vector>
 
-#include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/map/map_query.h"
 
 namespace bki_mapping {
 
+class RegionFrontiers;
 class ThreadPool;
 
 /// States and labels of the 512 voxels of a block.
@@ -44,7 +44,8 @@ struct GridBounds {
 };
 
 /// A map prepared for queries: states and labels of each block are decided when a query first reads it, and
-/// kept. Takes 0.8 kB for each block that was read, and 4 kB for each region of 8 x 8 x 8 blocks.
+/// kept. Takes 0.8 kB for each block that was read, 4 kB for each region of 8 x 8 x 8 blocks, and what
+/// frontiers() keeps.
 ///
 /// All functions, and all queries on it, may be called from several threads at once.
 class StateMap {
@@ -78,19 +79,38 @@ class StateMap {
   /// turns. @throws what the first failing job threw.
   void parallelFor(std::size_t jobs, const std::function<void(std::size_t)>& job) const;
 
+  /// The frontiers of a region that were kept, or nullptr. @param position SemanticMap::positionOf.
+  std::shared_ptr<const RegionFrontiers> keptFrontiers(std::uint32_t position) const {
+    return std::atomic_load(&regions_[position].frontiers);
+  }
+  /// Keeps them.
+  void keepFrontiers(std::uint32_t position, std::shared_ptr<const RegionFrontiers> frontiers) const {
+    std::atomic_store(&regions_[position].frontiers, std::move(frontiers));
+  }
+
  private:
+  /// What has been found out about a region.
+  struct Known {
+    Known() = default;
+    ~Known();
+    Known(const Known&) = delete;
+    Known& operator=(const Known&) = delete;
+
+    std::atomic<RegionStates*> states{nullptr};  ///< nullptr: not read yet
+    std::shared_ptr<const RegionFrontiers> frontiers;
+  };
+
   const SemanticMap& map_;
   int threads_;
-  GridTable region_position_;  ///< of each region in regions_
   GridBounds bounds_{{1, 1, 1}, {0, 0, 0}};
-  mutable std::vector<std::atomic<RegionStates*>> regions_;  ///< nullptr: not read yet
+  mutable std::vector<Known> regions_;  ///< by their positions in the map
   mutable std::mutex pool_mutex_;
   mutable std::unique_ptr<ThreadPool> pool_;  ///< made when first needed
 };
 
 class StateMap::RegionStates {
  public:
-  RegionStates() = default;
+  explicit RegionStates(const Region& region) : region_(&region) {}
   ~RegionStates();
   RegionStates(const RegionStates&) = delete;
   RegionStates& operator=(const RegionStates&) = delete;
@@ -111,6 +131,8 @@ class StateMap::RegionStates {
     return glance(map, index).block;
   }
   void prefetch(const BlockIndex& index) const { __builtin_prefetch(&slot(index)); }
+  /// Decides all blocks, which takes three quarters of the time that it takes one by one.
+  void readAll(const SemanticMap& map) const;
 
  private:
   // A slot is a pointer to BlockStates with flags in the lowest bits, which the alignment leaves 0.
@@ -127,6 +149,7 @@ class StateMap::RegionStates {
   /// Decides a block. Threads that do so at once get the same result; one of them keeps it. @return the slot.
   std::uintptr_t read(const SemanticMap& map, const BlockIndex& index) const;
 
+  const Region* region_;  ///< exists as long as a map of which a StateMap owns this
   mutable std::array<std::atomic<std::uintptr_t>, Region::kBlocks> blocks_{};
 };
 
