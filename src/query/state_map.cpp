@@ -47,8 +47,33 @@ void decide(const SemanticMap& map, const Block& block, BlockStates& states) {
 
 }  // namespace
 
+StateMap::RegionStates::RegionStates(const Region& region, const RegionStates& earlier) : region_(&region) {
+  std::array<int, Region::kBlocks> numbers;
+  std::array<std::uintptr_t, Region::kBlocks> slots;
+  std::size_t count = 0;
+  for (int number = 0; number < Region::kBlocks; ++number) {
+    if (!region.has(number)) continue;
+    const std::uintptr_t known =
+        earlier.blocks_[static_cast<std::size_t>(number)].load(std::memory_order_acquire);
+    const BlockStates* const states = glanceOf(known).block;
+    if (!states) continue;
+    __builtin_prefetch(&states->block, 1);
+    numbers[count] = number;
+    slots[count++] = known;
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    const BlockStates& states = *glanceOf(slots[n]).block;
+    if (states.block != region.find(numbers[n])) continue;
+    states.owners.share();
+    blocks_[static_cast<std::size_t>(numbers[n])].store(slots[n], std::memory_order_relaxed);
+  }
+}
+
 StateMap::RegionStates::~RegionStates() {
-  for (const auto& slot : blocks_) delete glanceOf(slot.load(std::memory_order_relaxed)).block;
+  for (const auto& slot : blocks_) {
+    const BlockStates* const states = glanceOf(slot.load(std::memory_order_relaxed)).block;
+    if (states && states->owners.release()) delete states;
+  }
 }
 
 std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
@@ -88,7 +113,8 @@ void StateMap::RegionStates::readAll(const SemanticMap& map) const {
 }
 
 StateMap::Known::~Known() {
-  delete states.load(std::memory_order_relaxed);
+  const RegionStates* const known = states.load(std::memory_order_relaxed);
+  if (known && known->owners_.release()) delete known;
 }
 
 StateMap::StateMap(const SemanticMap& map, int threads)
@@ -108,6 +134,37 @@ StateMap::StateMap(const SemanticMap& map, int threads)
   constexpr std::int32_t kEdge = Region::kEdge;
   bounds_.min = {low.x * kEdge, low.y * kEdge, low.z * kEdge};
   bounds_.max = {high.x * kEdge + kEdge - 1, high.y * kEdge + kEdge - 1, high.z * kEdge + kEdge - 1};
+}
+
+StateMap::StateMap(const SemanticMap& map, const StateMap& earlier, int threads) : StateMap(map, threads) {
+  if (map.decidesAs(earlier.map_)) takeOver(earlier);
+}
+
+void StateMap::takeOver(const StateMap& earlier) {
+  // Both maps exist, and hold their blocks: a block that both have at the same address is the same object.
+  // Neither map changes, and a map copies blocks that it shares before it writes to them.
+  const auto is_same = [&](const GridIndex& region) {
+    return map_.findRegion(region) == earlier.map_.findRegion(region);
+  };
+  for (std::uint32_t position = 0; position < regions_.size(); ++position) {
+    const Region& region = map_.regionAt(position);
+    const std::uint32_t before = earlier.map_.positionOf(region.index());
+    if (before == kNoPosition) continue;
+    Known& known = regions_[position];
+    RegionStates* const states = earlier.regions_[before].states.load(std::memory_order_acquire);
+    if (!states) continue;
+    if (states->region_ != &region) {
+      known.states.store(new RegionStates(region, *states), std::memory_order_relaxed);
+      continue;
+    }
+    states->owners_.share();
+    known.states.store(states, std::memory_order_relaxed);
+    const GridIndex& r = region.index();
+    if (is_same({r.x - 1, r.y, r.z}) && is_same({r.x + 1, r.y, r.z}) && is_same({r.x, r.y - 1, r.z}) &&
+        is_same({r.x, r.y + 1, r.z}) && is_same({r.x, r.y, r.z - 1}) && is_same({r.x, r.y, r.z + 1})) {
+      known.frontiers = earlier.keptFrontiers(before);
+    }
+  }
 }
 
 StateMap::~StateMap() = default;

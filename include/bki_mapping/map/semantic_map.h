@@ -62,6 +62,10 @@ class SemanticMap {
   }
   /// @param persistence in units of evidence; 0: gains do not decay.
   void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
+  /// Whether equal blocks of both maps have the same states and labels.
+  bool decidesAs(const SemanticMap& other) const {
+    return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_;
+  }
 
   /// All blocks, in unspecified order: a range for `for (const auto& [index, block] : map.entries())`.
   Entries entries() const;
@@ -104,6 +108,12 @@ class SemanticMap {
   /// The position of a region, below regionCount(), or kNoPosition. Holds until the map is next changed.
   std::uint32_t positionOf(const GridIndex& region) const { return region_position_.find(region); }
   const Region& regionAt(std::uint32_t position) const { return *regions_[position].region; }
+  /// @return nullptr if the map has no block in the region. While two maps exist that share blocks, equal
+  /// regions and equal blocks are those that neither of them has changed since.
+  const Region* findRegion(const GridIndex& region) const {
+    const std::uint32_t position = positionOf(region);
+    return position == kNoPosition ? nullptr : regions_[position].region.get();
+  }
   /// Moves the blocks of a region to a map of their own, which has the same settings. Copies no block.
   /// @return an empty map if this one has no such region. @throws std::bad_alloc; the map is then unchanged.
   SemanticMap takeRegion(const GridIndex& region);

@@ -16,6 +16,17 @@ namespace bki_mapping {
 class RegionFrontiers;
 class ThreadPool;
 
+/// Counts the owners of an object, which any of several threads may end up deleting.
+class OwnerCount {
+ public:
+  void share() const { owners_.fetch_add(1, std::memory_order_relaxed); }
+  /// @return whether nobody owns the object any more.
+  bool release() const { return owners_.fetch_sub(1, std::memory_order_acq_rel) == 1; }
+
+ private:
+  mutable std::atomic<std::uint32_t> owners_{1};
+};
+
 /// States and labels of the 512 voxels of a block.
 struct alignas(64) BlockStates {
   /// One bit for each voxel of a layer along z: bit x + 8 y, with x and y counted within the block.
@@ -28,6 +39,7 @@ struct alignas(64) BlockStates {
   std::array<ClassId, kBlockVoxels> labels;          ///< kFreeClass where not occupied
   const Block* block = nullptr;                      ///< the evidence
   bool any_occupied = false, any_free = false, all_free = false;
+  OwnerCount owners;
 
   /// @param offset of the voxel in the block, 0 to 511.
   VoxelState state(int offset) const {
@@ -45,7 +57,8 @@ struct GridBounds {
 
 /// A map prepared for queries: states and labels of each block are decided when a query first reads it, and
 /// kept. Takes 0.8 kB for each block that was read, 4 kB for each region of 8 x 8 x 8 blocks, and what
-/// frontiers() keeps.
+/// frontiers() keeps. The StateMap of a later snapshot can take over what was decided of blocks that have not
+/// changed since.
 ///
 /// All functions, and all queries on it, may be called from several threads at once.
 class StateMap {
@@ -54,6 +67,13 @@ class StateMap {
   /// @param threads that batches of queries use, the caller's among them; 0: all cores.
   /// @throws std::invalid_argument if `threads` is negative or above 1024.
   explicit StateMap(const SemanticMap& map, int threads = 0);
+  /// The same, but shares with another StateMap what that one has decided of the blocks that both maps share.
+  /// Where both maps have the same whole region, also what either of them will decide. All queries give the
+  /// same answers as without. Takes some 20 ns for each shared block in regions that have changed.
+  /// @param earlier which need not outlive the call; queries may be asked of it meanwhile. If its map decides
+  /// states by other gains, nothing is taken over. Any other map is allowed, but pays only if it shares
+  /// blocks: an earlier snapshot of the same map.
+  StateMap(const SemanticMap& map, const StateMap& earlier, int threads = 0);
   ~StateMap();
   StateMap(const StateMap&) = delete;
   StateMap& operator=(const StateMap&) = delete;
@@ -83,7 +103,7 @@ class StateMap {
   std::shared_ptr<const RegionFrontiers> keptFrontiers(std::uint32_t position) const {
     return std::atomic_load(&regions_[position].frontiers);
   }
-  /// Keeps them.
+  /// Keeps them, until a map has changed in the region, or in one beside it.
   void keepFrontiers(std::uint32_t position, std::shared_ptr<const RegionFrontiers> frontiers) const {
     std::atomic_store(&regions_[position].frontiers, std::move(frontiers));
   }
@@ -100,6 +120,8 @@ class StateMap {
     std::shared_ptr<const RegionFrontiers> frontiers;
   };
 
+  void takeOver(const StateMap& earlier);
+
   const SemanticMap& map_;
   int threads_;
   GridBounds bounds_{{1, 1, 1}, {0, 0, 0}};
@@ -111,6 +133,8 @@ class StateMap {
 class StateMap::RegionStates {
  public:
   explicit RegionStates(const Region& region) : region_(&region) {}
+  /// With what was decided of the blocks that the region shares with another one.
+  RegionStates(const Region& region, const RegionStates& earlier);
   ~RegionStates();
   RegionStates(const RegionStates&) = delete;
   RegionStates& operator=(const RegionStates&) = delete;
@@ -135,6 +159,8 @@ class StateMap::RegionStates {
   void readAll(const SemanticMap& map) const;
 
  private:
+  friend class StateMap;
+
   // A slot is a pointer to BlockStates with flags in the lowest bits, which the alignment leaves 0.
   static constexpr std::uintptr_t kNotRead = 0, kAnyOccupied = 1, kAllFree = 2, kAbsent = 4, kFlags = 7;
   static_assert(alignof(BlockStates) > kFlags);
@@ -149,6 +175,7 @@ class StateMap::RegionStates {
   /// Decides a block. Threads that do so at once get the same result; one of them keeps it. @return the slot.
   std::uintptr_t read(const SemanticMap& map, const BlockIndex& index) const;
 
+  OwnerCount owners_;
   const Region* region_;  ///< exists as long as a map of which a StateMap owns this
   mutable std::array<std::atomic<std::uintptr_t>, Region::kBlocks> blocks_{};
 };
