@@ -38,8 +38,10 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   });
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
   diagnostics_ = std::make_unique<MappingDiagnostics>(node_, private_node_, config_.diagnostic_period);
-  queries_ = std::make_unique<QueryServices>(private_node_, queue_, [this] {
-    return std::make_shared<const QueriedMap>(mapHeader(), mapper_->snapshot(), mapper_->classes());
+  queries_ = std::make_unique<QueryServices>(private_node_, queue_, [this](const QueriedMap* earlier) {
+    const ClassTable& classes = mapper_->classes();
+    return earlier ? std::make_shared<const QueriedMap>(mapHeader(), mapper_->snapshot(), classes, *earlier)
+                   : std::make_shared<const QueriedMap>(mapHeader(), mapper_->snapshot(), classes);
   });
   offerServices();
   if (!kept_->readOnly()) subscribe();

@@ -7,8 +7,7 @@
 
 namespace bki_mapping::ros_interface {
 
-QueryServices::QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping,
-                             std::function<RecentMap::Shared()> take)
+QueryServices::QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping, RecentMap::Take take)
     : node_(node), map_(std::move(take), mapping, freeing_) {
   node_.setCallbackQueue(&queue_);
   offer<QueryPoints>("query_points");

@@ -17,8 +17,7 @@ class QueryServices {
  public:
   /// @param node holds the services. @param mapping the queue that the mapping thread serves.
   /// @param take takes a snapshot; called in the mapping thread.
-  QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping,
-                std::function<RecentMap::Shared()> take);
+  QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping, RecentMap::Take take);
 
   /// Starts the threads.
   void start() {

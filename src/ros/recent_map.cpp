@@ -33,21 +33,21 @@ RecentMap::Shared RecentMap::get() {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (kept_) return kept_;  // another query has asked meanwhile
     }
-    Shared taken = take_();
+    Shared taken = take_(nullptr);
     keep(taken);
     return taken;
   });
 }
 
 void RecentMap::changed() noexcept {
-  bool wanted;
+  const QueriedMap* earlier;  // only this thread replaces it
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    wanted = kept_ != nullptr;
+    earlier = kept_.get();
   }
-  if (!wanted) return;
+  if (!earlier) return;
   try {
-    keep(idle() ? nullptr : take_());
+    keep(idle() ? nullptr : take_(earlier));
   } catch (const std::exception&) {
     keep(nullptr);  // the next query asks again, and its answer says why there is none
   }

@@ -18,13 +18,22 @@ namespace bki_mapping::ros_interface {
 /// A snapshot of the map, prepared for queries. All functions may be called from several threads at once.
 struct QueriedMap {
   QueriedMap(std_msgs::Header of_map, SemanticMap snapshot, const ClassTable& table)
-      : header(std::move(of_map)), map(std::move(snapshot)), classes(table) {}
+      : header(std::move(of_map)), map(std::move(snapshot)), classes(table), states(map, kThreads) {}
+  /// The same, but takes over what queries of an earlier snapshot have found out of what has not changed.
+  QueriedMap(std_msgs::Header of_map, SemanticMap snapshot, const ClassTable& table,
+             const QueriedMap& earlier)
+      : header(std::move(of_map)),
+        map(std::move(snapshot)),
+        classes(table),
+        states(map, earlier.states, kThreads) {}
 
   std_msgs::Header header;  ///< map frame, stamp of the last scan
   SemanticMap map;
   const ClassTable& classes;  ///< the server's; never changes
-  /// With a single thread: the others belong to mapping.
-  StateMap states{map, 1};
+  StateMap states;
+
+ private:
+  static constexpr int kThreads = 1;  ///< the others belong to mapping
 };
 
 /// Keeps a snapshot of the map as it was after its last change, so that queries need not wait until the
@@ -35,11 +44,13 @@ class RecentMap {
  public:
   using Clock = std::chrono::steady_clock;
   using Shared = std::shared_ptr<const QueriedMap>;
+  /// Takes a snapshot. @param earlier the one before, or nullptr.
+  using Take = std::function<Shared(const QueriedMap* earlier)>;
 
-  /// @param take takes a snapshot; for the mapping thread. @param mapping the queue that this thread serves.
+  /// @param take is called in the mapping thread. @param mapping the queue that this thread serves.
   /// @param freeing the queue of the thread that frees snapshots.
   /// @param interest how long snapshots are taken after a query.
-  RecentMap(std::function<Shared()> take, ros::CallbackQueue& mapping, ros::CallbackQueue& freeing,
+  RecentMap(Take take, ros::CallbackQueue& mapping, ros::CallbackQueue& freeing,
             Clock::duration interest = std::chrono::seconds(10))
       : take_(std::move(take)), mapping_(mapping), freeing_(freeing), interest_(interest) {}
 
@@ -56,7 +67,7 @@ class RecentMap {
   void keep(Shared snapshot) noexcept;
   bool idle() const { return Clock::now() - last_asked_.load() > interest_; }
 
-  std::function<Shared()> take_;
+  Take take_;
   ros::CallbackQueue& mapping_;
   ros::CallbackQueue& freeing_;
   Clock::duration interest_;

@@ -11,10 +11,11 @@ namespace {
 /// A mapper whose map has as many blocks as it has mapped scans, with a mapping thread that the test plays.
 class RecentMapTest : public testing::Test {
  protected:
-  RecentMap::Shared take() {
+  RecentMap::Shared take(const QueriedMap* earlier) {
     if (no_memory_) throw std::bad_alloc();
     ++taken_;
-    return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_);
+    if (!earlier) return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_);
+    return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_, *earlier);
   }
   void mapScan(RecentMap& recent) {
     map_.getOrAllocate({{scans_++, 0, 0}});
@@ -28,7 +29,8 @@ class RecentMapTest : public testing::Test {
     return asked.get();
   }
   RecentMap make(RecentMap::Clock::duration interest) {
-    return RecentMap([this] { return take(); }, mapping_, freeing_, interest);
+    return RecentMap([this](const QueriedMap* earlier) { return take(earlier); }, mapping_, freeing_,
+                     interest);
   }
 
   const ClassTable classes_{"one", {SemanticClass()}};
@@ -76,6 +78,22 @@ TEST_F(RecentMapTest, IsNeverOlderThanTheLastChange) {
   EXPECT_THROW(askAndServe(recent), std::bad_alloc);
   no_memory_ = false;
   EXPECT_EQ(askAndServe(recent)->map.size(), 1u);
+}
+
+TEST_F(RecentMapTest, TakesOverWhatQueriesHaveFoundOut) {
+  RecentMap recent = make(std::chrono::hours(1));
+  mapScan(recent);
+  const BlockStates* decided = nullptr;
+  std::weak_ptr<const QueriedMap> before;
+  {
+    const RecentMap::Shared asked = askAndServe(recent);
+    decided = asked->states.find({{0, 0, 0}});
+    before = asked;
+  }
+  mapScan(recent);
+  freeing_.callAvailable();
+  EXPECT_TRUE(before.expired()) << "a snapshot must not keep earlier ones";
+  EXPECT_EQ(recent.get()->states.find({{0, 0, 0}}), decided);
 }
 
 }  // namespace
