@@ -228,6 +228,22 @@ void decideStates(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(map.size()));
 }
 
+/// What the snapshot after a scan takes over from the one before, of which all was decided and searched.
+void takingOver(benchmark::State& state) {
+  QueryFixture& f = queryFixture();
+  const SemanticMap before = f.mapper.snapshot();
+  const Scan scan = simulation::Drive({11, 8.0, 1, {}}).frame(10).scan();
+  f.mapper.integrate(scan);
+  const SemanticMap after = f.mapper.snapshot();
+  f.mapper.withdraw(scan);
+  const StateMap states(before, 1);
+  frontiers(states);
+  for (auto _ : state) {
+    const StateMap next(after, states, 1);
+    benchmark::DoNotOptimize(&next);
+  }
+}
+
 /// @param query called as query(const StateMap&); answers `items`.
 template <typename Query>
 void ask(benchmark::State& state, int threads, std::size_t items, Query&& query) {
@@ -296,6 +312,22 @@ void sections(benchmark::State& state, int threads) {
   });
 }
 
+/// The first search of a map whose states are decided.
+void findingFrontiersFirst(benchmark::State& state, int threads) {
+  const SemanticMap& map = queryFixture().mapper.map();
+  for (auto _ : state) {
+    state.PauseTiming();
+    auto states = std::make_unique<StateMap>(map, threads);
+    for (const auto& entry : map.entries()) states->find(entry.index);
+    state.ResumeTiming();
+    benchmark::DoNotOptimize(frontiers(*states, {1, false, std::nullopt}));
+    state.PauseTiming();
+    states = nullptr;
+    state.ResumeTiming();
+  }
+}
+
+/// Further searches, for which the frontiers of each region have been kept.
 void findingFrontiers(benchmark::State& state, int threads, const FrontierRules& rules) {
   ask(state, threads, 1, [&](const StateMap& states) { benchmark::DoNotOptimize(frontiers(states, rules)); });
 }
@@ -348,6 +380,7 @@ int main(int argc, char** argv) {
   add("Snapshot", snapshots);
   add("Query", queries);
   add("DecideStates", decideStates);
+  add("TakeOverStates", takingOver);
   add("PointsOneByOne", readingEachPoint);
   for (const int threads : {1, 2}) {
     const std::string on = "/threads:" + std::to_string(threads);
@@ -362,6 +395,7 @@ int main(int argc, char** argv) {
     addOn("RaysToUnknown", [=](auto& state) { castingRays(state, threads, {ClassFilter::all(), true}); });
     addOn("Footprints", [=](auto& state) { footprints(state, threads); });
     addOn("Section", [=](auto& state) { sections(state, threads); });
+    addOn("FrontierSizesFirst", [=](auto& state) { findingFrontiersFirst(state, threads); });
     addOn("Frontiers", [=](auto& state) { findingFrontiers(state, threads, {}); });
     addOn("FrontierSizes", [=](auto& state) { findingFrontiers(state, threads, {1, false, std::nullopt}); });
     addOn("FrontierSizesInBox", [=](auto& state) {
