@@ -83,17 +83,14 @@ TEST_F(RecentMapTest, IsNeverOlderThanTheLastChange) {
 TEST_F(RecentMapTest, TakesOverWhatQueriesHaveFoundOut) {
   RecentMap recent = make(std::chrono::hours(1));
   mapScan(recent);
-  const BlockStates* decided = nullptr;
-  std::weak_ptr<const QueriedMap> before;
-  {
-    const RecentMap::Shared asked = askAndServe(recent);
-    decided = asked->states.find({{0, 0, 0}});
-    before = asked;
-  }
+  RecentMap::Shared asked = askAndServe(recent);
+  const BlockStates* const decided = asked->states.find({{0, 0, 0}});
   mapScan(recent);
+  EXPECT_EQ(recent.get()->states.find({{0, 0, 0}}), decided);
+  const std::weak_ptr<const QueriedMap> before = asked;
+  asked = nullptr;
   freeing_.callAvailable();
   EXPECT_TRUE(before.expired()) << "a snapshot must not keep earlier ones";
-  EXPECT_EQ(recent.get()->states.find({{0, 0, 0}}), decided);
 }
 
 }  // namespace
