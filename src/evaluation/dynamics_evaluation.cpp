@@ -1,5 +1,7 @@
 #include "evaluation/dynamics_evaluation.h"
 
+#include <algorithm>
+
 #include "bki_mapping/map/map_query.h"
 
 namespace bki_mapping {
@@ -24,10 +26,28 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
     voxel.ground_points += !moving && known.ground;
     voxel.standing_points += !moving && known.dynamic;
     voxel.other_points += !moving && !known.ground && !known.dynamic;
-    voxel.early_moving_points += moving && early;
     voxel.hit_late |= late;
+    if (!moving) continue;
+    voxel.last_moved = added_;
+    if (early && voxel.early_moving_points++ == 0) unseen_.push_back(n);
+    if (!voxel.seen_again) continue;
+    voxel.seen_again = false;
+    unseen_.push_back(n);
   }
+  findSeenAgain(scan);
   ++added_;
+}
+
+void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
+  if (unseen_.empty()) return;
+  beams_.build(scan);
+  const auto isSeenAgain = [this](std::uint32_t n) {
+    Voxel& voxel = voxels_[n];
+    if (voxel.last_moved == added_) return false;
+    voxel.seen_again = beams_.anyPasses(geometry_.voxelCentre(voxel.index), geometry_.resolution());
+    return voxel.seen_again;
+  };
+  unseen_.erase(std::remove_if(unseen_.begin(), unseen_.end(), isSeenAgain), unseen_.end());
 }
 
 bool DynamicsEvaluation::hasBeenLeft(const VoxelIndex& index, const Taken& taken) const {
@@ -40,7 +60,7 @@ std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const Se
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
   for (const Voxel& voxel : voxels_) {
     const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
-    if (voxel.ground_points + voxel.standing_points + voxel.other_points > 0) {
+    if (voxel.isShared()) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
     } else if (voxel.early_moving_points > 0 && !mayBeOccupied(voxel, taken)) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kLeft : VoxelFate::kForgotten);
@@ -67,6 +87,12 @@ DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const Taken&
     if (voxel.early_moving_points == 0 || mayBeOccupied(voxel, taken)) continue;
     quality.moving_points += voxel.early_moving_points;
     if (!occupied) quality.moving_removed += voxel.early_moving_points;
+    if (voxel.isShared() || !voxel.seen_again) {
+      (voxel.isShared() ? quality.moving_shared : quality.moving_unseen) += voxel.early_moving_points;
+      continue;
+    }
+    quality.decidable_points += voxel.early_moving_points;
+    if (!occupied) quality.decidable_removed += voxel.early_moving_points;
   }
   quality.static_points = quality.ground_points + quality.standing_points + quality.other_points;
   quality.static_kept = quality.ground_kept + quality.standing_kept + quality.other_kept;

@@ -12,6 +12,7 @@
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "evaluation/passing_beams.h"
 
 namespace bki_mapping {
 
@@ -47,11 +48,17 @@ struct DynamicsQuality : Accuracies {
               other_kept = 0;
   std::size_t floor_voxels = 0;  ///< voxels with static points of ground
   std::size_t floor_holes = 0;   ///< of these, those that are not occupied
+  /// Moving points that no map can tell to be gone: those in voxels that static points are in, too, and of
+  /// the others those that no beam has come near after the last moving point in their voxel.
+  std::size_t moving_shared = 0, moving_unseen = 0;
+  std::size_t decidable_points = 0;   ///< the other moving points
+  std::size_t decidable_removed = 0;  ///< of these, those that the map does not keep
 
   double groundAccuracy() const { return fraction(ground_kept, ground_points); }
   double standingAccuracy() const { return fraction(standing_kept, standing_points); }
   double otherAccuracy() const { return fraction(other_kept, other_points); }
   double holes() const { return fraction(floor_holes, floor_voxels); }
+  double decidableAccuracy() const { return fraction(decidable_removed, decidable_points); }
 };
 
 /// The outcome for a voxel, by its points: of static or of moving objects.
@@ -94,8 +101,15 @@ class DynamicsEvaluation {
   struct Voxel {
     VoxelIndex index;
     std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
+    std::size_t last_moved = 0;  ///< the last scan with a moving point
     bool hit_late = false;
+    bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
+
+    bool isShared() const { return ground_points + standing_points + other_points > 0; }
   };
+
+  /// Notes the voxels that something moving has left and that beams of the scan come near.
+  void findSeenAgain(const Scan& scan);
 
   static bool mayBeOccupied(const Voxel& voxel, const Taken& taken) {
     return voxel.hit_late || (taken && taken(voxel.index));
@@ -106,6 +120,8 @@ class DynamicsEvaluation {
   std::size_t scans_, late_, added_ = 0;
   GridTable index_of_;
   std::vector<Voxel> voxels_;
+  std::vector<std::uint32_t> unseen_;  ///< voxels with early moving points that were not seen again
+  PassingBeams beams_;                 ///< of the last scan
 };
 
 }  // namespace bki_mapping

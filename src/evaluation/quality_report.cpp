@@ -85,6 +85,9 @@ Json dynamicsJson(const DynamicsQuality& d) {
           {"sa_standing", d.standingAccuracy()},
           {"sa_other", d.otherAccuracy()},
           {"da", d.dynamicAccuracy()},
+          {"da_decidable", d.decidableAccuracy()},
+          {"moving_shared", d.moving_shared},
+          {"moving_unseen", d.moving_unseen},
           {"aa", d.accuracy()},
           {"ha", d.harmonicAccuracy()}};
 }
@@ -187,6 +190,8 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.percent("holes", d.holes(), "of the voxels with points of ground are not occupied");
   table.percent("DA", d.dynamicAccuracy(),
                 "of the early points of moving objects are in voxels that are not occupied");
+  table.percent("  decidable", d.decidableAccuracy(),
+                "of those in voxels that share no static point and that beams came near again");
   table.percent("AA", d.accuracy(), "sqrt(SA DA)");
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");

@@ -90,6 +90,42 @@ TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
   EXPECT_DOUBLE_EQ(quality.holes(), 0.5);
 }
 
+TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
+  // Label 20 moves, 10 stands. The sensor is at the origin; voxels are 1 m. Things move at 3, 5, 7 and 9 m,
+  // in different directions.
+  const Eigen::Vector3f shared(3.5f, 0.5f, 0.5f), unseen(0.5f, 5.5f, 0.5f), seen(-6.5f, 0.5f, 0.5f),
+      left(0.5f, -8.5f, 0.5f);
+  const auto classes = reference::smallTable();
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 6, 1);
+  evaluation.add(scanOf({{shared, 20}, {unseen, 20}, {seen, 20}, {left, 20}, {left, 20}}), *classes);
+  const auto beyond = [](Eigen::Vector3f point) { return Eigen::Vector3f(2.0f * point); };
+  // Beams pass through two of them, and beside one; another ends before it.
+  evaluation.add(scanOf({{beyond(seen), 10},
+                         {beyond(left), 10},
+                         {0.5f * unseen, 10},
+                         {beyond(unseen).cwiseProduct(Eigen::Vector3f(3, 1, 5)), 10}}),
+                 *classes);
+  evaluation.add(scanOf({{shared, 10}}), *classes);
+  const SemanticMap map = mapOf({shared.cast<double>(), unseen.cast<double>(), left.cast<double>()});
+  DynamicsQuality quality = evaluation.compare(map);
+  EXPECT_EQ(quality.moving_points, 5u);
+  EXPECT_EQ(quality.moving_removed, 1u);
+  EXPECT_EQ(quality.moving_shared, 1u);
+  EXPECT_EQ(quality.moving_unseen, 1u);
+  EXPECT_EQ(quality.decidable_points, 3u);
+  EXPECT_EQ(quality.decidable_removed, 1u);
+  EXPECT_DOUBLE_EQ(quality.decidableAccuracy(), 1.0 / 3.0);
+
+  // What comes back must be seen to leave again, also after the first half of the scans.
+  evaluation.add(scanOf({{left, 20}, {seen, 20}}), *classes);
+  evaluation.add(scanOf({{beyond(seen), 10}}), *classes);
+  evaluation.add(scanOf({{{20.5f, 20.5f, 0.5f}, 10}}), *classes);
+  quality = evaluation.compare(map);
+  EXPECT_EQ(quality.moving_unseen, 3u);
+  EXPECT_EQ(quality.decidable_points, 1u);
+  EXPECT_DOUBLE_EQ(quality.decidableAccuracy(), 1.0);
+}
+
 TEST(DynamicsQuality, NothingToCountIsNoNumber) {
   const DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
   const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}));
