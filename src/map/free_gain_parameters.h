@@ -33,6 +33,12 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
           "Evidence from hits over which a gain g above 1 falls, to 1 + (g - 1) exp(-evidence / "
           "persistence). Set it to the evidence of a few scans to keep what is hit again and again, "
           "such as parked cars; 0 keeps gains constant."),
+      realParameter(
+          "remaining", &C::remaining, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
+          Changes::kWhileMapping,
+          "Factor on the evidence for free by which what cannot move holds a voxel that something movable "
+          "with more evidence has left, such as the floor under the feet of a walker. 0 calls such voxels "
+          "free."),
   };
 }
 

@@ -25,7 +25,7 @@ BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
     }
     const float gain = map.freeGain(id, 0.0f);
     const bool decays = gain > 1.0f && map.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
-    planes.planes[planes.count++] = {block.plane(p), id, gain, decays};
+    planes.planes[planes.count++] = {block.plane(p), id, gain, decays, map.isFixed(id)};
   }
   return planes;
 }
@@ -86,7 +86,8 @@ void readBlock(const SemanticMap& map, const Block& block, BlockFields fields, B
 
 VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset) {
   // Units are whole numbers, of which doubles hold the sum over all classes exactly.
-  EvidenceUnits best_units = 0, free_units = 0;
+  EvidenceUnits best_units = 0, free_units = 0, fixed_units = 0;
+  ClassId fixed = kFreeClass;  // the likeliest of the classes that cannot move
   double units_of_classes = 0.0;
   VoxelView view;
   const auto& classes = block.classes();
@@ -101,12 +102,25 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int off
       best_units = units;
       view.label = classes[i];
     }
+    if (units > fixed_units && map.isFixed(classes[i])) {
+      fixed_units = units;
+      fixed = classes[i];
+    }
   }
   constexpr double kUnit = kEvidenceUnit;
-  const double best = kUnit * best_units, free = kUnit * free_units, of_classes = kUnit * units_of_classes;
-  const float gain = map.freeGain(view.label, static_cast<float>(best));
+  const double free = kUnit * free_units, of_classes = kUnit * units_of_classes;
+  float gain = map.freeGain(view.label, static_cast<float>(kUnit * best_units));
+  bool holds = isOccupied(best_units, gain, free_units);
+  if (!holds && map.remainingGain() > 0.0f && fixed != view.label &&
+      isOccupied(fixed_units, map.remainingGain(), free_units)) {
+    holds = true;
+    best_units = fixed_units;
+    view.label = fixed;
+    gain = map.remainingGain();
+  }
+  const double best = kUnit * best_units;
   if (best_units > 0 || free_units > 0) {
-    view.state = isOccupied(best_units, gain, free_units) ? VoxelState::kOccupied : VoxelState::kFree;
+    view.state = holds ? VoxelState::kOccupied : VoxelState::kFree;
   } else if (block.occlusion()[static_cast<std::size_t>(offset)]) {
     view.state = VoxelState::kOccluded;
   }

@@ -140,6 +140,8 @@ SemanticMap SemanticMap::emptyLikeThis() const {
   SemanticMap empty(geometry_, prior_, class_count_);
   empty.free_gains_ = free_gains_;
   empty.gain_persistence_ = gain_persistence_;
+  empty.remaining_gain_ = remaining_gain_;
+  empty.fixed_ = fixed_;
   return empty;
 }
 

@@ -115,6 +115,28 @@ template <bool kPosterior>
   return LoadU(exact);
 }
 
+/// Equation 12a: where the likeliest class does not hold a voxel, the likeliest of the fixed classes may.
+/// What holds it becomes what was found. @return the voxels that are occupied.
+[[gnu::always_inline]] inline Mask keepRemaining(const BlockPlanes& planes, IntVec free, int v,
+                                                 Mask is_occupied, Likeliest& found) {
+  const float gain = planes.map->remainingGain();
+  const Mask left = ~is_occupied & (found.best > 0);
+  if (!(gain > 0.0f) || !AnyTrue(left)) return is_occupied;
+  Likeliest fixed = {{}, Set(kFreeClass), Set(gain), {}, {{}, {}}, {{}, {}}};
+  for (std::size_t p = 0; p < planes.count; ++p) {
+    const BlockPlanes::Plane& plane = planes.planes[p];
+    if (!plane.fixed) continue;
+    const IntVec units = Max(LoadU(plane.units + v), IntVec{});
+    fixed.label = IfThenElse(units > fixed.best, Set(plane.id), fixed.label);
+    fixed.best = Max(units, fixed.best);
+  }
+  const Mask remains = left & (fixed.best > 0) & (fixed.label != found.label) & occupied(fixed, free);
+  found.best = IfThenElse(remains, fixed.best, found.best);
+  found.label = IfThenElse(remains, fixed.label, found.label);
+  found.gain = IfThenElse(remains, fixed.gain, found.gain);
+  return is_occupied | remains;
+}
+
 /// What the entropy needs beyond Likeliest.
 struct Concentrations {
   float prior;
@@ -180,11 +202,12 @@ struct Priors {
   }
 };
 
-/// Equations 10 and 13 of a vector of voxels.
+/// Equations 10 and 13 of a vector of voxels. @param found what decides the state: the likeliest class, or
+/// what remains.
 template <bool kEntropy>
 [[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
-                                                  const Likeliest& found, IntVec free, Mask is_occupied,
-                                                  int v, BlockView& view) {
+                                                  const Likeliest& likeliest, const Likeliest& found,
+                                                  IntVec free, Mask is_occupied, int v, BlockView& view) {
   ExactSum total = found.classes;
   total.add(free);
   const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
@@ -207,9 +230,9 @@ template <bool kEntropy>
   if constexpr (!kEntropy) return;
 
   others = total;
-  others.subtract(Max(found.best, free));
+  others.subtract(Max(likeliest.best, free));
   const Concentrations c = {prior.once, inverse_sum, prior.classes + others.evidence()};
-  StoreU(entropyOf(planes, found, free, c, v), view.entropy.data() + v);
+  StoreU(entropyOf(planes, likeliest, free, c, v), view.entropy.data() + v);
 }
 
 /// Copies the posterior of one vector of voxels to another.
@@ -232,6 +255,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     const IntVec free = Max(LoadU(planes.free + v), IntVec{});
     Likeliest found = findLikeliest<kPosterior>(planes, v);
     const Mask is_known = (found.best | free) != 0;
+    const Likeliest likeliest = found;
     Mask is_occupied = found.best > 0;
     // Elsewhere the gain makes no difference to the state.
     const Mask disputed = is_occupied & (free > 0);
@@ -239,6 +263,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       if constexpr (!kPosterior) findGains(planes, found);
       decay(planes, free, found);
       is_occupied &= occupied(found, free);
+      is_occupied = keepRemaining(planes, free, v, is_occupied, found);
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
     const IntVec state = (is_known & 1) - is_occupied, label = found.label | ~is_occupied;
@@ -252,7 +277,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       continue;
     }
     if (!AnyTrue(is_known)) unknown = v;
-    storePosterior<kEntropy>(planes, prior, found, free, is_occupied, v, view);
+    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, v, view);
   }
 }
 

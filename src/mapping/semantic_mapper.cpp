@@ -52,6 +52,13 @@ std::string megabytes(double bytes) {
   return numberText(std::round(bytes / 1e6)) + " MB";
 }
 
+/// The classes that cannot move: those without the flag dynamic, except the unlabelled one.
+SemanticMap::Classes fixedClasses(const ClassTable& classes) {
+  SemanticMap::Classes fixed;
+  for (const SemanticClass& c : classes.classes()) fixed[c.id] = !c.dynamic && !c.unlabelled;
+  return fixed;
+}
+
 UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   UpdateRules rules;
   rules.hits_before_misses = config.free_space.hits_before_misses;
@@ -60,7 +67,7 @@ UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   if (config.scan_limit.free > 0.0) rules.most_free = static_cast<float>(config.scan_limit.free);
   rules.free_threshold = static_cast<float>(config.scan_limit.free_threshold);
   rules.void_evidence = static_cast<float>(config.scan_limit.void_space);
-  for (const SemanticClass& c : classes.classes()) rules.fixed[c.id] = !c.dynamic && !c.unlabelled;
+  rules.fixed = fixedClasses(classes);
   return rules;
 }
 
@@ -145,6 +152,7 @@ SemanticMapper::~SemanticMapper() = default;
 
 void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
+  map_.setRemainingGain(config_.free_gain.remaining, fixedClasses(*classes_));
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     double of_kind = gain.static_classes;

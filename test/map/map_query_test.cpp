@@ -90,6 +90,8 @@ struct RandomVoxel {
   std::vector<std::pair<int, float>> evidence;  ///< by class; may be empty
   std::array<double, 3> gains;
   double persistence;
+  double remaining = 0.0;  ///< gain of what remains
+  SemanticMap::Classes fixed;
 
   explicit RandomVoxel(std::mt19937& random) {
     std::uniform_real_distribution<float> exponent(-6.0f, 6.0f);
@@ -103,6 +105,7 @@ struct RandomVoxel {
     SemanticMap map = mapWith(evidence, 77);
     for (std::size_t id = 0; id < gains.size(); ++id) map.setFreeGain(static_cast<ClassId>(id), gains[id]);
     map.setGainPersistence(persistence);
+    map.setRemainingGain(remaining, fixed);
     return viewPoint(map, map.geometry().voxelCentre(GridGeometry::voxelOf({{0, 0, 0}}, 77)));
   }
   /// The same with evidence added. @param id of a class, or kFreeClass.
@@ -149,6 +152,63 @@ TEST(MapQuery, StatesAgreeWithTheOccupancy) {
   EXPECT_GT(occupied, 300);
   EXPECT_GT(free, 300);
   EXPECT_GT(above, 200);
+}
+
+/// The evidence of a class, as it was added and rounded.
+double evidenceOf(const RandomVoxel& voxel, int id) {
+  double sum = 0.0;
+  for (const auto& [other, value] : voxel.evidence)
+    if (other == id) sum += static_cast<double>(kEvidenceUnit) * unitsOf(static_cast<double>(value));
+  return sum;
+}
+
+TEST(MapQuery, WhatCannotMoveRemains) {
+  // Equations 11, 12 and 12a, written down plainly.
+  std::mt19937 random(5);
+  int remained = 0, cleared = 0;
+  for (int n = 0; n < 20000; ++n) {
+    RandomVoxel voxel(random);
+    voxel.remaining = n % 4 == 0 ? 0.0 : std::exp2(static_cast<double>(random() % 9) - 6.0);
+    for (std::size_t id = 0; id < 3; ++id) {
+      voxel.fixed[id] = random() % 2 == 0;
+      if (!voxel.fixed[id]) voxel.gains[id] *= 100.0;
+    }
+    const double free = evidenceOf(voxel, kFreeClass);
+    int likeliest = 0, fixed = -1;
+    for (int id = 0; id < 3; ++id) {
+      if (evidenceOf(voxel, id) > evidenceOf(voxel, likeliest)) likeliest = id;
+      const bool more = fixed < 0 || evidenceOf(voxel, id) > evidenceOf(voxel, fixed);
+      if (voxel.fixed[static_cast<std::size_t>(id)] && more) fixed = id;
+    }
+    int label = kFreeClass;
+    if (evidenceOf(voxel, likeliest) == 0.0) {
+      if (free == 0.0) continue;
+    } else if (evidenceOf(voxel, likeliest) >= voxel.gain() * free) {
+      label = likeliest;
+    } else if (fixed >= 0 && !voxel.fixed[static_cast<std::size_t>(likeliest)] && voxel.remaining > 0.0 &&
+               evidenceOf(voxel, fixed) >= voxel.remaining * free) {
+      label = fixed;
+      ++remained;
+    } else {
+      ++cleared;
+    }
+    const VoxelView view = voxel.view();
+    EXPECT_EQ(view.label, label) << n;
+    EXPECT_EQ(view.state, label == kFreeClass ? VoxelState::kFree : VoxelState::kOccupied) << n;
+    if (label != fixed || label == likeliest || label == kFreeClass) continue;
+    double squares = 0.0, sum = free + 4 * kPrior;
+    for (int id = 0; id < 3; ++id) {
+      squares += std::pow(kPrior + evidenceOf(voxel, id), 2);
+      sum += evidenceOf(voxel, id);
+    }
+    const double alpha = kPrior + evidenceOf(voxel, fixed);
+    EXPECT_NEAR(view.class_probability, alpha * alpha / squares, 1e-6) << n;
+    EXPECT_NEAR(view.probability, alpha / sum, 1e-6) << n;
+    EXPECT_NEAR(view.occupancy, occupancyOf(evidenceOf(voxel, fixed), std::max(1.0, voxel.remaining) * free),
+                1e-6);
+  }
+  EXPECT_GT(remained, 200);
+  EXPECT_GT(cleared, 300);
 }
 
 TEST(MapQuery, ProbabilitiesGrowWithTheirEvidence) {

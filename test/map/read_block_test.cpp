@@ -67,6 +67,11 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
   for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
     map.setFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
   }
+  if (kind.gains) {
+    SemanticMap::Classes fixed;
+    for (std::size_t id = 0; id < kind.classes; ++id) fixed[id] = random() % 2 == 0;
+    map.setRemainingGain(random() % 4 == 0 ? 0.0 : kGains[random() % std::size(kGains)], fixed);
+  }
   if (kind.persistence) map.setGainPersistence(std::exp2(static_cast<double>(random() % 20) - 10.0));
   return map;
 }
@@ -144,18 +149,25 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
 TEST(ReadBlock, DecidesByTheLastUnit) {
   for (const std::string& set : instructionSets()) {
     for (const double gain : {1.0, 0.5, 2.0, 0.1, 4.0}) {
-      SemanticMap map(GridGeometry(0.3), 0.001, 3);
-      map.setFreeGain(1, gain);
-      Block& block = map.getOrAllocate({{0, 0, 0}});
-      std::vector<EvidenceUnits> hits(kBlockVoxels), free(kBlockVoxels);
-      for (int v = 0; v < kBlockVoxels; ++v) {
-        const auto at = static_cast<std::size_t>(v);
-        free[at] = 1 << (v % 29);
-        hits[at] = static_cast<EvidenceUnits>(std::lround(gain * free[at])) + v / 29 % 3 - 1;
+      for (const int round : {0, 1}) {
+        SemanticMap map(GridGeometry(0.3), 0.001, 3);
+        // The class holds the voxel itself, or remains of another, with the same gain.
+        const bool remains = round == 1;
+        map.setFreeGain(remains ? 0 : 1, remains ? 1e6 : gain);
+        if (remains) map.setRemainingGain(gain, SemanticMap::Classes(0b10));
+        Block& block = map.getOrAllocate({{0, 0, 0}});
+        std::vector<EvidenceUnits> hits(kBlockVoxels), free(kBlockVoxels);
+        for (int v = 0; v < kBlockVoxels; ++v) {
+          const auto at = static_cast<std::size_t>(v);
+          free[at] = 1 << (v % 29);
+          hits[at] = static_cast<EvidenceUnits>(std::lround(gain * free[at])) + v / 29 % 3 - 1;
+        }
+        block.add(1, hits.data());
+        block.add(kFreeClass, free.data());
+        for (EvidenceUnits& units : hits) ++units;
+        if (remains) block.add(0, hits.data());
+        compare(map, set, "gain " + std::to_string(gain));
       }
-      block.add(1, hits.data());
-      block.add(kFreeClass, free.data());
-      compare(map, set, "gain " + std::to_string(gain));
     }
   }
 }

@@ -349,7 +349,8 @@ TEST(Bounds, NoSettingMakesEvidenceInfinite) {
                                "scan_limit/free",
                                "scan_limit/free_threshold",
                                "scan_limit/void",
-                               "free_gain/persistence"};
+                               "free_gain/persistence",
+                               "free_gain/remaining"};
   for (const char* name : names) {
     MapperConfig config;
     EXPECT_THROW(setParameters(config, {{name, "1e39"}}), std::invalid_argument) << name;

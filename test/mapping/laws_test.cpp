@@ -439,6 +439,14 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   const SemanticMapper persistent(config, std::make_shared<ClassTable>("gains", classes));
   EXPECT_FLOAT_EQ(persistent.map().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
   EXPECT_EQ(persistent.map().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
+  EXPECT_EQ(persistent.map().remainingGain(), 0.0f);
+  config.free_gain.remaining = 0.25;
+  const SemanticMapper remaining(config, std::make_shared<ClassTable>("gains", classes));
+  EXPECT_EQ(remaining.map().remainingGain(), 0.25f);
+  EXPECT_FALSE(remaining.map().isFixed(0)) << "what is unlabelled may move";
+  EXPECT_TRUE(remaining.map().isFixed(1));
+  EXPECT_FALSE(remaining.map().isFixed(2));
+  EXPECT_FALSE(remaining.map().isFixed(kFreeClass));
 }
 
 }  // namespace

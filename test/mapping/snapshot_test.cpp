@@ -80,12 +80,15 @@ TEST(Snapshot, KeepsGainsAndGeometry) {
   SemanticMap map(GridGeometry(0.25), 0.002, 3);
   map.setFreeGain(1, 3.0);
   map.setGainPersistence(2.0);
+  map.setRemainingGain(0.5, SemanticMap::Classes(0b100));
   const SemanticMap snapshot = map.snapshot();
   EXPECT_EQ(snapshot.geometry().resolution(), 0.25);
   EXPECT_EQ(snapshot.prior(), 0.002);
   EXPECT_EQ(snapshot.classCount(), 3u);
   EXPECT_EQ(snapshot.freeGain(1, 1.0f), map.freeGain(1, 1.0f));
   EXPECT_NE(snapshot.freeGain(1, 1.0f), 1.0f);
+  EXPECT_EQ(snapshot.remainingGain(), 0.5f);
+  EXPECT_TRUE(snapshot.isFixed(2) && !snapshot.isFixed(1));
 }
 
 std::vector<Scan> someScans() {

@@ -14,6 +14,10 @@ struct FreeGainConfig {
 
   /// Evidence of hits over which a gain g > 1 decays, to 1 + (g - 1) exp(-hits / persistence); 0: never.
   double persistence = 0.0;
+
+  /// Gain by which the likeliest class that cannot move holds a voxel, where one that can move has more
+  /// evidence and has left; 0: such a voxel is free.
+  double remaining = 0.0;
 };
 
 }  // namespace bki_mapping

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -62,9 +63,20 @@ class SemanticMap {
   }
   /// @param persistence in units of evidence; 0: gains do not decay.
   void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
+
+  using Classes = std::bitset<256>;
+  /// Gain by which the likeliest of the fixed classes, those that cannot move, holds a voxel that its
+  /// likeliest class does not; 0, the default: such a voxel is free (Equation 12a in docs/method.md).
+  float remainingGain() const { return remaining_gain_; }
+  bool isFixed(ClassId id) const { return fixed_[id]; }
+  void setRemainingGain(double gain, const Classes& fixed) {
+    remaining_gain_ = static_cast<float>(gain);
+    fixed_ = fixed;
+  }
   /// Whether equal blocks of both maps have the same states and labels.
   bool decidesAs(const SemanticMap& other) const {
-    return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_;
+    return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_ &&
+           remaining_gain_ == other.remaining_gain_ && (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
   }
 
   /// All blocks, in unspecified order: a range for `for (const auto& [index, block] : map.entries())`.
@@ -182,7 +194,8 @@ class SemanticMap {
   double prior_;
   std::size_t class_count_;
   std::array<float, 256> free_gains_;
-  float gain_persistence_ = 0.0f;
+  float gain_persistence_ = 0.0f, remaining_gain_ = 0.0f;
+  Classes fixed_;
   std::vector<SharedRegion> regions_;
   GridTable region_position_;  ///< of each region in regions_
   std::size_t size_ = 0;       ///< number of blocks

@@ -40,6 +40,7 @@ const std::vector<std::string> kNumbers = {"free_space_gap",
                                            "free_gain_living",
                                            "free_gain_static",
                                            "free_gain_persistence",
+                                           "free_gain_remaining",
                                            "scan_limit_hits",
                                            "scan_limit_free",
                                            "scan_limit_free_threshold",
@@ -80,8 +81,8 @@ void setAllowed(Config& config, Dice& dice) {
   for (const char* name : {"free_gain_dynamic", "free_gain_static"}) {
     if (sometimes()) set(config, name, dice.between(0.01, 100.0));
   }
-  for (const char* name : {"free_gain_living", "free_gain_persistence", "scan_limit_hits", "scan_limit_free",
-                           "scan_limit_void"}) {
+  for (const char* name : {"free_gain_living", "free_gain_persistence", "free_gain_remaining",
+                           "scan_limit_hits", "scan_limit_free", "scan_limit_void"}) {
     if (sometimes()) set(config, name, dice.oneIn(2) ? 0.0 : dice.between(0.01, 10.0));
   }
   if (sometimes()) set(config, "sensor_model_min_range", dice.between(0.0, 2.0));
