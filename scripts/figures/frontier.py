@@ -19,6 +19,8 @@ STEPS = {
     '+ free_gain/dynamic 16': {'free_gain/dynamic': 16},
     '+ free_gain/persistence 0.5': {'free_gain/persistence': 0.5},
     '+ free_gain/living 10000': {'free_gain/living': 10000},
+    '+ scan_limit/void 24': {'scan_limit/void': 24, 'kernel/scale': 20, 'free_gain/static': 0.0005},
+    '+ free_gain/remaining 0.1': {'free_gain/remaining': 0.1},
 }
 
 
@@ -121,7 +123,10 @@ def draw(programs, sequence, name, title, presets, output):
     figures_of = {}
     for file in sorted(os.listdir(presets)):
         preset = file[:-len('.yaml')]
-        figures_of[preset] = programs.evaluate(sequence, {}, ['--config', os.path.join(presets, file)])
+        words = ['--config', os.path.join(presets, file)]
+        if preset == 'occupancy_only':  # it is for clouds without labels
+            words += ['--classes', 'occupancy']
+        figures_of[preset] = programs.evaluate(sequence, {}, words)
         rows.append(row_of('preset ' + preset, figures_of[preset]))
     calibration = draw_calibration(figures_of, name, output)
     draw_frontier(rows, name, title, output)

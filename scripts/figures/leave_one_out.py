@@ -11,8 +11,7 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-GAINS = {'dynamic': (20, 50, 150, 500), 'living': (3e4, 3e5), 'static': (0.0005, 0.002),
-         'persistence': (0.03, 0.05, 0.08, 0.12)}
+GAINS = {'persistence': (0.03, 0.04, 0.05), 'dynamic': (50, 100, 200), 'remaining': (0.05, 0.2)}
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
@@ -74,7 +73,7 @@ def main():
     parser.add_argument('--programs', default='build/devel/lib/bki_mapping', help='folder with the programs of the package')
     parser.add_argument('--presets', default='config/presets', help='folder with the presets')
     parser.add_argument('--scratch', required=True, help='folder for simulated drives')
-    parser.add_argument('--void', type=float, nargs='+', default=[0.6], help='values of scan_limit/void to compare')
+    parser.add_argument('--void', type=float, nargs='+', default=[2.4], help='values of scan_limit/void to compare')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
     given = parser.parse_args()

@@ -112,6 +112,7 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int off
   float gain = map.freeGain(view.label, static_cast<float>(kUnit * best_units));
   bool holds = isOccupied(best_units, gain, free_units);
   if (!holds && map.remainingGain() > 0.0f && fixed != view.label &&
+      fixed_units > (best_units - 1) >> kRemainingShift &&
       isOccupied(fixed_units, map.remainingGain(), free_units)) {
     holds = true;
     best_units = fixed_units;

@@ -49,6 +49,8 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const Block& 
 
 /// Whether a voxel with evidence is occupied: Equation 11 in docs/method.md, decided on whole units.
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free);
+/// log2 of the share that (12a) asks of what remains: a quarter of the evidence of what has left.
+constexpr int kRemainingShift = 2;
 /// SemanticMap::freeGain, compiled for any processor.
 float decayedGain(const SemanticMap& map, ClassId id, float hits);
 

@@ -130,7 +130,9 @@ template <bool kPosterior>
     fixed.label = IfThenElse(units > fixed.best, Set(plane.id), fixed.label);
     fixed.best = Max(units, fixed.best);
   }
-  const Mask remains = left & (fixed.best > 0) & (fixed.label != found.label) & occupied(fixed, free);
+  const Mask is_large = fixed.best > (found.best - 1) >> kRemainingShift;  // at least that share, rounded up
+  const Mask remains =
+      left & (fixed.best > 0) & (fixed.label != found.label) & is_large & occupied(fixed, free);
   found.best = IfThenElse(remains, fixed.best, found.best);
   found.label = IfThenElse(remains, fixed.label, found.label);
   found.gain = IfThenElse(remains, fixed.gain, found.gain);

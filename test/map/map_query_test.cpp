@@ -166,7 +166,7 @@ TEST(MapQuery, WhatCannotMoveRemains) {
   // Equations 11, 12 and 12a, written down plainly.
   std::mt19937 random(5);
   int remained = 0, cleared = 0;
-  for (int n = 0; n < 20000; ++n) {
+  for (int n = 0; n < 50000; ++n) {
     RandomVoxel voxel(random);
     voxel.remaining = n % 4 == 0 ? 0.0 : std::exp2(static_cast<double>(random() % 9) - 6.0);
     for (std::size_t id = 0; id < 3; ++id) {
@@ -186,6 +186,7 @@ TEST(MapQuery, WhatCannotMoveRemains) {
     } else if (evidenceOf(voxel, likeliest) >= voxel.gain() * free) {
       label = likeliest;
     } else if (fixed >= 0 && !voxel.fixed[static_cast<std::size_t>(likeliest)] && voxel.remaining > 0.0 &&
+               4.0 * evidenceOf(voxel, fixed) >= evidenceOf(voxel, likeliest) &&
                evidenceOf(voxel, fixed) >= voxel.remaining * free) {
       label = fixed;
       ++remained;
@@ -209,6 +210,26 @@ TEST(MapQuery, WhatCannotMoveRemains) {
   }
   EXPECT_GT(remained, 200);
   EXPECT_GT(cleared, 300);
+}
+
+TEST(MapQuery, WhatRemainsIsAtLeastAQuarter) {
+  const auto state = [](EvidenceUnits moved, EvidenceUnits fixed) {
+    SemanticMap map(GridGeometry(1.0), kPrior, 3);
+    for (const auto& [id, units] : {std::pair{1, moved}, {2, fixed}, {int{kFreeClass}, 1}}) {
+      EvidenceUnits plane[kBlockVoxels] = {};
+      plane[77] = units;
+      map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(id), plane);
+    }
+    map.setFreeGain(1, 1e12);
+    map.setRemainingGain(1e-6, SemanticMap::Classes(0b100));
+    return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
+  };
+  for (const EvidenceUnits quarter : {1, 2, 1000, 1 << 28}) {
+    EXPECT_EQ(state(4 * (quarter - 1) + 3, quarter), VoxelState::kOccupied) << quarter;
+    if (quarter == 1 << 28) break;  // four times as much is out of range
+    EXPECT_EQ(state(4 * quarter, quarter), VoxelState::kOccupied) << quarter;
+    EXPECT_EQ(state(4 * quarter + 1, quarter), VoxelState::kFree) << quarter;
+  }
 }
 
 TEST(MapQuery, ProbabilitiesGrowWithTheirEvidence) {
