@@ -96,6 +96,7 @@ class RandomChanges {
         break;
       case 4:
         map.setGainPersistence(draw(2) == 0 ? 0.0 : 3.0 * unit());
+        map.setRemainingGain(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
         break;
       case 5:
         if (draw(15) == 0) map.clear();
