@@ -10,7 +10,7 @@ std::set<std::uint32_t> DynamicsEvaluation::movingOfSemanticKitti() {
   return {252, 253, 254, 255, 256, 257, 258, 259};
 }
 
-void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
+void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
   const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
@@ -34,7 +34,7 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes) {
     voxel.seen_again = false;
     unseen_.push_back(n);
   }
-  findSeenAgain(scan);
+  findSeenAgain(whole);
   ++added_;
 }
 

@@ -87,7 +87,10 @@ class DynamicsEvaluation {
 
   /// Adds the next scan. Skips points that are not finite, unlabelled, or have a label outside of the class
   /// table. Ids of the class table do not say what moves: points labelled by id all count as static.
-  void add(const Scan& scan, const ClassTable& classes);
+  void add(const Scan& scan, const ClassTable& classes) { add(scan, classes, scan); }
+  /// The same of a scan that lacks points. @param whole the scan with all of its beams, whatever their
+  /// labels.
+  void add(const Scan& scan, const ClassTable& classes, const Scan& whole);
 
   /// Whether what moved through a voxel has left it: no point of the last scans hits the voxel, and it is not
   /// taken. @param taken may be empty.

@@ -89,7 +89,7 @@ struct Evaluation {
 
   /// The same for a scan without labels: the ground-truth cloud, if there is one, says what moves.
   void addUnlabelled(const Scan& scan, const ClassTable& classes) {
-    dynamics.add(cloud ? cloud->labelled(scan) : Scan(), classes);
+    dynamics.add(cloud ? cloud->labelled(scan) : Scan(), classes, scan);
     addPoints(scan);
   }
 
