@@ -159,10 +159,12 @@ void StateMap::takeOver(const StateMap& earlier) {
     }
     states->owners_.share();
     known.states.store(states, std::memory_order_relaxed);
+    auto kept = earlier.keptFrontiers(before);
+    if (!kept) continue;
     const GridIndex& r = region.index();
     if (is_same({r.x - 1, r.y, r.z}) && is_same({r.x + 1, r.y, r.z}) && is_same({r.x, r.y - 1, r.z}) &&
         is_same({r.x, r.y + 1, r.z}) && is_same({r.x, r.y, r.z - 1}) && is_same({r.x, r.y, r.z + 1})) {
-      known.frontiers = earlier.keptFrontiers(before);
+      known.frontiers = std::move(kept);
     }
   }
 }
