@@ -9,7 +9,7 @@ namespace bki_mapping {
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
 
 /// Environment variable that names the fastest instruction set which a process may use, so that processors
-/// that differ compute the same bits. Read once, when the first map or mapper is made.
+/// that differ compute the same bits. Read once, when the first mapper is made or the first block is read.
 constexpr const char* kInstructionSetVariable = "BKI_MAPPING_INSTRUCTION_SET";
 
 /// The names of the instruction sets that this build and this processor have, and the environment allows,

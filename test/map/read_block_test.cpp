@@ -172,6 +172,31 @@ TEST(ReadBlock, DecidesByTheLastUnit) {
   }
 }
 
+TEST(ReadBlock, WhatRemainsIsAQuarterOfWhatHasLeft) {
+  for (const std::string& set : instructionSets()) {
+    SemanticMap map(GridGeometry(0.3), 0.001, 3);
+    map.setFreeGain(0, 1e12);
+    map.setRemainingGain(1e-6, SemanticMap::Classes(0b10));
+    std::vector<EvidenceUnits> left(kBlockVoxels), remains(kBlockVoxels);
+    const std::vector<EvidenceUnits> free(kBlockVoxels, 1);
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const auto at = static_cast<std::size_t>(v);
+      remains[at] = 1 << (v % 28);
+      left[at] = 4 * remains[at] + v / 28 % 7 - 3;
+    }
+    Block& block = map.getOrAllocate({{0, 0, 0}});
+    block.add(0, left.data());
+    block.add(1, remains.data());
+    block.add(kFreeClass, free.data());
+    BlockView view;
+    readBlock(viewKernelsFor(set), map, block, BlockFields::kStates, view);
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      const bool holds = left[v] <= 4 * remains[v];
+      EXPECT_EQ(view.label[v], holds ? 1 : kFreeClass) << set << ' ' << left[v] << ' ' << remains[v];
+    }
+  }
+}
+
 TEST(ReadBlock, ATinyPriorIsANumberStill) {
   for (const std::string& set : instructionSets()) {
     SemanticMap map(GridGeometry(0.3), 1e-300, 3);

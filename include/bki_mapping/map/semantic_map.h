@@ -56,11 +56,7 @@ class SemanticMap {
     if (gain <= 1.0f || gain_persistence_ <= 0.0f) return gain;
     return 1.0f + (gain - 1.0f) * std::exp(-hits / gain_persistence_);
   }
-  void setFreeGain(ClassId id, double gain) {
-    // Not infinite, whose product with no evidence would be no number.
-    constexpr double kMost = std::numeric_limits<float>::max();
-    free_gains_[id] = static_cast<float>(std::min(gain, kMost));
-  }
+  void setFreeGain(ClassId id, double gain) { free_gains_[id] = finite(gain); }
   /// @param persistence in units of evidence; 0: gains do not decay.
   void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
 
@@ -70,7 +66,8 @@ class SemanticMap {
   float remainingGain() const { return remaining_gain_; }
   bool isFixed(ClassId id) const { return fixed_[id]; }
   void setRemainingGain(double gain, const Classes& fixed) {
-    remaining_gain_ = static_cast<float>(gain);
+    constexpr double kLeast = std::numeric_limits<float>::min();  // 0 would switch the rule off
+    remaining_gain_ = gain > 0.0 ? finite(std::max(gain, kLeast)) : 0.0f;
     fixed_ = fixed;
   }
   /// Whether equal blocks of both maps have the same states and labels.
@@ -169,6 +166,12 @@ class SemanticMap {
   std::size_t indexBytes() const;
 
  private:
+  /// Not infinite, whose product with no evidence would be no number.
+  static float finite(double gain) {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    return static_cast<float>(std::min(gain, kMost));
+  }
+
   /// Regions are never empty.
   struct SharedRegion {
     std::shared_ptr<Region> region;
