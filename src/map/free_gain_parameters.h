@@ -36,9 +36,10 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
       realParameter(
           "remaining", &C::remaining, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
           Changes::kWhileMapping,
-          "Factor on the evidence for free by which what cannot move holds a voxel that something movable "
-          "with more evidence has left, such as the floor under the feet of a walker. 0 calls such voxels "
-          "free."),
+          "After something movable has left a voxel, a class that cannot move still occupies it if its "
+          "evidence is at least this factor times that for free, and a quarter of that for what has left: "
+          "the floor under the feet of a walker, for example. Smaller values keep more; 0 switches the rule "
+          "off."),
   };
 }
 

@@ -16,7 +16,7 @@ struct BlockPlanes {
     ClassId id;
     float gain;   ///< on the evidence for `free` in voxels whose likeliest class this is, before it decays
     bool decays;  ///< whether the gain depends on the evidence for the class
-    bool fixed;   ///< whether the class holds what its likeliest class has left
+    bool fixed;   ///< whether the class cannot move, and so may remain by (12a)
   };
 
   const SemanticMap* map;

@@ -15,8 +15,8 @@ struct FreeGainConfig {
   /// Evidence of hits over which a gain g > 1 decays, to 1 + (g - 1) exp(-hits / persistence); 0: never.
   double persistence = 0.0;
 
-  /// Gain by which the likeliest class that cannot move holds a voxel, where one that can move has more
-  /// evidence and has left; 0: such a voxel is free.
+  /// Where something movable has left, the likeliest class that cannot move still occupies a voxel if its
+  /// evidence is at least this factor times that for free, and a quarter of that for what has left; 0: never.
   double remaining = 0.0;
 };
 
