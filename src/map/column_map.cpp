@@ -83,7 +83,9 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
     }
     for (Cells& column : cells) column.clear();
     for (const std::int32_t z : blocks->second) {
-      readBlock(map, *map.find({{stack.first, stack.second, z}}), BlockFields::kStates, view);
+      const Block* const block = map.find({{stack.first, stack.second, z}});
+      if (!block) continue;  // erased, but not among the changed blocks
+      readBlock(map, *block, BlockFields::kStates, view);
       for (std::size_t v = 0; v < kBlockVoxels; ++v) {
         if (view.state[v] == VoxelState::kUnknown) continue;
         const auto layer = static_cast<std::int32_t>(v / cells.size());

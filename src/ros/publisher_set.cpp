@@ -68,6 +68,8 @@ void PublisherSet::closeChanges() {
   const std::lock_guard<std::mutex> lock(mutex_);
   closed_.add(changed_);
   changed_.clear();
+  closed_start_over_ = closed_start_over_ || start_over_;
+  start_over_ = false;
 }
 
 void PublisherSet::startOver() {
@@ -93,7 +95,7 @@ std::shared_ptr<const MapSnapshot> PublisherSet::takeSnapshot() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     std::swap(closed, closed_);
-    std::swap(start_over, start_over_);
+    std::swap(start_over, closed_start_over_);
   }
   for (const auto& publisher : publishers_) {
     if (!publisher->wanted()) {
@@ -108,7 +110,7 @@ std::shared_ptr<const MapSnapshot> PublisherSet::takeSnapshot() {
 
 std::vector<MapPublisher*> PublisherSet::findDue() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool any_change = start_over_ || !changed_.empty() || !closed_.empty();
+  const bool any_change = start_over_ || closed_start_over_ || !changed_.empty() || !closed_.empty();
   bool any_wanted = false;
   std::vector<MapPublisher*> due;
   for (const auto& publisher : publishers_) {
@@ -124,7 +126,7 @@ std::vector<MapPublisher*> PublisherSet::findDue() {
   if (!any_wanted) {
     changed_.clear();
     closed_.clear();
-    start_over_ = false;
+    start_over_ = closed_start_over_ = false;
   }
   return due;
 }

@@ -59,9 +59,10 @@ class PublisherSet {
   TakeSnapshot take_snapshot_;
   std::vector<std::unique_ptr<MapPublisher>> publishers_;
 
-  std::mutex mutex_;  ///< of the following three
+  std::mutex mutex_;  ///< of what follows
   ChangedBlocks changed_, closed_;
-  bool start_over_ = false;
+  /// A request after the snapshot was taken is for the next one: as after a reset.
+  bool start_over_ = false, closed_start_over_ = false;
 
   std::atomic<bool> running_{false};
   std::thread thread_;

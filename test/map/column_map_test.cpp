@@ -155,6 +155,17 @@ int costOf(const SemanticMap& map, const ClassTable& classes, const ColumnView& 
   return cost;
 }
 
+TEST_F(Columns, ErasedBlocksOfWhichNobodyToldDoNoHarm) {
+  add({{0, 0, 1}}, kRoad);
+  add({{0, 0, 9}}, kCar);
+  ColumnMap kept;
+  kept.update(map_, classes_);
+  map_.erase(GridGeometry::blockOf({{0, 0, 1}}));
+  kept.update(map_, classes_, {GridGeometry::blockOf({{0, 0, 9}})});
+  ASSERT_TRUE(kept.find({{0, 0, 0}}));
+  EXPECT_TRUE(std::isnan(kept.find({{0, 0, 0}})->ground)) << "the road is still there";
+}
+
 TEST_F(Columns, UpdatesEqualARecomputation) {
   std::mt19937 random(5);
   const auto draw = [&](int edge) {
