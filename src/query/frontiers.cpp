@@ -10,6 +10,14 @@ namespace {
 
 constexpr std::size_t kRegionsPerJob = 8;
 
+/// The frontiers of a region, which are kept for the next call. @param position its position in the map.
+std::shared_ptr<const RegionFrontiers> ofWholeRegion(const StateMap& states, std::uint32_t position) {
+  if (auto kept = states.keptFrontiers(position)) return kept;
+  auto made = std::make_shared<const RegionFrontiers>(states, states.map().regionAt(position), nullptr);
+  states.keepFrontiers(position, made);
+  return made;
+}
+
 /// Clusters the frontier voxels of all regions: those of each region, which are kept for the next call, and
 /// of these what is connected across regions.
 class FrontierFinder {
@@ -66,11 +74,7 @@ class FrontierFinder {
     if (box_ && !box_->containsRegion(region.index())) {
       return std::make_shared<const RegionFrontiers>(states_, region, &*box_);
     }
-    const auto position = static_cast<std::uint32_t>(r);
-    if (auto kept = states_.keptFrontiers(position)) return kept;
-    auto made = std::make_shared<const RegionFrontiers>(states_, region, nullptr);
-    states_.keepFrontiers(position, made);
-    return made;
+    return ofWholeRegion(states_, static_cast<std::uint32_t>(r));
   }
 
   /// Joins the parts of a region with those of regions around it.
@@ -183,6 +187,12 @@ class FrontierFinder {
 
 std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules) {
   return FrontierFinder(states, rules).clusters();
+}
+
+void prepareFrontiers(const StateMap& states, const std::function<bool()>& goes_on) {
+  for (std::size_t position = states.map().regionCount(); position-- > 0 && goes_on();) {
+    ofWholeRegion(states, static_cast<std::uint32_t>(position));
+  }
 }
 
 std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size) {

@@ -6,9 +6,20 @@
 #include "ros/service_answer.h"
 
 namespace bki_mapping::ros_interface {
+namespace {
+
+template <typename Request>
+RecentMap::Shared mapFor(RecentMap& map, const Request&) {
+  return map.get();
+}
+RecentMap::Shared mapFor(RecentMap& map, const GetFrontiers::Request& asked) {
+  return boxOf(asked) ? map.get() : map.getForFrontiers();
+}
+
+}  // namespace
 
 QueryServices::QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping, RecentMap::Take take)
-    : node_(node), map_(std::move(take), mapping, freeing_) {
+    : node_(node), map_(std::move(take), mapping, background_) {
   node_.setCallbackQueue(&queue_);
   offer<QueryPoints>("query_points");
   offer<CastRays>("cast_rays");
@@ -26,7 +37,7 @@ void QueryServices::offer(const std::string& name) {
   const boost::function<bool(Request&, Response&)> serve = [this](Request& asked, Response& response) {
     answer(response, [&] {
       Response made;  // so that a query that fails leaves the answer empty
-      query(*map_.get(), asked, made);
+      query(*mapFor(map_, asked), asked, made);
       response = std::move(made);
       return std::string();
     });

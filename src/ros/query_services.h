@@ -21,13 +21,13 @@ class QueryServices {
 
   /// Starts the threads.
   void start() {
-    freeing_thread_.start();
+    background_thread_.start();
     threads_.start();
   }
   /// Ends the threads. Until then the mapping queue must be served.
   void stop() {
     threads_.stop();
-    freeing_thread_.stop();
+    background_thread_.stop();
   }
   /// For the mapping thread, which reports changes.
   RecentMap& map() { return map_; }
@@ -37,13 +37,13 @@ class QueryServices {
   void offer(const std::string& name);
 
   ros::CallbackQueue queue_;
-  ros::CallbackQueue freeing_;  ///< of snapshots, which would pile up in memory behind long queries
+  ros::CallbackQueue background_;  ///< frees snapshots, which would pile up in memory behind long queries
   ros::NodeHandle node_;
   RecentMap map_;
   std::vector<ros::ServiceServer> services_;
   // More than one, so that a small query need not wait for a large one.
   ros::AsyncSpinner threads_{2, &queue_};
-  ros::AsyncSpinner freeing_thread_{1, &freeing_};
+  ros::AsyncSpinner background_thread_{1, &background_};
 };
 
 }  // namespace bki_mapping::ros_interface

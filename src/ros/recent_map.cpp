@@ -2,28 +2,37 @@
 
 #include <new>
 
+#include "bki_mapping/query/frontiers.h"
 #include "ros/queued_call.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
 
-/// Frees a snapshot in the thread that calls it: this takes long if the map has changed much since.
-class Release : public ros::CallbackInterface {
+/// A function that the thread of a queue calls.
+class Call : public ros::CallbackInterface {
  public:
-  explicit Release(RecentMap::Shared snapshot) : snapshot_(std::move(snapshot)) {}
+  explicit Call(std::function<void()> function) : function_(std::move(function)) {}
   CallResult call() override {
-    snapshot_.reset();
+    function_();
     return Success;
   }
 
  private:
-  RecentMap::Shared snapshot_;
+  std::function<void()> function_;
 };
 
 }  // namespace
 
+template <typename Function>
+void RecentMap::later(Function function) noexcept {
+  try {
+    background_.addCallback(ros::CallbackInterfacePtr(new Call(std::move(function))));
+  } catch (const std::bad_alloc&) {
+  }
+}
+
 RecentMap::Shared RecentMap::get() {
-  last_asked_ = Clock::now();
+  asked_ = Clock::now();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (kept_) return kept_;
@@ -47,14 +56,16 @@ void RecentMap::changed() noexcept {
   }
   if (!earlier) return;
   try {
-    keep(idle() ? nullptr : take_(earlier));
+    Shared taken = isRecent(asked_) ? take_(earlier) : nullptr;
+    keep(taken);
+    if (taken && isRecent(frontiers_asked_)) later([this, taken] { prepare(taken); });
   } catch (const std::exception&) {
     keep(nullptr);  // the next query asks again, and its answer says why there is none
   }
 }
 
 void RecentMap::releaseIfIdle() noexcept {
-  if (idle()) keep(nullptr);
+  if (!isRecent(asked_)) keep(nullptr);
 }
 
 void RecentMap::keep(Shared snapshot) noexcept {
@@ -62,10 +73,17 @@ void RecentMap::keep(Shared snapshot) noexcept {
     const std::lock_guard<std::mutex> lock(mutex_);
     kept_.swap(snapshot);
   }
-  if (!snapshot) return;
+  // Freeing takes long if the map has changed much since.
+  if (snapshot) later([freed = std::move(snapshot)]() mutable { freed.reset(); });
+}
+
+void RecentMap::prepare(const Shared& snapshot) {
   try {
-    freeing_.addCallback(ros::CallbackInterfacePtr(new Release(std::move(snapshot))));
-  } catch (const std::bad_alloc&) {  // then it is freed here
+    prepareFrontiers(snapshot->states, [&] {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return kept_ == snapshot;
+    });
+  } catch (const std::bad_alloc&) {  // then queries find them, or say why not
   }
 }
 

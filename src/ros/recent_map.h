@@ -48,30 +48,43 @@ class RecentMap {
   using Take = std::function<Shared(const QueriedMap* earlier)>;
 
   /// @param take is called in the mapping thread. @param mapping the queue that this thread serves.
-  /// @param freeing the queue of the thread that frees snapshots.
-  /// @param interest how long snapshots are taken after a query.
-  RecentMap(Take take, ros::CallbackQueue& mapping, ros::CallbackQueue& freeing,
+  /// @param background the queue of the thread that prepares and frees snapshots.
+  /// @param interest how long snapshots are taken, and prepared, after a query.
+  RecentMap(Take take, ros::CallbackQueue& mapping, ros::CallbackQueue& background,
             Clock::duration interest = std::chrono::seconds(10))
-      : take_(std::move(take)), mapping_(mapping), freeing_(freeing), interest_(interest) {}
+      : take_(std::move(take)), mapping_(mapping), background_(background), interest_(interest) {}
 
   /// The map as it was after its last change. For the threads of queries.
   /// @throws std::bad_alloc, and std::future_error when the server shuts down.
   Shared get();
+  /// The same for a query of the frontiers of the whole map, which takes long. They are found ahead in the
+  /// snapshots after it, in the background, as long as such queries are asked.
+  Shared getForFrontiers() {
+    frontiers_asked_ = Clock::now();
+    return get();
+  }
   /// Takes a snapshot of the changed map if queries are asked. For the mapping thread, after each change.
   void changed() noexcept;
   /// Gives the snapshot up if no queries are asked any more. For the mapping thread, now and then.
   void releaseIfIdle() noexcept;
 
  private:
+  using Time = std::atomic<Clock::time_point>;
+
   /// Replaces the snapshot.
   void keep(Shared snapshot) noexcept;
-  bool idle() const { return Clock::now() - last_asked_.load() > interest_; }
+  /// Finds the frontiers of the snapshot ahead, until there is a newer one.
+  void prepare(const Shared& snapshot);
+  /// Calls a function in the background; drops it at once if there is no memory for that.
+  template <typename Function>
+  void later(Function function) noexcept;
+  bool isRecent(const Time& asked) const { return Clock::now() - asked.load() <= interest_; }
 
   Take take_;
   ros::CallbackQueue& mapping_;
-  ros::CallbackQueue& freeing_;
+  ros::CallbackQueue& background_;
   Clock::duration interest_;
-  std::atomic<Clock::time_point> last_asked_{Clock::time_point()};
+  Time asked_{Clock::time_point()}, frontiers_asked_{Clock::time_point()};
   std::mutex mutex_;
   Shared kept_;  ///< nullptr while no queries are asked
 };

@@ -296,6 +296,31 @@ TEST(StateMap, IsAskedAndTakenOverAtOnce) {
   expectSameFrontiers(last->states);
 }
 
+TEST(Frontiers, PreparedInWholeOrInPartEqualLookingAtEveryVoxel) {
+  RandomChanges changes(4);
+  SemanticMap map = changes.emptyMap();
+  for (int n = 0; n < 80; ++n) changes.change(map);
+  const auto all = slowFrontiers(map);
+  const std::size_t regions = map.regionCount();
+  ASSERT_GT(regions, 3u);
+  for (const std::size_t most : {std::size_t{0}, regions / 2, regions}) {
+    const StateMap states(map, 1);
+    std::size_t prepared = 0;
+    prepareFrontiers(states, [&] { return prepared++ < most; });
+    std::size_t kept = 0;
+    for (std::uint32_t r = 0; r < regions; ++r) kept += states.keptFrontiers(r) != nullptr;
+    EXPECT_EQ(kept, most);
+    EXPECT_EQ(clustersOf(frontiers(states)), all);
+  }
+  for (int n = 0; n < 20; ++n) {
+    const StateMap states(map, 1);
+    std::thread ahead([&] { prepareFrontiers(states, [] { return true; }); });
+    const auto found = clustersOf(frontiers(states));
+    ahead.join();
+    ASSERT_EQ(found, all);
+  }
+}
+
 TEST(Frontiers, OfManyRegionsEqualLookingAtEveryVoxel) {
   RandomChanges changes(3);
   SemanticMap map = changes.emptyMap();

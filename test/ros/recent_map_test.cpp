@@ -29,13 +29,13 @@ class RecentMapTest : public testing::Test {
     return asked.get();
   }
   RecentMap make(RecentMap::Clock::duration interest) {
-    return RecentMap([this](const QueriedMap* earlier) { return take(earlier); }, mapping_, freeing_,
+    return RecentMap([this](const QueriedMap* earlier) { return take(earlier); }, mapping_, background_,
                      interest);
   }
 
   const ClassTable classes_{"one", {SemanticClass()}};
   SemanticMap map_{GridGeometry(1.0), 0.001, 1};
-  ros::CallbackQueue mapping_, freeing_;
+  ros::CallbackQueue mapping_, background_;
   int scans_ = 0, taken_ = 0;
   bool no_memory_ = false;
 };
@@ -54,19 +54,19 @@ TEST_F(RecentMapTest, IsTakenOnlyWhileQueriesAreAsked) {
   EXPECT_EQ(recent.get().get(), recent.get().get());
 }
 
-TEST_F(RecentMapTest, IsGivenUpAndFreedByItsOwnThread) {
+TEST_F(RecentMapTest, IsGivenUpAndFreedInTheBackground) {
   RecentMap recent = make(std::chrono::seconds(-1));  // idle at once
   std::weak_ptr<const QueriedMap> kept = askAndServe(recent);
   EXPECT_FALSE(kept.expired());
   mapScan(recent);
   EXPECT_EQ(taken_, 1);
   EXPECT_FALSE(kept.expired());
-  freeing_.callAvailable();
+  background_.callAvailable();
   EXPECT_TRUE(kept.expired());
   kept = askAndServe(recent);
   EXPECT_EQ(taken_, 2);
   recent.releaseIfIdle();
-  freeing_.callAvailable();
+  background_.callAvailable();
   EXPECT_TRUE(kept.expired());
 }
 
@@ -89,8 +89,30 @@ TEST_F(RecentMapTest, TakesOverWhatQueriesHaveFoundOut) {
   EXPECT_EQ(recent.get()->states.find({{0, 0, 0}}), decided);
   const std::weak_ptr<const QueriedMap> before = asked;
   asked = nullptr;
-  freeing_.callAvailable();
+  background_.callAvailable();
   EXPECT_TRUE(before.expired()) << "a snapshot must not keep earlier ones";
+}
+
+TEST_F(RecentMapTest, FindsFrontiersAheadOfQueriesThatAskForThem) {
+  const auto isPrepared = [](const QueriedMap& of) {
+    for (std::uint32_t position = 0; position < of.map.regionCount(); ++position) {
+      if (!of.states.keptFrontiers(position)) return false;
+    }
+    return true;
+  };
+  RecentMap recent = make(std::chrono::hours(1));
+  mapScan(recent);
+  askAndServe(recent);
+  mapScan(recent);
+  background_.callAvailable();
+  EXPECT_FALSE(isPrepared(*recent.get())) << "nobody has asked for frontiers";
+  EXPECT_FALSE(isPrepared(*recent.getForFrontiers()));
+  mapScan(recent);
+  const RecentMap::Shared passed = recent.get();
+  mapScan(recent);
+  background_.callAvailable();
+  EXPECT_TRUE(isPrepared(*recent.get()));
+  EXPECT_FALSE(isPrepared(*passed)) << "a newer snapshot took its place";
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -33,6 +34,10 @@ struct FrontierRules {
 /// first.
 /// @throws std::invalid_argument if the box is not finite, inside out, or reaches beyond the grid.
 std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules = {});
+/// Finds ahead what frontiers() of the whole map keeps, in another thread than those that ask. A search
+/// meanwhile shares the work: it starts with the regions that this comes to last.
+/// @param goes_on asked between two regions; returns false to stop.
+void prepareFrontiers(const StateMap& states, const std::function<bool()>& goes_on);
 /// Those of the whole map, with their voxels.
 std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size);
 

@@ -8,12 +8,17 @@
 
 namespace bki_mapping::ros_interface {
 
+std::optional<Eigen::AlignedBox3d> boxOf(const GetFrontiers::Request& asked) {
+  const Eigen::AlignedBox3d box(toVector(asked.min), toVector(asked.max));
+  if (box.min().isZero(0.0) && box.max().isZero(0.0)) return std::nullopt;
+  return box;
+}
+
 void query(const QueriedMap& map, const GetFrontiers::Request& asked, GetFrontiers::Response& answer) {
   FrontierRules rules;
   rules.min_size = asked.min_size;
   rules.with_voxels = asked.with_voxels;
-  const Eigen::AlignedBox3d box(toVector(asked.min), toVector(asked.max));
-  if (!box.min().isZero(0.0) || !box.max().isZero(0.0)) rules.box = box;
+  rules.box = boxOf(asked);
   std::vector<Frontier> found = frontiers(map.states, rules);
   if (asked.max_count > 0 && found.size() > asked.max_count) found.resize(asked.max_count);
   if (asked.with_voxels) {

@@ -9,6 +9,9 @@
 #include <bki_mapping/GetSection.h>
 #include <bki_mapping/QueryPoints.h>
 
+#include <Eigen/Geometry>
+#include <optional>
+
 #include "ros/recent_map.h"
 
 namespace bki_mapping::ros_interface {
@@ -23,5 +26,8 @@ void query(const QueriedMap& map, const GetNearestObstacles::Request& asked,
 void query(const QueriedMap& map, const GetSection::Request& asked, GetSection::Response& answer);
 void query(const QueriedMap& map, const GetFrontiers::Request& asked, GetFrontiers::Response& answer);
 void query(const QueriedMap& map, const GetDistances::Request& asked, GetDistances::Response& answer);
+
+/// The box to which a request limits the frontiers; without: it asks for those of the whole map.
+std::optional<Eigen::AlignedBox3d> boxOf(const GetFrontiers::Request& asked);
 
 }  // namespace bki_mapping::ros_interface
