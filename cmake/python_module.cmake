@@ -40,6 +40,11 @@ if(CMAKE_CROSSCOMPILING)
   message(STATUS "The Python module is left out of builds for another processor")
   return()
 endif()
+# Some package may have looked for Python without its headers. Newer versions of pybind11 (Debian 13) take it for found then, and
+# call python_add_library, which only the headers bring.
+if(Python_FOUND AND NOT COMMAND python_add_library)
+  find_package(Python QUIET COMPONENTS Interpreter Development)
+endif()
 find_package(pybind11 2.4 QUIET)
 if(NOT pybind11_FOUND OR NOT Python3_FOUND)
   message(STATUS "The Python module is left out; install pybind11-dev and python3-dev for it")
