@@ -181,7 +181,7 @@ py::object boundsOf(const FixedMap& map) {
   py::array_t<double> bounds({2, 3});
   std::copy_n(box.min().data(), 3, bounds.mutable_data(0, 0));
   std::copy_n(box.max().data(), 3, bounds.mutable_data(1, 0));
-  return std::move(bounds);
+  return py::object(std::move(bounds));
 }
 
 }  // namespace

@@ -273,7 +273,7 @@ py::object frontiersOf(const FixedMap& map, py::handle min_size, py::handle retu
   py::array found = ownedArray(
       std::move(records),
       structType({{"centre", "f8", offsetof(F, centre), 3}, {"size", "i8", offsetof(F, size)}}, sizeof(F)));
-  if (!rules.with_voxels) return std::move(found);
+  if (!rules.with_voxels) return py::object(std::move(found));
   return py::make_tuple(found, indexArray(voxels));
 }
 
