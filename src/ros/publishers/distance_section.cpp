@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 
 #include "bki_mapping/query/distance_field.h"
@@ -77,7 +78,7 @@ class DistanceSection : public MapPublisher {
   void bring(const StateMap& states, const Eigen::AlignedBox3d& region, const ObstacleRules& rules) {
     if (!field_ || !(field_->rules() == rules)) {
       field_.reset();
-      field_.emplace(states, region, rules);
+      field_ = std::make_unique<DistanceField>(states, region, rules);
     } else if (changed.all() || region.min() != region_.min() || region.max() != region_.max() ||
                manyChangedIn(states.geometry(), region)) {
       field_->compute(states, region);
@@ -144,8 +145,8 @@ class DistanceSection : public MapPublisher {
   /// Of a field, which takes 12 bytes a voxel.
   static constexpr double kMostVoxels = 1e7;
 
-  std::optional<DistanceField> field_;
-  Eigen::AlignedBox3d region_;  ///< of field_
+  std::unique_ptr<DistanceField> field_;  // in an optional, GCC 14 takes it for uninitialized
+  Eigen::AlignedBox3d region_;            ///< of field_
   SentenceThrottle throttle_;
 };
 
