@@ -105,8 +105,8 @@ std::string regionFile(const Json& region, const std::string& what) {
 }
 
 Eigen::Vector3d corner(const Json& bounds, const char* name, const std::string& what) {
-  const std::string of = "the bounds of " + what;
-  const Json& numbers = list(bounds, name, of);
+  const std::string owner = "the bounds of " + what;
+  const Json& numbers = list(bounds, name, owner);
   Eigen::Vector3d corner;
   if (numbers.size() != 3) throw Fault("a corner of the bounds of " + what + " has not three numbers");
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -132,8 +132,8 @@ CityRegion readRegion(const Json& region, const std::string& what, std::int64_t 
 }
 
 void readRegions(const Json& json, CityIndex& index) {
-  const std::string of = "the index";
-  const Json& regions = list(json, "regions", of);
+  const std::string owner = "the index";
+  const Json& regions = list(json, "regions", owner);
   if (regions.empty()) throw Fault("it lists no regions");
   std::set<std::string> files;
   for (std::size_t n = 0; n < regions.size(); ++n) {
@@ -156,8 +156,8 @@ void readRegions(const Json& json, CityIndex& index) {
 }
 
 void readDrives(const Json& json, CityIndex& index) {
-  const std::string of = "the index";
-  const Json& drives = list(json, "drives", of);
+  const std::string owner = "the index";
+  const Json& drives = list(json, "drives", owner);
   for (std::size_t n = 0; n < drives.size(); ++n) {
     const std::string what = "drive " + std::to_string(n + 1);
     index.drives.push_back(text(drives[n], "name", what));

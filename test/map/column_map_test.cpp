@@ -155,7 +155,7 @@ int costOf(const SemanticMap& map, const ClassTable& classes, const ColumnView& 
   return cost;
 }
 
-TEST_F(Columns, ErasedBlocksOfWhichNobodyToldDoNoHarm) {
+TEST_F(Columns, BlocksErasedWithoutNoticeDoNoHarm) {
   add({{0, 0, 1}}, kRoad);
   add({{0, 0, 9}}, kCar);
   ColumnMap kept;

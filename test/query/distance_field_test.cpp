@@ -139,8 +139,8 @@ TEST(DistanceField, IsExactFarAway) {
 /// The loops of each instruction set, on numbers of all sizes and signs.
 TEST(DistanceKernels, AreTheSameOnAllInstructionSets) {
   std::mt19937 random(43);
-  const std::string slowest = "generic";
-  const DistanceKernels& generic = distanceKernelsFor(slowest);
+  const std::string name = "generic";
+  const DistanceKernels& generic = distanceKernelsFor(name);
   for (const std::string& set : instructionSets()) {
     const DistanceKernels& kernels = distanceKernelsFor(set);
     for (const std::size_t width : {1u, 15u, 16u, 37u, 200u}) {
