@@ -244,10 +244,19 @@ class Made(MadeCity):
         self.assertRegex(text, f'map_city: another map_city works in {self.output}; wait until it has ended')
         # The workers outlive a killed map_city for a moment, and do not hold its lock.
         self.addCleanup(first.stdout.close)
-        children = psutil.Process(first.pid).children(recursive=True)
-        self.addCleanup(lambda: [child.kill() for child in children if child.is_running()])
-        for child in children:
-            child.suspend()
+        suspended = []
+
+        def kill_suspended():
+            for child in suspended:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    child.kill()
+
+        self.addCleanup(kill_suspended)
+        for child in psutil.Process(first.pid).children(recursive=True):
+            with contextlib.suppress(psutil.NoSuchProcess):  # a program that a worker ran has ended meanwhile
+                child.suspend()
+                suspended.append(child)
+        self.assertTrue(suspended)
         first.kill()
         first.wait()
         self.finish(self.start(city, '--workers', '2', '--resume', '--no-picture'))
