@@ -143,8 +143,7 @@ class Made(MadeCity):
         self.assertTrue(raised.exception.of_worker)
 
     def test_a_scheduler_of_its_own(self):
-        """Workers of a scheduler that somebody else has started: first one that lacks this package, then one that has it."""
-        place = self.folder / 'scheduler.json'
+        """A scheduler that somebody else has started, with a worker, first where this package is missing."""
 
         def dask(name, *arguments, **environment):
             process = subprocess.Popen([sys.executable, '-m', f'distributed.cli.dask_{name}', '--no-dashboard',
@@ -155,19 +154,31 @@ class Made(MadeCity):
             self.addCleanup(process.terminate)
             return process
 
-        scheduler = dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place)
-        end = time.monotonic() + 60
-        while not (place.exists() and place.stat().st_size) and time.monotonic() < end:
-            time.sleep(0.05)
-        address = json.loads(place.read_text())['address']
-        city = self.describe(['d1', 'd2'])
+        def start_scheduler(name, **environment):
+            place = self.folder / name
+            process = dask('scheduler', '--host', '127.0.0.1', '--port', 0, '--scheduler-file', place, **environment)
+            end = time.monotonic() + 60
+            while not (place.exists() and place.stat().st_size) and time.monotonic() < end:
+                time.sleep(0.05)
+            return process, json.loads(place.read_text())['address']
+
+        has_it = {'PYTHONPATH': str(SOURCE / 'python')}
         options = ('--nthreads', 1, '--local-directory', self.folder)
+        city = self.describe(['d1', 'd2'])
+        host = socket.gethostname()
+        lacking, address = start_scheduler('lacking.json', PYTHONPATH='')
+        dask('worker', address, *options, **has_it)
+        text = self.finish(self.start(city, '--scheduler', address), 1)
+        self.assertRegex(text, rf'map_city: the scheduler on {host} cannot import bki_mapping.city .*; install')
+        lacking.terminate()
+
+        scheduler, address = start_scheduler('scheduler.json', **has_it)
         unfit = dask('worker', address, *options, PYTHONPATH='')
         text = self.finish(self.start(city, '--scheduler', address), 1)
-        self.assertRegex(text, rf'map_city: the worker on {socket.gethostname()} cannot import bki_mapping.city .*; install')
+        self.assertRegex(text, rf'map_city: the worker on {host} cannot import bki_mapping.city .*; install')
         unfit.terminate()
         unfit.wait()
-        dask('worker', address, *options, PYTHONPATH=str(SOURCE / 'python'))
+        dask('worker', address, *options, **has_it)
         self.finish(self.start(city, '--scheduler', address, '--resume'))
         self.expect_equal(['d1', 'd2'])
         # The scheduler is killed while the worker maps.

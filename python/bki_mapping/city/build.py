@@ -49,7 +49,7 @@ def dask_client(workers=0, scheduler=None):
             if not workers_of(client, distributed):
                 raise CityError(f'the Dask scheduler {scheduler} has no workers; start some: '
                                 f'dask-worker {scheduler} --nthreads 1')
-            sentence = unfit_worker(client)
+            sentence = unfit_process(client)
             if sentence:
                 raise CityError(sentence)
             yield client
@@ -213,7 +213,7 @@ class Builder:
                     raise CityError('the Dask scheduler has gone; start it and its workers again, and run the same command '
                                     'with --resume') from None
                 self.client.cancel(list(futures))
-                raise CityError(unfit_worker(self.client) or f'a task failed ({type(error).__name__}: {error}); run the '
+                raise CityError(unfit_process(self.client) or f'a task failed ({type(error).__name__}: {error}); run the '
                                 'same command with --resume') from None
             if 'fault' in found and (must or found['of_worker'] or self.disk_is_full()):
                 self.client.cancel(list(futures))
@@ -253,8 +253,9 @@ class Builder:
                     path.unlink()
 
 
-def unfit_worker(client):
-    """A sentence about a worker that has not the same modules as this process; None if all have."""
+def unfit_process(client):
+    """A sentence about a worker, or the scheduler, that has not the same modules as this process; None if all have. Newer
+    versions of Dask unpack tasks in the scheduler, too."""
     version, source = work.VERSION, sys.version_info[:2]
 
     def probe():  # without names of this package, so that it can run where that is missing
@@ -263,15 +264,19 @@ def unfit_worker(client):
         try:
             from bki_mapping.city import work
         except Exception as error:
-            return f"the worker on {host} cannot import bki_mapping.city ({error})"
+            return f"on {host} cannot import bki_mapping.city ({error})"
         if getattr(work, 'VERSION', None) != version:
-            return f'the worker on {host} has another version of bki_mapping.city ({work.__file__})'
+            return f'on {host} has another version of bki_mapping.city ({work.__file__})'
         return None
     try:
-        sentences = sorted({found for found in client.run(probe).values() if found})
+        sentences = sorted({'the worker ' + found for found in client.run(probe).values() if found})
+        found = client.run_on_scheduler(probe)
     except Exception as error:
-        return f'a worker cannot be asked for its modules ({type(error).__name__}: {error}); give all the same version of ' \
-               f'Dask and of Python, here {source[0]}.{source[1]}'
-    if not sentences:
-        return None
-    return sentences[0] + '; install the same bki_mapping there, source its setup.bash, and start the worker again'
+        return f'a worker or the scheduler cannot be asked for its modules ({type(error).__name__}: {error}); give all the ' \
+               f'same version of Dask and of Python, here {source[0]}.{source[1]}'
+    if sentences:
+        return sentences[0] + '; install the same bki_mapping there, source its setup.bash, and start the worker again'
+    if found:
+        return f'the scheduler {found}; install the same bki_mapping there, source its setup.bash, and start the scheduler ' \
+               'and its workers again'
+    return None
