@@ -136,7 +136,7 @@ void readBlocks(benchmark::State& state, const std::string& instruction_set, Blo
   BlockView view;
   for (auto _ : state) {
     for (const auto& [index, block] : blocks) {
-      readBlock(kernels, map, *block, fields, view);
+      readBlock(kernels, map, index, *block, fields, view);
       benchmark::DoNotOptimize(&view);
     }
   }
@@ -160,7 +160,7 @@ void queries(benchmark::State& state) {
   for (auto _ : state) {
     for (const auto& entry : f.mapper.map().entries()) {
       for (int v = 0; v < kBlockVoxels; ++v) {
-        benchmark::DoNotOptimize(viewVoxel(f.mapper.map(), *entry.block, v));
+        benchmark::DoNotOptimize(viewVoxel(f.mapper.map(), entry.index, *entry.block, v));
         ++voxels;
       }
     }

@@ -147,18 +147,20 @@ class RecordReader {
     static const Block kNoEvidence;
     const GridGeometry& grid = map_.states.geometry();
     const Block* block = nullptr;
+    BlockIndex index;
     int offset = 0;
     if (grid.contains(point)) {
       const VoxelIndex voxel = grid.voxelAt(point);
-      const BlockStates* const found = reader_.find(GridGeometry::blockOf(voxel));
+      index = GridGeometry::blockOf(voxel);
+      const BlockStates* const found = reader_.find(index);
       if (found) block = found->block;
       offset = GridGeometry::offsetInBlock(voxel);
     }
     const auto view =
         record_.has(PointRecord::kEntropy) ? &viewVoxel : static_cast<ViewInBlock>(&viewWithoutEntropy);
-    return view(map_.states.map(), block ? *block : kNoEvidence, offset);
+    return view(map_.states.map(), index, block ? *block : kNoEvidence, offset);
   }
-  using ViewInBlock = VoxelView (*)(const SemanticMap&, const Block&, int);
+  using ViewInBlock = VoxelView (*)(const SemanticMap&, const BlockIndex&, const Block&, int);
 
   const FixedMap& map_;
   const PointRecord& record_;

@@ -41,7 +41,7 @@ Count countVoxels(const SemanticMap& map, const VoxelStates& states) {
   Count count;
   BlockView view;
   for (const auto& [index, block] : map.entries()) {
-    readBlock(map, *block, BlockFields::kStates, view);
+    readBlock(map, index, *block, BlockFields::kStates, view);
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
       const auto v = static_cast<std::size_t>(offset);
       if (view.state[v] == VoxelState::kUnknown || !states.contains(view.state[v])) continue;
@@ -115,7 +115,7 @@ class TileWriter {
     for (int number = 0; number < Region::kBlocks; ++number) {
       const BlockIndex index = region.blockIndex(number);
       const Block* const block = map_.find(index);
-      if (!block || !readStates(*block)) continue;
+      if (!block || !readStates(index, *block)) continue;
       ++blocks;
       numbers += static_cast<char>(number & 0xff);
       numbers += static_cast<char>(number >> 8);
@@ -140,8 +140,8 @@ class TileWriter {
 
  private:
   /// Reads a block, in which voxels that are left out become unknown. @return whether any voxel remains.
-  bool readStates(const Block& block) {
-    readBlock(map_, block, BlockFields::kAllButEntropy, view_);
+  bool readStates(const BlockIndex& index, const Block& block) {
+    readBlock(map_, index, block, BlockFields::kAllButEntropy, view_);
     left_out_ = false;
     bool any = false;
     for (VoxelState& state : view_.state) {

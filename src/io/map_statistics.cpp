@@ -33,16 +33,26 @@ void count(MapStatistics& statistics, const BlockIndex& index, const BlockView& 
   }
 }
 
-/// Counts the blocks of a map.
-void countAll(MapStatistics& statistics, const SemanticMap& map, const BlockVisit& visit) {
+/// Counts the blocks of a map. @param tile only those in this one.
+void countAll(MapStatistics& statistics, const SemanticMap& map, const BlockVisit& visit,
+              const GridIndex* tile = nullptr) {
   BlockView view;
   for (const auto& [index, block] : sortedBlocks(map)) {
+    if (tile && SemanticMap::regionOf(index) != *tile) continue;
     ++statistics.blocks;
     statistics.planes += block->classes().size();
     statistics.memory_bytes += block->bytes();
-    readBlock(map, *block, BlockFields::kStates, view);
+    readBlock(map, index, *block, BlockFields::kStates, view);
     count(statistics, index, view);
     if (visit) visit(index, view);
+  }
+}
+
+/// Adds the tiles whose evidence may decide states in a tile.
+void addTilesAround(const GridIndex& tile, MapFile& file, SemanticMap& map) {
+  for (int n = 0; n < 27; ++n) {
+    const GridIndex beside{tile.x + n % 3 - 1, tile.y + n / 3 % 3 - 1, tile.z + n / 9 - 1};
+    if (beside != tile) file.addTileTo(map, {beside});
   }
 }
 
@@ -59,8 +69,9 @@ MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockV
   for (const TileEntry& tile : file.tiles()) {
     SemanticMap map = empty_map.snapshot();
     file.addTileTo(map, {tile.index});
+    if (empty_map.neighbourhoodRatio() > 0.0f) addTilesAround(tile.index, file, map);
     ++statistics.tiles;
-    countAll(statistics, map, visit);
+    countAll(statistics, map, visit, &tile.index);
   }
   return statistics;
 }

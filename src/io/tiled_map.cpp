@@ -15,6 +15,7 @@
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/clear_box.h"
 #include "io/city_index.h"
+#include "map/neighbourhood.h"
 #include "store/box_tiles.h"
 #include "store/database.h"
 
@@ -322,12 +323,21 @@ StoredMap TiledMap::readTiles(const std::vector<GridIndex>& tiles, std::size_t m
 
 StoredMap TiledMap::readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit) {
   const GridGeometry grid(resolution());
+  const bool asks =
+      emptyMapWithGains(path(), info()).neighbourhoodRatio() > 0.0f;  // states depend on voxels around
   std::vector<GridIndex> tiles;
   for (const Eigen::Vector3d& point : points) {
     if (!point.allFinite()) throw std::invalid_argument("a coordinate of a point is not a finite number");
     if (!grid.contains(point)) continue;
-    const GridIndex tile = tileOf(grid.voxelAt(point));
-    if (tiles.empty() || tiles.back() != tile) tiles.push_back(tile);
+    const VoxelIndex voxel = grid.voxelAt(point);
+    for (int corner = 0; corner < (asks ? 8 : 1); ++corner) {
+      const int reach = asks ? kNeighbourhoodReach : 0;
+      const auto at = [&](std::int32_t centre, int bit) {
+        return centre + (corner >> bit & 1 ? reach : -reach);
+      };
+      const GridIndex tile = tileOf(VoxelIndex{{at(voxel.x, 0), at(voxel.y, 1), at(voxel.z, 2)}});
+      if (tiles.empty() || tiles.back() != tile) tiles.push_back(tile);
+    }
   }
   return readTiles(tiles, memory_limit);
 }

@@ -40,7 +40,7 @@ VoxelPoints::VoxelPoints(const SemanticMap& map, const ClassTable& classes, cons
   forEachBlock([this](std::size_t b) {
     const auto& [index, block] = blocks_[b];
     BlockView view;
-    readBlock(map_, *block, BlockFields::kStates, view);
+    readBlock(map_, index, *block, BlockFields::kStates, view);
     std::size_t count = 0;
     forEachSelected(index, view, [&count](std::size_t) { ++count; });
     begin_[b + 1] = count;
@@ -83,7 +83,7 @@ void VoxelPoints::writeBlock(std::size_t b, Point* to) const {
   const Centres x = centresOf(index.x, resolution), y = centresOf(index.y, resolution),
                 z = centresOf(index.z, resolution);
   BlockView view;
-  readBlock(map_, *block, BlockFields::kAll, view);
+  readBlock(map_, index, *block, BlockFields::kAll, view);
   forEachSelected(index, view, [&](std::size_t v) {
     Point& point = *new (to++) Point;
     point.x = x[v % kBlockEdge];

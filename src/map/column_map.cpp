@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "map/neighbourhood.h"
+
 namespace bki_mapping {
 namespace {
 
@@ -63,7 +65,7 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
 std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
                                                   const std::vector<GridIndex>& changed) {
   std::set<StackIndex> stacks;
-  for (const GridIndex& index : changed) {
+  for (const GridIndex& index : withDependents(map, {changed.data(), changed.size()})) {
     const StackIndex stack(index.x, index.y);
     stacks.insert(stack);
     if (map.find({index})) {
@@ -83,9 +85,10 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
     }
     for (Cells& column : cells) column.clear();
     for (const std::int32_t z : blocks->second) {
-      const Block* const block = map.find({{stack.first, stack.second, z}});
+      const BlockIndex index{{stack.first, stack.second, z}};
+      const Block* const block = map.find(index);
       if (!block) continue;  // erased, but not among the changed blocks
-      readBlock(map, *block, BlockFields::kStates, view);
+      readBlock(map, index, *block, BlockFields::kStates, view);
       for (std::size_t v = 0; v < kBlockVoxels; ++v) {
         if (view.state[v] == VoxelState::kUnknown) continue;
         const auto layer = static_cast<std::int32_t>(v / cells.size());

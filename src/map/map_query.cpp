@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "map/calibration.h"
+#include "map/neighbourhood.h"
 #include "map/view_kernels.h"
 
 namespace bki_mapping {
@@ -12,27 +13,63 @@ namespace {
 
 constexpr EvidenceUnits kNoEvidence[kBlockVoxels] = {};
 
-BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
-  BlockPlanes planes;
-  planes.map = &map;
-  planes.free = kNoEvidence;
-  for (std::size_t p = 0; p < block.classes().size(); ++p) {
-    const ClassId id = block.classes()[p];
-    if (id == kFreeClass) {
-      planes.free = block.plane(p);
-      planes.has_free = true;
-      continue;
-    }
-    const float gain = map.freeGain(id, 0.0f);
-    const bool decays = gain > 1.0f && map.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
-    planes.planes[planes.count++] = {block.plane(p), id, gain, decays, map.isFixed(id)};
-  }
-  return planes;
-}
-
 /// - p log(p), accurate for p near 1, too. @param others sum of the other concentrations.
 double entropyTerm(double alpha, double others) {
   return alpha / (alpha + others) * std::log1p(others / alpha);
+}
+
+/// What decides the state of a voxel by itself.
+struct OwnEvidence {
+  EvidenceUnits best = 0, free = 0;                ///< evidence of the likeliest class, and for `free`
+  EvidenceUnits fixed_best = 0;                    ///< of the likeliest of the classes that cannot move
+  ClassId label = kFreeClass, fixed = kFreeClass;  ///< these classes
+  double of_classes = 0.0;                         ///< the sum over all classes [units]
+  float gain = 1.0f;                               ///< of the likeliest class
+  bool holds = false;                              ///< (11)
+};
+
+OwnEvidence ownEvidence(const SemanticMap& map, const Block& block, int offset) {
+  // Units are whole numbers, of which doubles hold the sum over all classes exactly.
+  OwnEvidence own;
+  const auto& classes = block.classes();
+  for (std::size_t i = 0; i < classes.size(); ++i) {
+    const EvidenceUnits units = std::max(block.plane(i)[offset], 0);
+    if (classes[i] == kFreeClass) {
+      own.free = units;
+      continue;
+    }
+    own.of_classes += units;
+    if (units > own.best) {  // of equal evidence, the first class has the smaller id
+      own.best = units;
+      own.label = classes[i];
+    }
+    if (units > own.fixed_best && map.isFixed(classes[i])) {
+      own.fixed_best = units;
+      own.fixed = classes[i];
+    }
+  }
+  own.gain = map.freeGain(own.label, kEvidenceUnit * static_cast<float>(own.best));
+  own.holds = isOccupied(own.best, own.gain, own.free);
+  return own;
+}
+
+/// Equation 12b: what the voxels around say of one that asks them.
+VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
+  VoteSums sums;
+  constexpr int kReach = kNeighbourhoodReach;
+  for (int z = -kReach; z <= kReach; ++z) {
+    for (int y = -kReach; y <= kReach; ++y) {
+      for (int x = -kReach; x <= kReach; ++x) {
+        const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
+        const Block* const block = map.find(GridGeometry::blockOf(at));
+        if (!block) continue;
+        const OwnEvidence own = ownEvidence(map, *block, GridGeometry::offsetInBlock(at));
+        if (own.best == 0 || !map.asksNeighbourhood(own.label)) continue;
+        (own.holds ? sums.kept : sums.cleared) += std::min(own.best, kMostVote);
+      }
+    }
+  }
+  return sums;
 }
 
 /// Equation 13: the probability that something is in a voxel. @param best evidence of the likeliest class.
@@ -66,12 +103,34 @@ float decayedGain(const SemanticMap& map, ClassId id, float hits) {
   return map.freeGain(id, hits);
 }
 
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const Block& block, BlockFields fields,
-               BlockView& view) {
+BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
+  BlockPlanes planes;
+  planes.map = &map;
+  planes.free = kNoEvidence;
+  for (std::size_t p = 0; p < block.classes().size(); ++p) {
+    const ClassId id = block.classes()[p];
+    if (id == kFreeClass) {
+      planes.free = block.plane(p);
+      planes.has_free = true;
+      continue;
+    }
+    const float gain = map.freeGain(id, 0.0f);
+    const bool decays = gain > 1.0f && map.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
+    planes.planes[planes.count++] = {block.plane(p),           id, gain, decays, map.isFixed(id),
+                                     map.asksNeighbourhood(id)};
+  }
+  return planes;
+}
+
+void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
+               const Block& block, BlockFields fields, BlockView& view) {
   const auto read = fields == BlockFields::kStates          ? kernels.states
                     : fields == BlockFields::kAllButEntropy ? kernels.posterior
                                                             : kernels.all;
-  read(planesOf(map, block), view);
+  BlockPlanes planes = planesOf(map, block);
+  Overruled overruled;
+  if (findOverruled(kernels, map, index, block, overruled)) planes.overruled = &overruled;
+  read(planes, view);
   const Block::Occlusion& marks = block.occlusion();
   if (marks.none()) return;
   for (std::size_t v = 0; v < kBlockVoxels; ++v) {
@@ -79,69 +138,56 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const Block& 
   }
 }
 
-void readBlock(const SemanticMap& map, const Block& block, BlockFields fields, BlockView& view) {
+void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockFields fields,
+               BlockView& view) {
   static const ViewKernels* const fastest = &viewKernelsFor("");
-  readBlock(*fastest, map, block, fields, view);
+  readBlock(*fastest, map, index, block, fields, view);
 }
 
-VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset) {
-  // Units are whole numbers, of which doubles hold the sum over all classes exactly.
-  EvidenceUnits best_units = 0, free_units = 0, fixed_units = 0;
-  ClassId fixed = kFreeClass;  // the likeliest of the classes that cannot move
-  double units_of_classes = 0.0;
-  VoxelView view;
-  const auto& classes = block.classes();
-  for (std::size_t i = 0; i < classes.size(); ++i) {
-    const EvidenceUnits units = std::max(block.plane(i)[offset], 0);
-    if (classes[i] == kFreeClass) {
-      free_units = units;
-      continue;
-    }
-    units_of_classes += units;
-    if (units > best_units) {  // of equal evidence, the first class has the smaller id
-      best_units = units;
-      view.label = classes[i];
-    }
-    if (units > fixed_units && map.isFixed(classes[i])) {
-      fixed_units = units;
-      fixed = classes[i];
-    }
+VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block,
+                             int offset) {
+  OwnEvidence own = ownEvidence(map, block, offset);
+  bool holds = own.holds, restored = false, has_left = false;
+  if (map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
+    holds = areKept(map, votesAround(map, GridGeometry::voxelOf(index, offset)));
+    restored = holds && !own.holds;
+    has_left = !holds && own.holds;
   }
-  constexpr double kUnit = kEvidenceUnit;
-  const double free = kUnit * free_units, of_classes = kUnit * units_of_classes;
-  float gain = map.freeGain(view.label, static_cast<float>(kUnit * best_units));
-  bool holds = isOccupied(best_units, gain, free_units);
-  if (!holds && map.remainingGain() > 0.0f && fixed != view.label &&
-      fixed_units > (best_units - 1) >> kRemainingShift &&
-      isOccupied(fixed_units, map.remainingGain(), free_units)) {
+  if (!holds && map.remainingGain() > 0.0f && own.fixed != own.label &&
+      own.fixed_best > (own.best - 1) >> kRemainingShift &&
+      isOccupied(own.fixed_best, map.remainingGain(), own.free)) {
     holds = true;
-    best_units = fixed_units;
-    view.label = fixed;
-    gain = map.remainingGain();
+    has_left = false;
+    own.best = own.fixed_best;
+    own.label = own.fixed;
+    own.gain = map.remainingGain();
   }
-  const double best = kUnit * best_units;
-  if (best_units > 0 || free_units > 0) {
+  VoxelView view;
+  if (own.best > 0 || own.free > 0) {
     view.state = holds ? VoxelState::kOccupied : VoxelState::kFree;
   } else if (block.occlusion()[static_cast<std::size_t>(offset)]) {
     view.state = VoxelState::kOccluded;
   }
   const bool occupied = view.state == VoxelState::kOccupied;
-  if (!occupied) view.label = kFreeClass;
+  if (occupied) view.label = own.label;
 
   // Equations 10 and 13.
+  constexpr double kUnit = kEvidenceUnit;
+  const double best = kUnit * own.best, free = kUnit * own.free, of_classes = kUnit * own.of_classes;
   const double prior = map.prior(), prior_of_classes = prior * static_cast<double>(map.classCount());
-  const double own = occupied ? best : free, alpha = prior + own;
-  const double others = prior_of_classes + (of_classes + free - own), sum = alpha + others;
+  const double decisive = occupied ? best : free, alpha = prior + decisive;
+  const double others = prior_of_classes + (of_classes + free - decisive), sum = alpha + others;
   view.evidence = static_cast<float>(of_classes + free);
   view.probability = static_cast<float>(alpha / sum);
   view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
-  view.occupancy = static_cast<float>(occupancyOf(prior, best, static_cast<double>(gain), free));
+  view.occupancy = static_cast<float>(
+      occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), restored ? 0.0 : free));
   view.class_probability = static_cast<float>(1.0 / squaredRatios(map, block, offset, prior + best));
   return view;
 }
 
-VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
-  VoxelView view = viewWithoutEntropy(map, block, offset);
+VoxelView viewVoxel(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset) {
+  VoxelView view = viewWithoutEntropy(map, index, block, offset);
   const auto classes = block.classes().size(), all = map.classCount() + 1;
   double total = 0.0;
   for (std::size_t i = 0; i < classes; ++i) total += std::max(block.plane(i)[offset], 0);
@@ -157,15 +203,17 @@ VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset) {
 }
 
 VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel) {
-  const Block* block = map.find(GridGeometry::blockOf(voxel));
-  return block ? viewWithoutEntropy(map, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
+  const BlockIndex index = GridGeometry::blockOf(voxel);
+  const Block* block = map.find(index);
+  return block ? viewWithoutEntropy(map, index, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
 }
 
 VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {
   const VoxelIndex voxel = map.geometry().voxelAt(point);
-  const Block* block = map.find(GridGeometry::blockOf(voxel));
+  const BlockIndex index = GridGeometry::blockOf(voxel);
+  const Block* block = map.find(index);
   const int offset = GridGeometry::offsetInBlock(voxel);
-  return block ? viewVoxel(map, *block, offset) : viewVoxel(map, Block(), offset);
+  return block ? viewVoxel(map, index, *block, offset) : viewVoxel(map, index, Block(), offset);
 }
 
 std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map) {

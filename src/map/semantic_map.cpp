@@ -141,6 +141,8 @@ SemanticMap SemanticMap::emptyLikeThis() const {
   empty.free_gains_ = free_gains_;
   empty.gain_persistence_ = gain_persistence_;
   empty.remaining_gain_ = remaining_gain_;
+  empty.neighbourhood_ratio_ = neighbourhood_ratio_;
+  empty.asking_ = asking_;
   empty.fixed_ = fixed_;
   return empty;
 }

@@ -9,6 +9,10 @@
 
 namespace bki_mapping {
 
+/// The voxels of a block of whose states those around decide otherwise than their own evidence (12b).
+using Overruled = std::array<std::int32_t, kBlockVoxels>;
+constexpr std::int32_t kNotOverruled = 0, kKept = 1, kCleared = -1;
+
 /// The planes of a block, and what else the posterior of its voxels depends on.
 struct BlockPlanes {
   struct Plane {
@@ -17,6 +21,7 @@ struct BlockPlanes {
     float gain;   ///< on the evidence for `free` in voxels whose likeliest class this is, before it decays
     bool decays;  ///< whether the gain depends on the evidence for the class
     bool fixed;   ///< whether the class cannot move, and so may remain by (12a)
+    bool asks;    ///< whether voxels whose likeliest class this is ask their neighbourhood (12b)
   };
 
   const SemanticMap* map;
@@ -24,6 +29,14 @@ struct BlockPlanes {
   std::size_t count = 0;
   const EvidenceUnits* free = nullptr;  ///< zeros if the block has no plane for `free`
   bool has_free = false;
+  const Overruled* overruled = nullptr;  ///< by the voxels around; nullptr: none is
+};
+
+/// What the voxels of a block say to those around that ask (12b) [units, at most kMostVote]: the evidence for
+/// the likeliest class where that asks its neighbourhood, too, and the voxel's own evidence keeps or clears
+/// it.
+struct BlockVotes {
+  alignas(64) std::array<EvidenceUnits, kBlockVoxels> kept, cleared;
 };
 
 /// The loops for one instruction set: they set all fields of the view that they are named for, and state
@@ -35,20 +48,27 @@ struct ViewKernels {
   Read states;     ///< state and label
   Read posterior;  ///< all but entropy
   Read all;
+  /// @return whether any voxel asks its neighbourhood; otherwise all votes are 0.
+  bool (*votes)(const BlockPlanes& planes, BlockVotes& votes);
 };
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.
 /// @throws std::invalid_argument for any other.
 const ViewKernels& viewKernelsFor(const std::string& instruction_set);
 
+/// The planes of a block. @param map that decides; it need not have the block.
+BlockPlanes planesOf(const SemanticMap& map, const Block& block);
+
 /// readBlock with the given loops.
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const Block& block, BlockFields fields,
-               BlockView& view);
+void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
+               const Block& block, BlockFields fields, BlockView& view);
 
 // Scalar parts, which all instruction sets share, so that they decide alike:
 
 /// Whether a voxel with evidence is occupied: Equation 11 in docs/method.md, decided on whole units.
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free);
+/// The most that one voxel counts for in (12b), so that the sum over a neighbourhood stays whole [units].
+constexpr EvidenceUnits kMostVote = 1 << 23;
 /// log2 of the share that (12a) asks of what remains: a quarter of the evidence of what has left.
 constexpr int kRemainingShift = 2;
 /// SemanticMap::freeGain, compiled for any processor.

@@ -10,7 +10,7 @@ namespace bki_mapping {
 
 const ViewKernels& viewKernelsAvx2() {
   static const ViewKernels kernels = {"avx2", readPlanes<false, false>, readPlanes<true, false>,
-                                      readPlanes<true, true>};
+                                      readPlanes<true, true>, readVotes};
   return kernels;
 }
 

@@ -10,7 +10,7 @@ namespace bki_mapping {
 
 const ViewKernels& viewKernelsAvx512() {
   static const ViewKernels kernels = {"avx512", readPlanes<false, false>, readPlanes<true, false>,
-                                      readPlanes<true, true>};
+                                      readPlanes<true, true>, readVotes};
   return kernels;
 }
 

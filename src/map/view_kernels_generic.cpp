@@ -8,7 +8,7 @@ namespace bki_mapping {
 
 const ViewKernels& viewKernelsGeneric() {
   static const ViewKernels kernels = {"generic", readPlanes<false, false>, readPlanes<true, false>,
-                                      readPlanes<true, true>};
+                                      readPlanes<true, true>, readVotes};
   return kernels;
 }
 

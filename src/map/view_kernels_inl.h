@@ -209,7 +209,8 @@ struct Priors {
 template <bool kEntropy>
 [[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
                                                   const Likeliest& likeliest, const Likeliest& found,
-                                                  IntVec free, Mask is_occupied, int v, BlockView& view) {
+                                                  IntVec free, Mask is_occupied, IntVec overruling, int v,
+                                                  BlockView& view) {
   ExactSum total = found.classes;
   total.add(free);
   const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
@@ -218,10 +219,12 @@ template <bool kEntropy>
   others.subtract(own);
   const FloatVec p = (prior.once + evidenceOf(own)) * inverse_sum,
                  not_p = (prior.classes + others.evidence()) * inverse_sum;
-  const FloatVec best = evidenceOf(found.best), alpha = prior.once + best, something = prior.something + best,
+  const Mask has_left = (overruling == kCleared) & ~is_occupied;  // otherwise a fixed class remains
+  const FloatVec best = evidenceOf(found.best), alpha = prior.once + best,
+                 something = prior.something + unless(has_left, best),
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
                  nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something +
-                           weight * evidenceOf(free);
+                           weight * unless(overruling == kKept, evidenceOf(free));
   // The sum of (prior + e)^2 over the classes.
   const FloatVec squares = prior.squares + 2.0f * prior.once * found.classes.evidence() + found.squares.sum;
   StoreU(evidence, view.evidence.data() + v);
@@ -259,12 +262,14 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     const Mask is_known = (found.best | free) != 0;
     const Likeliest likeliest = found;
     Mask is_occupied = found.best > 0;
+    const IntVec overruling = planes.overruled ? LoadU(planes.overruled->data() + v) : IntVec{};
     // Elsewhere the gain makes no difference to the state.
-    const Mask disputed = is_occupied & (free > 0);
+    const Mask disputed = (is_occupied & (free > 0)) | (overruling != 0);
     if (kPosterior || AnyTrue(disputed)) {
       if constexpr (!kPosterior) findGains(planes, found);
       decay(planes, free, found);
       is_occupied &= occupied(found, free);
+      is_occupied = (is_occupied | (overruling == kKept)) & (overruling != kCleared);
       is_occupied = keepRemaining(planes, free, v, is_occupied, found);
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
@@ -279,8 +284,27 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       continue;
     }
     if (!AnyTrue(is_known)) unknown = v;
-    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, v, view);
+    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, overruling, v, view);
   }
+}
+
+inline bool readVotes(const BlockPlanes& planes, BlockVotes& votes) {
+  IntVec any = {};
+  for (int v = 0; v < kBlockVoxels; v += kLanes) {
+    const IntVec free = Max(LoadU(planes.free + v), IntVec{});
+    Likeliest found = findLikeliest<true>(planes, v);
+    IntVec asks = {};
+    for (std::size_t p = 0; p < planes.count; ++p) {
+      if (planes.planes[p].asks) asks |= found.label == planes.planes[p].id;
+    }
+    const IntVec vote = Min(found.best, Set(kMostVote)) & asks;
+    any |= vote;
+    decay(planes, free, found);
+    const Mask is_kept = occupied(found, free);
+    StoreU(vote & is_kept, votes.kept.data() + v);
+    StoreU(vote & ~is_kept, votes.cleared.data() + v);
+  }
+  return AnyTrue(any != 0);
 }
 
 }  // namespace

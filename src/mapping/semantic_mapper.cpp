@@ -59,6 +59,13 @@ SemanticMap::Classes fixedClasses(const ClassTable& classes) {
   return fixed;
 }
 
+/// The classes of what moves, and may also be parked.
+SemanticMap::Classes parkingClasses(const ClassTable& classes) {
+  SemanticMap::Classes parking;
+  for (const SemanticClass& c : classes.classes()) parking[c.id] = c.dynamic && !c.living && !c.unlabelled;
+  return parking;
+}
+
 UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   UpdateRules rules;
   rules.hits_before_misses = config.free_space.hits_before_misses;
@@ -153,6 +160,7 @@ SemanticMapper::~SemanticMapper() = default;
 void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
   map_.setRemainingGain(config_.free_gain.remaining, fixedClasses(*classes_));
+  map_.setNeighbourhoodRatio(config_.free_gain.neighbourhood, parkingClasses(*classes_));
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     double of_kind = gain.static_classes;

@@ -25,7 +25,7 @@ class PointReader {
   PointReader(const StateMap& states, const PointValues& values)
       : map_(states.map()), reader_(states), values_(values) {
     wants_posterior_ = values.occupancy || values.class_probability || values.probability || values.variance;
-    if (wants_posterior_) prior_ = viewWithoutEntropy(map_, Block(), 0);
+    if (wants_posterior_) prior_ = viewWithoutEntropy(map_, BlockIndex(), Block(), 0);
   }
 
   /// Reads points `begin` to `end` - 1, at most kBatch. @return false if one is not finite.
@@ -55,18 +55,19 @@ class PointReader {
       __builtin_prefetch(&blocks_[n]->layers[static_cast<std::size_t>(place.offset) / 64]);
       if (values_.labels) __builtin_prefetch(&blocks_[n]->labels[static_cast<std::size_t>(place.offset)]);
     }
-    for (std::size_t n = 0; n < count; ++n) write(begin + n, blocks_[n], places_[n].offset);
+    for (std::size_t n = 0; n < count; ++n) write(begin + n, blocks_[n], places_[n]);
     return finite;
   }
 
  private:
-  void write(std::size_t n, const BlockStates* block, int offset) const {
+  void write(std::size_t n, const BlockStates* block, const Place& place) const {
+    const int offset = place.offset;
     if (values_.states) values_.states[n] = block ? block->state(offset) : VoxelState::kUnknown;
     if (values_.labels) {
       values_.labels[n] = block ? block->labels[static_cast<std::size_t>(offset)] : kFreeClass;
     }
     if (!wants_posterior_) return;
-    const VoxelView view = block ? viewWithoutEntropy(map_, *block->block, offset) : prior_;
+    const VoxelView view = block ? viewWithoutEntropy(map_, place.block, *block->block, offset) : prior_;
     if (values_.occupancy) values_.occupancy[n] = view.occupancy;
     if (values_.class_probability) values_.class_probability[n] = view.class_probability;
     if (values_.probability) values_.probability[n] = view.probability;

@@ -1,10 +1,12 @@
 #include "bki_mapping/query/state_map.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
+#include "map/neighbourhood.h"
 #include "parallel/thread_pool.h"
 
 namespace bki_mapping {
@@ -20,9 +22,10 @@ std::uint64_t lowestBits(std::uint64_t bytes) {
   return ((bytes & 0x0101010101010101u) * 0x0102040810204080u) >> 56;
 }
 
-void decide(const SemanticMap& map, const Block& block, BlockStates& states) {
+void decide(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockStates& states) {
   BlockView view;
-  readBlock(map, block, BlockFields::kStates, view);
+  readBlock(map, index, block, BlockFields::kStates, view);
+  states.asks_neighbourhood = mayAskNeighbourhood(map, block);
   states.labels = view.label;
   states.block = &block;
   std::uint64_t any_occupied = 0, any_free = 0, all_free = ~std::uint64_t{0};
@@ -45,9 +48,26 @@ void decide(const SemanticMap& map, const Block& block, BlockStates& states) {
   states.all_free = all_free == ~std::uint64_t{0};
 }
 
+/// Whether two maps have the same at all 26 neighbours of an index.
+/// @param across_faces only at those six that share a face with it.
+template <typename Find, typename FindEarlier>
+bool sameAround(const GridIndex& index, bool across_faces, const Find& find,
+                const FindEarlier& find_earlier) {
+  for (int n = 0; n < 27; ++n) {
+    const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
+    const int apart = std::abs(x) + std::abs(y) + std::abs(z);
+    if (apart == 0 || (across_faces && apart > 1)) continue;
+    const GridIndex at{index.x + x, index.y + y, index.z + z};
+    if (find(at) != find_earlier(at)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-StateMap::RegionStates::RegionStates(const Region& region, const RegionStates& earlier) : region_(&region) {
+StateMap::RegionStates::RegionStates(const Region& region, const SemanticMap& map,
+                                     const RegionStates& earlier, const SemanticMap& earlier_map)
+    : region_(&region) {
   std::array<int, Region::kBlocks> numbers;
   std::array<std::uintptr_t, Region::kBlocks> slots;
   std::size_t count = 0;
@@ -64,6 +84,12 @@ StateMap::RegionStates::RegionStates(const Region& region, const RegionStates& e
   for (std::size_t n = 0; n < count; ++n) {
     const BlockStates& states = *glanceOf(slots[n]).block;
     if (states.block != region.find(numbers[n])) continue;
+    if (states.asks_neighbourhood &&
+        !sameAround(
+            region.blockIndex(numbers[n]), false, [&](const GridIndex& at) { return map.find({at}); },
+            [&](const GridIndex& at) { return earlier_map.find({at}); })) {
+      continue;
+    }
     states.owners.share();
     blocks_[static_cast<std::size_t>(numbers[n])].store(slots[n], std::memory_order_relaxed);
   }
@@ -83,7 +109,7 @@ std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockI
     return kAbsent;
   }
   auto states = std::make_unique<BlockStates>();
-  decide(map, *block, *states);
+  decide(map, index, *block, *states);
   const std::uintptr_t decided = reinterpret_cast<std::uintptr_t>(states.get()) |
                                  (states->any_occupied ? kAnyOccupied : 0) |
                                  (states->all_free ? kAllFree : 0);
@@ -143,8 +169,11 @@ StateMap::StateMap(const SemanticMap& map, const StateMap& earlier, int threads)
 void StateMap::takeOver(const StateMap& earlier) {
   // Both maps exist, and hold their blocks: a block that both have at the same address is the same object.
   // Neither map changes, and a map copies blocks that it shares before it writes to them.
-  const auto is_same = [&](const GridIndex& region) {
-    return map_.findRegion(region) == earlier.map_.findRegion(region);
+  const bool alone = !(map_.neighbourhoodRatio() > 0.0f);  // states depend on nothing outside of the block
+  const auto surroundings_are_same = [&](const GridIndex& region) {
+    return sameAround(
+        region, alone, [&](const GridIndex& at) { return map_.findRegion(at); },
+        [&](const GridIndex& at) { return earlier.map_.findRegion(at); });
   };
   for (std::uint32_t position = 0; position < regions_.size(); ++position) {
     const Region& region = map_.regionAt(position);
@@ -153,19 +182,15 @@ void StateMap::takeOver(const StateMap& earlier) {
     Known& known = regions_[position];
     RegionStates* const states = earlier.regions_[before].states.load(std::memory_order_acquire);
     if (!states) continue;
-    if (states->region_ != &region) {
-      known.states.store(new RegionStates(region, *states), std::memory_order_relaxed);
+    if (states->region_ != &region || !(alone || surroundings_are_same(region.index()))) {
+      known.states.store(new RegionStates(region, map_, *states, earlier.map_), std::memory_order_relaxed);
       continue;
     }
     states->owners_.share();
     known.states.store(states, std::memory_order_relaxed);
     auto kept = earlier.keptFrontiers(before);
     if (!kept) continue;
-    const GridIndex& r = region.index();
-    if (is_same({r.x - 1, r.y, r.z}) && is_same({r.x + 1, r.y, r.z}) && is_same({r.x, r.y - 1, r.z}) &&
-        is_same({r.x, r.y + 1, r.z}) && is_same({r.x, r.y, r.z - 1}) && is_same({r.x, r.y, r.z + 1})) {
-      known.frontiers = std::move(kept);
-    }
+    if (!alone || surroundings_are_same(region.index())) known.frontiers = std::move(kept);
   }
 }
 

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "map/neighbourhood.h"
+
 namespace bki_mapping::ros_interface {
 namespace {
 
@@ -96,6 +98,10 @@ std::shared_ptr<const MapSnapshot> PublisherSet::takeSnapshot() {
     const std::lock_guard<std::mutex> lock(mutex_);
     std::swap(closed, closed_);
     std::swap(start_over, closed_start_over_);
+  }
+  if (!closed.all() && !closed.empty()) {
+    const std::vector<GridIndex>& blocks = closed.blocks();
+    closed.add(withDependents(snapshot->map, {blocks.data(), blocks.size()}));
   }
   for (const auto& publisher : publishers_) {
     if (!publisher->wanted()) {

@@ -17,6 +17,7 @@
 #include "core/stopwatch.h"
 #include "io/map_picture.h"
 #include "io/map_statistics.h"
+#include "map/neighbourhood.h"
 #include "store/box_tiles.h"
 #include "tools/options.h"
 
@@ -161,7 +162,8 @@ class PointQuery {
            reach = std::min(2.0 * reach, most)) {
         Eigen::AlignedBox3d box;
         for (const std::size_t n : waiting) box.extend(points_[n]);
-        const Eigen::Vector3d margin = Eigen::Vector3d::Constant(reach + grid_.resolution());
+        const Eigen::Vector3d margin =
+            Eigen::Vector3d::Constant(reach + (1.0 + kNeighbourhoodReach) * grid_.resolution());
         const StoredMap stored = map_.readBox({box.min() - margin, box.max() + margin}, limit_);
         const StateMap states(stored.map);
         std::vector<std::size_t> left;

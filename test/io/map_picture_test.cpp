@@ -17,8 +17,12 @@ namespace {
 
 MapInfo infoWithGains() {
   MapInfo info = infoOf();
+  std::vector<SemanticClass> classes = info.classes->classes();
+  classes[1].living = false;  // so that its voxels ask their neighbourhood
+  info.classes = std::make_shared<ClassTable>("a table", classes);
   info.parameters =
-      "resolution: 7\nunknown: 1\nfree_gain:\n  static: 0.01\n  dynamic: 50\n  persistence: 3\n";
+      "resolution: 7\nunknown: 1\nfree_gain:\n  static: 0.01\n  dynamic: 50\n  persistence: 3\n  "
+      "neighbourhood: 1.5\n";
   return info;
 }
 
@@ -56,6 +60,7 @@ SemanticMap markedMap(unsigned seed, int blocks, int extent) {
 SemanticMap mapWithGains(unsigned seed, int blocks, int extent) {
   SemanticMap map = infoOf().emptyMap();
   map.setGainPersistence(3.0);
+  map.setNeighbourhoodRatio(1.5, SemanticMap::Classes().set(40));
   map.setFreeGain(0, 1.0);   // unlabelled
   map.setFreeGain(40, 2.5);  // by its own gain
   map.setFreeGain(80, 0.01);
@@ -75,7 +80,7 @@ TEST(MapStatistics, CountsVoxelsAsTheMapperSeesThem) {
   for (const auto& [index, block] : map.entries()) {
     bytes += block->bytes();
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewVoxel(map, *block, v);
+      const VoxelView view = viewVoxel(map, index, *block, v);
       expected.free += view.state == VoxelState::kFree;
       expected.occluded += view.state == VoxelState::kOccluded;
       expected.occupied += view.state == VoxelState::kOccupied;
@@ -232,6 +237,9 @@ TEST(MapPicture, WritesPng) {
 
 TEST(MapFileGains, RefusesParametersThatAreNone) {
   MapInfo info = infoOf();
+  std::vector<SemanticClass> classes = info.classes->classes();
+  classes[1].living = false;  // so that its voxels ask their neighbourhood
+  info.classes = std::make_shared<ClassTable>("a table", classes);
   info.parameters = "free_gain: {static: -1}";
   EXPECT_NE(
       sentenceOf([&] { emptyMapWithGains("FILE", info); }).find("the parameters in FILE cannot be used"),

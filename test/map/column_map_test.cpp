@@ -172,6 +172,8 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
     return static_cast<int>(random() % static_cast<unsigned>(2 * edge)) - edge;
   };
   ColumnMap kept;
+  map_.setFreeGain(kCar, 3.0);
+  map_.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kCar));
   for (int round = 0; round < 30; ++round) {
     std::vector<GridIndex> changed;
     for (int i = 0; i < 20; ++i) {

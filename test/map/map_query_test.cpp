@@ -28,8 +28,8 @@ SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offs
 
 VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
   const SemanticMap map = mapWith(evidence, 77);
-  const VoxelView view = viewVoxel(map, *map.find({{0, 0, 0}}), 77);
-  const VoxelView judged = viewWithoutEntropy(map, *map.find({{0, 0, 0}}), 77);
+  const VoxelView view = viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
+  const VoxelView judged = viewWithoutEntropy(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   EXPECT_EQ(judged.state, view.state);
   EXPECT_EQ(judged.label, view.label);
   EXPECT_EQ(judged.probability, view.probability);
@@ -222,7 +222,7 @@ TEST(MapQuery, WhatRemainsIsAtLeastAQuarter) {
     }
     map.setFreeGain(1, 1e12);
     map.setRemainingGain(1e-6, SemanticMap::Classes(0b100));
-    return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
+    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
   };
   for (const EvidenceUnits quarter : {1, 2, 1000, 1 << 28}) {
     EXPECT_EQ(state(4 * (quarter - 1) + 3, quarter), VoxelState::kOccupied) << quarter;
@@ -265,7 +265,7 @@ TEST(MapQuery, ProbabilitiesDoNotDependOnTheUnitOfEvidence) {
       plane[77] = unitsOf(static_cast<double>(unit * value));
       map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(id), plane);
     }
-    return viewVoxel(map, *map.find({{0, 0, 0}}), 77);
+    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   };
   EXPECT_FLOAT_EQ(view(64.0f).occupancy, view(1.0f).occupancy);
   EXPECT_FLOAT_EQ(view(64.0f).class_probability, view(1.0f).class_probability);
@@ -281,7 +281,7 @@ TEST(MapQuery, TheLastUnitDecides) {
       plane[77] = units;
       map.getOrAllocate({{0, 0, 0}}).add(id, plane);
     }
-    return viewVoxel(map, *map.find({{0, 0, 0}}), 77);
+    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   };
   constexpr EvidenceUnits kMany = 1 << 30;
   EXPECT_EQ(viewOfUnits(kMany, kMany + 1, 0).label, 2);
@@ -301,7 +301,7 @@ TEST(MapQuery, FreeVoxelAndTies) {
 
 TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
   SemanticMap map = mapWith({{1, 0.375f}, {2, 0.25f}, {kFreeClass, 0.5f}}, 77);
-  const auto view = [&map] { return viewVoxel(map, *map.find({{0, 0, 0}}), 77); };
+  const auto view = [&map] { return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77); };
   const double sum = 1.125 + 4 * kPrior;
   EXPECT_EQ(view().state, VoxelState::kFree);
   EXPECT_NEAR(view().probability, (0.5 + kPrior) / sum, 1e-6);
@@ -323,7 +323,7 @@ TEST(MapQuery, RepeatedHitsOutweighTheGain) {
     SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
     map.setFreeGain(1, 4.0);
     map.setGainPersistence(persistence);
-    return viewVoxel(map, *map.find({{0, 0, 0}}), 77).state;
+    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
   };
   EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
   EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have been passing";  // gain 3.5
@@ -335,13 +335,13 @@ TEST(MapQuery, RepeatedHitsOutweighTheGain) {
 TEST(MapQuery, GainsWithoutEvidenceForFreeMakeNothingFree) {
   SemanticMap map = mapWith({{1, 0.4f}}, 77);
   map.setFreeGain(1, 1000.0);
-  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
 }
 
 TEST(MapQuery, UnknownVoxelHasThePrior) {
   const SemanticMap map = mapWith({{1, 1.0f}}, 0);
   for (const VoxelView& view :
-       {viewVoxel(map, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
+       {viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
     EXPECT_EQ(view.state, VoxelState::kUnknown);
     EXPECT_NEAR(view.probability, 0.25, 1e-6);
     EXPECT_NEAR(view.occupancy, occupancyOf(0.0, 0.0), 1e-6);
@@ -356,9 +356,9 @@ TEST(MapQuery, OccludedOnlyWithoutEvidence) {
   Block::Occlusion marks;
   marks.set(0).set(1);
   map.getOrAllocate({{0, 0, 0}}).setOcclusion(marks);
-  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 0).state, VoxelState::kOccupied);
-  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 1).state, VoxelState::kOccluded);
-  EXPECT_EQ(viewVoxel(map, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
+  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 0).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 1).state, VoxelState::kOccluded);
+  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
 }
 
 TEST(MapQuery, VisitsKnownVoxelsInSortedOrder) {

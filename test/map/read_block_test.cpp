@@ -23,6 +23,7 @@ struct Kind {
   double prior;
   enum Evidence { kPlain, kSparse, kTies, kExtreme } evidence;  ///< kSparse: mostly whole rows of zeros
   bool gains, persistence, occlusion;
+  bool neighbours = false;  ///< blocks around, and a ratio of evidence
 };
 
 EvidenceUnits randomUnits(Kind::Evidence kind, std::mt19937& random) {
@@ -41,9 +42,7 @@ EvidenceUnits randomUnits(Kind::Evidence kind, std::mt19937& random) {
   }
 }
 
-SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
-  SemanticMap map(GridGeometry(0.3), kind.prior, kind.classes);
-  Block& block = map.getOrAllocate({{0, 0, 0}});
+void fillBlock(const Kind& kind, std::mt19937& random, Block& block) {
   std::vector<EvidenceUnits> plane(kBlockVoxels);
   for (int p = 0; p < kind.planes; ++p) {
     const std::size_t n = random() % (kind.classes + 1);
@@ -57,6 +56,21 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
       std::copy(plane.begin(), plane.end(), to);
       return true;
     });
+  }
+}
+
+SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
+  SemanticMap map(GridGeometry(0.3), kind.prior, kind.classes);
+  Block& block = map.getOrAllocate({{0, 0, 0}});
+  fillBlock(kind, random, block);
+  for (int n = 0; kind.neighbours && n < 27; ++n) {
+    const BlockIndex index{{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1}};
+    if (n != 13 && random() % 4 != 0) fillBlock(kind, random, map.getOrAllocate(index));
+  }
+  if (kind.neighbours) {
+    SemanticMap::Classes asking;
+    for (std::size_t id = 0; id < kind.classes; ++id) asking[id] = random() % 2 == 0;
+    map.setNeighbourhoodRatio(std::exp2(static_cast<double>(random() % 5) - 2.0), asking);
   }
   if (kind.occlusion) {
     Block::Occlusion marks;
@@ -82,20 +96,21 @@ void expectNear(float value, float expected, const char* field, const std::strin
 
 /// Compares every voxel of the map's block with viewVoxel.
 void compare(const SemanticMap& map, const std::string& set, const std::string& what) {
-  const Block& block = *map.find({{0, 0, 0}});
+  constexpr BlockIndex kOrigin{{0, 0, 0}};
+  const Block& block = *map.find(kOrigin);
   BlockView view, states, posterior;
   std::memset(static_cast<void*>(&view), 0x55, sizeof(view));
   states = posterior = view;
   const ViewKernels& kernels = viewKernelsFor(set);
-  readBlock(kernels, map, block, BlockFields::kAll, view);
-  readBlock(kernels, map, block, BlockFields::kStates, states);
-  readBlock(kernels, map, block, BlockFields::kAllButEntropy, posterior);
+  readBlock(kernels, map, kOrigin, block, BlockFields::kAll, view);
+  readBlock(kernels, map, kOrigin, block, BlockFields::kStates, states);
+  readBlock(kernels, map, kOrigin, block, BlockFields::kAllButEntropy, posterior);
   EXPECT_EQ(states.state, view.state) << set << ", " << what;
   EXPECT_EQ(states.label, view.label) << set << ", " << what;
   posterior.entropy = view.entropy;
   EXPECT_EQ(std::memcmp(&posterior, &view, sizeof(view)), 0) << set << ", " << what;
   for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    const VoxelView got = view.at(offset), expected = viewVoxel(map, block, offset);
+    const VoxelView got = view.at(offset), expected = viewVoxel(map, kOrigin, block, offset);
     const std::string where = set + ", " + what + ", voxel " + std::to_string(offset);
     ASSERT_EQ(got.state, expected.state) << where;
     ASSERT_EQ(got.label, expected.label) << where;
@@ -146,6 +161,31 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
   }
 }
 
+TEST(ReadBlock, EqualsItsVoxelsOneByOneAmongOtherBlocks) {
+  std::mt19937 random(9);
+  int n = 0;
+  for (const auto evidence : {Kind::kPlain, Kind::kSparse, Kind::kTies, Kind::kExtreme}) {
+    for (const bool persistence : {false, true}) {
+      for (const double prior : {0.001, 1.0}) {
+        for (const auto& [classes, planes] : {std::pair{1, 2}, {3, 6}, {20, 8}}) {
+          const Kind kind{static_cast<std::size_t>(classes),
+                          planes,
+                          prior,
+                          evidence,
+                          true,
+                          persistence,
+                          n % 2 == 0,
+                          true};
+          const SemanticMap map = randomMap(kind, random);
+          for (const std::string& set : instructionSets()) compare(map, set, "map " + std::to_string(n));
+          if (HasFatalFailure()) return;
+          ++n;
+        }
+      }
+    }
+  }
+}
+
 TEST(ReadBlock, DecidesByTheLastUnit) {
   for (const std::string& set : instructionSets()) {
     for (const double gain : {1.0, 0.5, 2.0, 0.1, 4.0}) {
@@ -189,7 +229,7 @@ TEST(ReadBlock, WhatRemainsIsAQuarterOfWhatHasLeft) {
     block.add(1, remains.data());
     block.add(kFreeClass, free.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, block, BlockFields::kStates, view);
+    readBlock(viewKernelsFor(set), map, {{0, 0, 0}}, block, BlockFields::kStates, view);
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const bool holds = left[v] <= 4 * remains[v];
       EXPECT_EQ(view.label[v], holds ? 1 : kFreeClass) << set << ' ' << left[v] << ' ' << remains[v];
@@ -204,7 +244,7 @@ TEST(ReadBlock, ATinyPriorIsANumberStill) {
     hits[0] = 1;
     map.getOrAllocate({{0, 0, 0}}).add(1, hits.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, *map.find({{0, 0, 0}}), BlockFields::kAll, view);
+    readBlock(viewKernelsFor(set), map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll, view);
     for (std::size_t v = 0; v < 2; ++v) {
       EXPECT_NEAR(view.probability[v], v == 0 ? 1.0 : 0.25, 1e-6);
       EXPECT_NEAR(view.occupancy[v], v == 0 ? 1.0 / 1.1 : 0.1 / (1.1 * 0.1 + 6.0), 1e-6);

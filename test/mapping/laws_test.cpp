@@ -216,7 +216,7 @@ TEST(Laws, WithdrawingWhatIsNotThereIsCountedAndReadsAsNothing) {
   EXPECT_GT(mapper.withdraw(scans[0]).negative, 0u);
   for (const auto& entry : mapper.map().entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      ASSERT_EQ(viewVoxel(mapper.map(), *entry.block, v).state, VoxelState::kUnknown);
+      ASSERT_EQ(viewVoxel(mapper.map(), entry.index, *entry.block, v).state, VoxelState::kUnknown);
     }
   }
   mapper.integrate(scans[0]);
@@ -320,7 +320,7 @@ TEST(Laws, ProbabilitiesSumToOne) {
   const SemanticMap map = mapOf(someScans(), configOf("line"));
   for (const auto& entry : map.entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewVoxel(map, *entry.block, v);
+      const VoxelView view = viewVoxel(map, entry.index, *entry.block, v);
       double sum = 0.0;
       for (const int label : {0, 1, 2, 3, 255}) {
         const EvidenceUnits* plane = entry.block->evidence(static_cast<ClassId>(label));

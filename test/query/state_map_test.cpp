@@ -36,7 +36,7 @@ void expectSameStates(const StateMap& states) {
     ASSERT_EQ(found.block, block);
     bool any_occupied = false, any_free = false, all_free = true;
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
-      const VoxelView view = viewWithoutEntropy(states.map(), *block, offset);
+      const VoxelView view = viewWithoutEntropy(states.map(), index, *block, offset);
       ASSERT_EQ(found.state(offset), view.state);
       ASSERT_EQ(found.labels[static_cast<std::size_t>(offset)], view.label);
       any_occupied |= view.state == VoxelState::kOccupied;
@@ -97,6 +97,7 @@ class RandomChanges {
       case 4:
         map.setGainPersistence(draw(2) == 0 ? 0.0 : 3.0 * unit());
         map.setRemainingGain(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
+        map.setNeighbourhoodRatio(draw(3) == 0 ? 0.0 : 3.0 * unit(), draw(3) == 0 ? 0b1000 : 0b1001);
         break;
       case 5:
         if (draw(15) == 0) map.clear();

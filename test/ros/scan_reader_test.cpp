@@ -304,7 +304,7 @@ void expectShares(const SoftLabels& soft) {
 void expectSaneEvidence(const SemanticMap& map) {
   for (const auto& entry : map.entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewWithoutEntropy(map, *entry.block, v);
+      const VoxelView view = viewWithoutEntropy(map, entry.index, *entry.block, v);
       ASSERT_TRUE(std::isfinite(view.probability) && std::isfinite(view.variance));
       for (const ClassId id : entry.block->classes()) {
         ASSERT_GE(entry.block->evidence(id)[v], 0) << "class " << int{id};

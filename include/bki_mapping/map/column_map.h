@@ -66,8 +66,9 @@ class ColumnMap {
   }
   const ColumnRules& rules() const { return rules_; }
 
-  /// Recomputes the stacks that contain the given blocks. @param changed blocks that have changed, or were
-  /// created or erased. @return those stacks; stacks without blocks are no longer in columns().
+  /// Recomputes the stacks that contain the given blocks, or others whose states depend on their evidence.
+  /// @param changed blocks that have changed, or were created or erased. @return those stacks; stacks without
+  /// blocks are no longer in columns().
   std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes,
                               const std::vector<GridIndex>& changed);
 

@@ -77,12 +77,16 @@ enum class BlockFields {
 
 /// Reads all voxels of a block, many times as fast as one by one. States and labels are those of viewVoxel;
 /// the other fields differ from them by at most 1e-6 of their value.
-void readBlock(const SemanticMap& map, const Block& block, BlockFields fields, BlockView& view);
+/// @param map that the block is part of: with SemanticMap::neighbourhoodRatio, states depend on the blocks
+/// around.
+void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockFields fields,
+               BlockView& view);
 
-/// The state and posterior of a voxel. @param offset of the voxel in its block.
-VoxelView viewVoxel(const SemanticMap& map, const Block& block, int offset);
+/// The state and posterior of a voxel. @param map that the block is part of. @param offset of the voxel in
+/// its block.
+VoxelView viewVoxel(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset);
 /// The same with entropy 0, which is much faster: the logarithms take most of the time.
-VoxelView viewWithoutEntropy(const SemanticMap& map, const Block& block, int offset);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset);
 /// The same for a voxel by index; unknown if the map has no block there.
 VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel);
 /// viewVoxel for the voxel that contains a point. @param point in the map frame [m].
@@ -98,7 +102,7 @@ void forEachKnownVoxel(const SemanticMap& map, Visit&& visit) {
   BlockView view;
   view.entropy.fill(0.0f);
   for (const auto& [index, block] : sortedBlocks(map)) {
-    readBlock(map, *block, BlockFields::kAllButEntropy, view);
+    readBlock(map, index, *block, BlockFields::kAllButEntropy, view);
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
       const VoxelView voxel = view.at(offset);
       if (voxel.state != VoxelState::kUnknown) visit(GridGeometry::voxelOf(index, offset), voxel);

@@ -70,10 +70,20 @@ class SemanticMap {
     remaining_gain_ = gain > 0.0 ? finite(std::max(gain, kLeast)) : 0.0f;
     fixed_ = fixed;
   }
-  /// Whether equal blocks of both maps have the same states and labels.
+  /// The ratio of evidence at which its neighbourhood keeps a voxel whose likeliest class asks it; 0, the
+  /// default: each voxel decides by itself (Equation 12b in docs/method.md).
+  float neighbourhoodRatio() const { return neighbourhood_ratio_; }
+  bool asksNeighbourhood(ClassId id) const { return asking_[id]; }
+  void setNeighbourhoodRatio(double ratio, const Classes& asking) {
+    neighbourhood_ratio_ = finite(ratio);
+    asking_ = asking;
+  }
+  /// Whether equal blocks of both maps, with equal blocks around, have the same states and labels.
   bool decidesAs(const SemanticMap& other) const {
     return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_ &&
-           remaining_gain_ == other.remaining_gain_ && (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
+           (neighbourhood_ratio_ == 0.0f || asking_ == other.asking_) &&
+           neighbourhood_ratio_ == other.neighbourhood_ratio_ && remaining_gain_ == other.remaining_gain_ &&
+           (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
   }
 
   /// All blocks, in unspecified order: a range for `for (const auto& [index, block] : map.entries())`.
@@ -197,8 +207,8 @@ class SemanticMap {
   double prior_;
   std::size_t class_count_;
   std::array<float, 256> free_gains_;
-  float gain_persistence_ = 0.0f, remaining_gain_ = 0.0f;
-  Classes fixed_;
+  float gain_persistence_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
+  Classes fixed_, asking_;
   std::vector<SharedRegion> regions_;
   GridTable region_position_;  ///< of each region in regions_
   std::size_t size_ = 0;       ///< number of blocks

@@ -44,8 +44,9 @@ class DistanceField {
   /// Makes the field that of another map of the same grid, equal to the bit to a new one, from a snapshot
   /// that was taken later, for instance. Recomputes the lines of voxels that contain a change: of the
   /// obstacles along y, of the results of that along x, and of those along z.
-  /// @param changed the blocks that may have changed, been created or erased; those outside of the region are
-  /// ignored. @throws std::invalid_argument if the resolution differs.
+  /// @param changed the blocks whose evidence may have changed, or that were created or erased; others whose
+  /// states depend on it are found. Those outside of the region are ignored. @throws std::invalid_argument if
+  /// the resolution differs.
   void update(const StateMap& states, Span<const GridIndex> changed);
 
   /// The voxel with the smallest coordinates, and the number of voxels along each axis.

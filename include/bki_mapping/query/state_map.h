@@ -40,6 +40,7 @@ struct alignas(64) BlockStates {
   std::array<ClassId, kBlockVoxels> labels;          ///< kFreeClass where not occupied
   const Block* block = nullptr;                      ///< the evidence
   bool any_occupied = false, any_free = false, all_free = false;
+  bool asks_neighbourhood = false;  ///< whether states may depend on the blocks around
   OwnerCount owners;
 
   /// @param offset of the voxel in the block, 0 to 511.
@@ -134,8 +135,9 @@ class StateMap {
 class StateMap::RegionStates {
  public:
   explicit RegionStates(const Region& region) : region_(&region) {}
-  /// With what was decided of the blocks that the region shares with another one.
-  RegionStates(const Region& region, const RegionStates& earlier);
+  /// With what was decided in another map of the blocks that did not change, nor any on which they depend.
+  RegionStates(const Region& region, const SemanticMap& map, const RegionStates& earlier,
+               const SemanticMap& earlier_map);
   ~RegionStates();
   RegionStates(const RegionStates&) = delete;
   RegionStates& operator=(const RegionStates&) = delete;

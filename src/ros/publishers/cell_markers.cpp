@@ -202,7 +202,7 @@ class CellMarkers : public MapPublisher {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = snapshot.map.find(index);
       if (!block) continue;
-      readBlock(snapshot.map, *block, BlockFields::kStates, view);
+      readBlock(snapshot.map, index, *block, BlockFields::kStates, view);
       bool any = false;
       forEachShown(index, view, snapshot, [&](std::size_t v, double) {
         ++cells.of_label[view.label[v]];
@@ -248,7 +248,7 @@ class CellMarkers : public MapPublisher {
     const ColorMode mode = snapshot.config.color_mode;
     const double edge = snapshot.map.geometry().resolution();
     BlockView view;
-    readBlock(snapshot.map, block, fieldsOf(mode), view);
+    readBlock(snapshot.map, index, block, fieldsOf(mode), view);
     double x[kBlockEdge], y[kBlockEdge];
     for (int n = 0; n < kBlockEdge; ++n) {
       x[n] = (index.x * kBlockEdge + n + 0.5) * edge;

@@ -36,7 +36,7 @@ struct StreamedBlocks {
 
   void write(const BlockIndex& index, const Block& block, std::uint8_t* to) const {
     BlockView view;
-    readBlock(*map, block, BlockFields::kAllButEntropy, view);
+    readBlock(*map, index, block, BlockFields::kAllButEntropy, view);
     OccupancyBlock message;
     message.x = index.x;
     message.y = index.y;

@@ -1,0 +1,131 @@
+#include "map/neighbourhood.h"
+
+#include <algorithm>
+#include <array>
+
+#include "bki_mapping/core/grid_table.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr int kReach = kNeighbourhoodReach, kWindow = 2 * kReach + 1, kEdge = kBlockEdge + 2 * kReach;
+
+/// A block with its surroundings.
+using Votes = std::array<std::array<std::array<std::int32_t, kEdge>, kEdge>, kEdge>;
+
+/// The part of an axis that a block covers which lies `step` beside the one in the middle.
+struct Part {
+  explicit Part(int step)
+      : to(step < 0   ? 0
+           : step > 0 ? kReach + kBlockEdge
+                      : kReach),
+        from(step < 0 ? kBlockEdge - kReach : 0),
+        count(step == 0 ? kBlockEdge : kReach) {}
+  int to, from, count;  ///< in Votes, in the block
+};
+
+void copyPart(const std::array<EvidenceUnits, kBlockVoxels>& from, const Part& x, const Part& y,
+              const Part& z, Votes& to) {
+  const auto at = [](int n) { return static_cast<std::size_t>(n); };
+  for (int k = 0; k < z.count; ++k) {
+    for (int j = 0; j < y.count; ++j) {
+      const int voxel = x.from + kBlockEdge * (y.from + j + kBlockEdge * (z.from + k));
+      std::copy_n(from.data() + voxel, x.count, to[at(z.to + k)][at(y.to + j)].data() + x.to);
+    }
+  }
+}
+
+/// Sums over the window of each voxel of the block, one axis after the other.
+void sumWindows(const Votes& votes, std::array<EvidenceUnits, kBlockVoxels>& sums) {
+  static_assert(std::int64_t{kMostVote} * kWindow * kWindow * kWindow <= kMostUnits, "sums do not overflow");
+  static_assert(kWindow == 5, "as many terms");
+  constexpr std::size_t kInner = kBlockEdge, kRows = kEdge;
+  std::array<std::array<std::array<std::int32_t, kInner>, kRows>, kRows> along_x;
+  std::array<std::array<std::array<std::int32_t, kInner>, kInner>, kRows> along_y{};
+  for (std::size_t z = 0; z < kRows; ++z) {
+    for (std::size_t y = 0; y < kRows; ++y) {
+      for (std::size_t x = 0; x < kInner; ++x) {
+        const std::int32_t* const row = votes[z][y].data() + x;
+        along_x[z][y][x] = row[0] + row[1] + row[2] + row[3] + row[4];
+      }
+    }
+    for (std::size_t y = 0; y < kInner; ++y) {
+      for (std::size_t n = 0; n < kWindow; ++n) {
+        for (std::size_t x = 0; x < kInner; ++x) along_y[z][y][x] += along_x[z][y + n][x];
+      }
+    }
+  }
+  sums.fill(0);
+  for (std::size_t z = 0; z < kInner; ++z) {
+    for (std::size_t n = 0; n < kWindow; ++n) {
+      const std::int32_t* const layer = along_y[z + n][0].data();
+      for (std::size_t v = 0; v < kInner * kInner; ++v) sums[kInner * kInner * z + v] += layer[v];
+    }
+  }
+}
+
+}  // namespace
+
+bool mayAskNeighbourhood(const SemanticMap& map, const Block& block) {
+  const auto& classes = block.classes();
+  return map.neighbourhoodRatio() > 0.0f &&
+         std::any_of(classes.begin(), classes.end(), [&](ClassId id) { return map.asksNeighbourhood(id); });
+}
+
+bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
+                   const Block& block, Overruled& overruled) {
+  if (!mayAskNeighbourhood(map, block)) return false;
+  BlockVotes own;
+  if (!kernels.votes(planesOf(map, block), own)) return false;
+  Votes kept{}, cleared{};
+  BlockVotes beside;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        const BlockVotes* votes = &own;
+        if (x != 0 || y != 0 || z != 0) {
+          const Block* const neighbour = map.find({{index.x + x, index.y + y, index.z + z}});
+          if (!neighbour || !mayAskNeighbourhood(map, *neighbour) ||
+              !kernels.votes(planesOf(map, *neighbour), beside))
+            continue;
+          votes = &beside;
+        }
+        copyPart(votes->kept, Part(x), Part(y), Part(z), kept);
+        copyPart(votes->cleared, Part(x), Part(y), Part(z), cleared);
+      }
+    }
+  }
+  std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums;
+  sumWindows(kept, kept_sums);
+  sumWindows(cleared, cleared_sums);
+  for (std::size_t v = 0; v < overruled.size(); ++v) {
+    overruled[v] = kNotOverruled;
+    if (own.kept[v] == 0 && own.cleared[v] == 0) continue;
+    const bool are_kept = areKept(map, {kept_sums[v], cleared_sums[v]});
+    if (are_kept && own.cleared[v] > 0) overruled[v] = kKept;
+    if (!are_kept && own.kept[v] > 0) overruled[v] = kCleared;
+  }
+  return true;
+}
+
+std::vector<GridIndex> withDependents(const SemanticMap& map, Span<const GridIndex> blocks) {
+  std::vector<GridIndex> all;
+  GridTable known;
+  const auto insert = [&](const GridIndex& index) {
+    const auto fresh = static_cast<std::uint32_t>(all.size());
+    if (known.insert(index, fresh) == fresh) all.push_back(index);
+  };
+  for (const GridIndex& index : blocks) insert(index);
+  if (!(map.neighbourhoodRatio() > 0.0f)) return all;
+  for (const GridIndex& index : blocks) {
+    for (int n = 0; n < 27; ++n) {
+      const GridIndex beside{index.x + n % 3 - 1, index.y + n / 3 % 3 - 1, index.z + n / 9 - 1};
+      if (known.find(beside) != kNoPosition) continue;
+      const Block* const block = map.find({beside});
+      if (block && mayAskNeighbourhood(map, *block)) insert(beside);
+    }
+  }
+  return all;
+}
+
+}  // namespace bki_mapping

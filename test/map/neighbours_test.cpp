@@ -1,0 +1,202 @@
+// Equation 12b, by looking at every voxel around.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "bki_mapping/map/map_query.h"
+#include "map/neighbourhood.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr ClassId kRoad = 0, kCar = 1, kTruck = 2, kWalker = 3;
+constexpr double kPrior = 0.001, kMost = 128.0;  // evidence of one voxel counts up to this
+constexpr double kGain = 20.0, kPersistence = 0.5, kRatio = 1.5, kRemaining = 0.2;
+
+/// The evidence for a class in a voxel.
+double evidenceFor(const SemanticMap& map, const VoxelIndex& voxel, ClassId id) {
+  const Block* const block = map.find(GridGeometry::blockOf(voxel));
+  const EvidenceUnits* const plane = block ? block->evidence(id) : nullptr;
+  return plane ? static_cast<double>(evidenceOf(plane[GridGeometry::offsetInBlock(voxel)])) : 0.0;
+}
+
+ClassId likeliest(const SemanticMap& map, const VoxelIndex& voxel) {
+  ClassId best = kRoad;
+  for (const ClassId id : {kCar, kTruck, kWalker}) {
+    if (evidenceFor(map, voxel, id) > evidenceFor(map, voxel, best)) best = id;
+  }
+  return best;
+}
+
+bool asks(ClassId id) {
+  return id == kCar || id == kTruck;
+}
+
+/// Equations 11 and 12.
+bool holds(const SemanticMap& map, const VoxelIndex& voxel, ClassId id) {
+  const double hits = evidenceFor(map, voxel, id), most = id == kRoad ? 1.0 : kGain;
+  return hits >= (1.0 + (most - 1.0) * std::exp(-hits / kPersistence)) * evidenceFor(map, voxel, kFreeClass);
+}
+
+/// The class that occupies a voxel, from the definitions; kFreeClass if none does.
+ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel) {
+  const double free = evidenceFor(map, voxel, kFreeClass), road = evidenceFor(map, voxel, kRoad);
+  const ClassId best = likeliest(map, voxel);
+  if (evidenceFor(map, voxel, best) == 0.0) return kFreeClass;
+  double kept = 0.0, cleared = 0.0;
+  for (int z = -2; z <= 2; ++z) {
+    for (int y = -2; y <= 2; ++y) {
+      for (int x = -2; x <= 2; ++x) {
+        const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
+        const ClassId of_other = likeliest(map, at);
+        if (!asks(of_other)) continue;
+        const double evidence = std::min(evidenceFor(map, at, of_other), kMost);
+        (holds(map, at, of_other) ? kept : cleared) += evidence;
+      }
+    }
+  }
+  if (asks(best) ? kept >= kRatio * cleared : holds(map, voxel, best)) return best;
+  if (best == kRoad) return kFreeClass;
+  return road >= kRemaining * free && 4.0 * road >= evidenceFor(map, voxel, best) ? kRoad : kFreeClass;
+}
+
+/// A map of 3 x 3 x 2 blocks of which some are missing: clusters of all classes, some of them crossed.
+SemanticMap randomMap(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  SemanticMap map(GridGeometry(0.3), kPrior, 4);
+  for (const ClassId id : {kCar, kTruck, kWalker}) map.setFreeGain(id, kGain);
+  map.setGainPersistence(kPersistence);
+  map.setNeighbourhoodRatio(kRatio, SemanticMap::Classes().set(kCar).set(kTruck));
+  map.setRemainingGain(kRemaining, SemanticMap::Classes(0b1));
+  for (int z = -1; z < 1; ++z) {
+    for (int y = -1; y < 2; ++y) {
+      for (int x = -1; x < 2; ++x) {
+        if (random() % 8 == 0) continue;
+        Block& block = map.getOrAllocate({{x, y, z}});
+        for (const ClassId id : {kRoad, kCar, kTruck, kWalker, kFreeClass}) {
+          std::vector<EvidenceUnits> plane(kBlockVoxels);
+          const double share = 0.2 + 0.5 * unit(random), most = id == kCar && random() % 4 == 0 ? 300.0 : 2.0;
+          for (EvidenceUnits& units : plane) units = unit(random) < share ? unitsOf(most * unit(random)) : 0;
+          block.add(id, plane.data());
+        }
+      }
+    }
+  }
+  return map;
+}
+
+TEST(Neighbours, DecideAsByLookingAtEachOfThem) {
+  std::size_t labels[256] = {}, overruled = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SemanticMap map = randomMap(seed);
+    SemanticMap alone = map.snapshot();
+    alone.setNeighbourhoodRatio(0.0, {});
+    BlockView view;
+    for (const auto& [index, block] : map.entries()) {
+      readBlock(map, index, *block, BlockFields::kAllButEntropy, view);
+      for (int v = 0; v < kBlockVoxels; ++v) {
+        const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
+        const ClassId expected = slowLabel(map, voxel);
+        ASSERT_EQ(view.at(v).label, expected) << seed;
+        ASSERT_EQ(viewWithoutEntropy(map, voxel).label, expected) << seed;
+        ++labels[expected];
+        const VoxelView own = viewWithoutEntropy(alone, voxel);
+        overruled += own.label != expected;
+        // Nothing else but the state and what follows from it depends on the neighbours.
+        ASSERT_EQ(view.at(v).evidence, own.evidence);
+        if (own.label == expected) {
+          ASSERT_NEAR(view.at(v).occupancy, own.occupancy, 1e-6f);
+        }
+      }
+    }
+  }
+  for (const ClassId id : {kRoad, kCar, kTruck, kWalker, kFreeClass}) EXPECT_GT(labels[id], 200u) << int{id};
+  EXPECT_GT(overruled, 500u);
+}
+
+/// A row of voxels along x from (0, 0, 0), each with evidence for the car and for `free`.
+SemanticMap rowOfCar(const std::vector<std::pair<double, double>>& evidence) {
+  SemanticMap map(GridGeometry(0.3), kPrior, 3);
+  map.setFreeGain(kCar, 1000.0);
+  map.setGainPersistence(0.05);
+  map.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kCar));
+  for (std::size_t n = 0; n < evidence.size(); ++n) {
+    const VoxelIndex voxel{{static_cast<int>(n), 0, 0}};
+    for (const auto& [id, value] : {std::pair{kCar, evidence[n].first}, {kFreeClass, evidence[n].second}}) {
+      std::vector<EvidenceUnits> plane(kBlockVoxels);
+      plane[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] = unitsOf(value);
+      map.getOrAllocate(GridGeometry::blockOf(voxel)).add(id, plane.data());
+    }
+  }
+  return map;
+}
+
+VoxelView viewAt(const SemanticMap& map, int x) {
+  return viewWithoutEntropy(map, VoxelIndex{{x, 0, 0}});
+}
+
+TEST(Neighbours, ClearWhatIsLeftOfACar) {
+  // Beams have crossed all of these voxels but one.
+  const SemanticMap map = rowOfCar({{0.1, 0.1}, {0.1, 0.1}, {0.08, 0.0}, {0.1, 0.1}, {0.1, 0.1}});
+  EXPECT_EQ(viewAt(map, 2).state, VoxelState::kFree);
+  EXPECT_LT(viewAt(map, 2).occupancy, 0.05f);
+  EXPECT_FLOAT_EQ(viewAt(map, 2).evidence, evidenceOf(unitsOf(0.08)));
+}
+
+TEST(Neighbours, KeepTheRoofOfAParkedCar) {
+  // Beams graze one of these voxels.
+  const SemanticMap map = rowOfCar({{2.0, 0.0}, {2.0, 0.0}, {0.08, 0.1}, {2.0, 0.01}, {2.0, 0.0}});
+  EXPECT_EQ(viewAt(map, 2).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewAt(map, 2).label, kCar);
+  const double something = 0.1 * kPrior + 0.08;  // what beams say does not count
+  EXPECT_NEAR(viewAt(map, 2).occupancy, something / (1.1 * something + 6.0 * kPrior), 1e-4);
+}
+
+TEST(Neighbours, AreAskedAcrossBlocksUpToTwoVoxelsAway) {
+  // In the second block, voxel 8 has crossed ones at distance 2, voxel 9 only at distance 3.
+  const SemanticMap map =
+      rowOfCar({{0, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}, {9, 90}, {9, 90}, {0, 0}, {1, 0}, {1, 0}});
+  EXPECT_EQ(viewAt(map, 8).state, VoxelState::kFree);
+  EXPECT_EQ(viewAt(map, 9).state, VoxelState::kOccupied);
+}
+
+TEST(Neighbours, OfOtherClassesAreNotAsked) {
+  SemanticMap map = rowOfCar({{0.1, 0.1}, {0.08, 0.0}, {0.1, 0.1}});
+  EXPECT_EQ(viewAt(map, 1).state, VoxelState::kFree);
+  map.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kTruck));
+  EXPECT_EQ(viewAt(map, 1).state, VoxelState::kOccupied);
+}
+
+TEST(Neighbours, DependentsAreAllWhoseStatesChange) {
+  std::mt19937 random(3);
+  SemanticMap map = randomMap(9);
+  std::size_t elsewhere = 0;
+  for (int round = 0; round < 20; ++round) {
+    const SemanticMap before = map.snapshot();
+    const BlockIndex changed{{static_cast<int>(random() % 3) - 1, static_cast<int>(random() % 3) - 1, 0}};
+    if (round % 4 == 3) {
+      map.erase(changed);
+    } else {
+      std::vector<EvidenceUnits> plane(kBlockVoxels, unitsOf(0.3));
+      map.getOrAllocate(changed).add(random() % 2 == 0 ? kCar : kFreeClass, plane.data());
+    }
+    const std::vector<GridIndex> touched = {changed},
+                                 all = withDependents(map, {touched.data(), touched.size()});
+    for (const auto& [index, block] : map.entries()) {
+      if (!before.find(index)) continue;
+      BlockView now, then;
+      readBlock(map, index, *block, BlockFields::kStates, now);
+      readBlock(before, index, *before.find(index), BlockFields::kStates, then);
+      const bool same = now.state == then.state && now.label == then.label;
+      elsewhere += !same && index != changed;
+      EXPECT_TRUE(same || std::find(all.begin(), all.end(), index) != all.end());
+    }
+  }
+  EXPECT_GT(elsewhere, 10u);
+}
+
+}  // namespace
+}  // namespace bki_mapping
