@@ -86,6 +86,7 @@ void noteHits(const UpdateRules& rules, const BlockSums& hits, SeenVoxels& seen,
   }
   hit = seen.fixed | may_move;
   seen.fixed &= ~may_move;
+  seen.moving = may_move;
 }
 
 void noteFree(const UpdateRules& rules, const BlockSums& free, const VoxelMask& hit, SeenVoxels& seen) {

@@ -12,10 +12,10 @@ constexpr std::uint64_t kColumn = 0x0101010101010101;  ///< the voxels of a laye
 constexpr std::uint64_t kRow = 0xff;                   ///< those with y = 0
 constexpr int kAcrossX = kBlockEdge - 1, kAcrossY = kBlockEdge * (kBlockEdge - 1);
 
-/// The voxels of `mask` whose two neighbours along the axis are members, too. @param previous, next the
-/// members in the two blocks beside it.
-LayerBits erode(std::size_t axis, const LayerBits& previous, const LayerBits& mask, const LayerBits& next) {
-  LayerBits eroded;
+/// The voxels whose two neighbours along the axis are members. @param previous, mask, next the members in a
+/// block, and in the two beside it.
+LayerBits between(std::size_t axis, const LayerBits& previous, const LayerBits& mask, const LayerBits& next) {
+  LayerBits found;
   for (std::size_t z = 0; z <= kLast; ++z) {
     std::uint64_t below = z == 0 ? previous[kLast] : mask[z - 1], above = z == kLast ? next[0] : mask[z + 1];
     if (axis == 0) {
@@ -25,9 +25,9 @@ LayerBits erode(std::size_t axis, const LayerBits& previous, const LayerBits& ma
       below = mask[z] << kBlockEdge | (previous[z] >> kAcrossY & kRow);
       above = mask[z] >> kBlockEdge | (next[z] & kRow) << kAcrossY;
     }
-    eroded[z] = mask[z] & below & above;
+    found[z] = below & above;
   }
-  return eroded;
+  return found;
 }
 
 GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
@@ -35,28 +35,51 @@ GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
   return block;
 }
 
+/// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
+template <typename MaskOfBlock>
+VoxelMask betweenIn(const IndexNumbering& blocks, std::size_t b, std::size_t axis,
+                    const MaskOfBlock& maskOfBlock) {
+  const auto beside = [&](int step) -> LayerBits {
+    const std::uint32_t position = blocks.find(neighbour(blocks.members()[b], axis, step));
+    return position == kNoPosition ? LayerBits{} : bitsOf(maskOfBlock(position));
+  };
+  return maskOf(between(axis, beside(-1), bitsOf(maskOfBlock(b)), beside(1)));
+}
+
 }  // namespace
 
 void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
   const Chunks chunks(seen_.size());
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::swap(before_, masks_);
-    const auto before = [&](std::size_t b) {
-      return axis > 0 ? before_[b] : seen_[b].crossed | seen_[b].fixed;
-    };
+  const auto forEachBlock = [&](const auto& job) {
     pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-      for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-        masks_[b] = before(b);
-        if (masks_[b].none()) continue;
-        const auto beside = [&](int step) -> LayerBits {
-          const std::uint32_t position = blocks.find(neighbour(blocks.members()[b], axis, step));
-          return position == kNoPosition ? LayerBits{} : bitsOf(before(position));
-        };
-        masks_[b] = maskOf(erode(axis, beside(-1), bitsOf(masks_[b]), beside(1)));
-        if (axis == 2) masks_[b] &= seen_[b].crossed;
-      }
+      for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) job(b);
     });
-  }
+  };
+  forEachBlock([&](std::size_t b) {
+    const SeenVoxels& seen = seen_[b];
+    empty_[b] = seen.crossed;
+    if (seen.crossed.none()) return;
+    empty_[b] |=
+        betweenIn(blocks, b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
+        ~(seen.fixed | seen.moving);
+  });
+  const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].fixed; };
+  forEachBlock([&](std::size_t b) {
+    const VoxelMask own = seen(b);
+    along_x_[b] = along_y_[b] = own;
+    if (own.none()) return;
+    along_x_[b] &= betweenIn(blocks, b, 0, seen);
+    along_y_[b] &= betweenIn(blocks, b, 1, seen);
+  });
+  // With both neighbours across the faces, those across an edge are two steps away, along different axes.
+  forEachBlock([&](std::size_t b) {
+    voids_[b] = empty_[b] & along_x_[b] & along_y_[b];
+    if (voids_[b].none()) return;
+    const auto along_x = [&](std::size_t n) -> const VoxelMask& { return along_x_[n]; };
+    const auto along_y = [&](std::size_t n) -> const VoxelMask& { return along_y_[n]; };
+    voids_[b] &= betweenIn(blocks, b, 1, along_x) & betweenIn(blocks, b, 2, along_x) &
+                 betweenIn(blocks, b, 2, along_y);
+  });
 }
 
 }  // namespace bki_mapping

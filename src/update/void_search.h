@@ -1,4 +1,4 @@
-/// @file Finds the voxels that a scan sees empty together with all their neighbours.
+/// @file Finds the voxels that a scan sees empty together with their neighbours.
 #pragma once
 
 #include <vector>
@@ -13,28 +13,31 @@ namespace bki_mapping {
 struct SeenVoxels {
   VoxelMask crossed;  ///< evidence for `free` reaches the limit, and no hit adds evidence
   VoxelMask fixed;    ///< hits add evidence, all of them of classes that cannot move
+  VoxelMask moving;   ///< other hits add evidence
 };
 
-/// Finds void voxels: crossed, with 26 neighbours of which each is crossed or fixed. Keeps its memory from
-/// scan to scan.
+/// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
+/// bridged or fixed. A bridged voxel lies between two crossed ones, below and above it, and no hit adds
+/// evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:
   /// Forgets the last scan, and takes all memory for this one. @param blocks number of those that it touches.
   void start(std::size_t blocks) {
     seen_.assign(blocks, {});
-    masks_.resize(blocks);
-    before_.resize(blocks);
+    for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &along_y_, &voids_}) masks->resize(blocks);
   }
   /// What the scan says of a block; different threads may write to different blocks.
   SeenVoxels& at(std::size_t block) { return seen_[block]; }
   /// Computes the void voxels. @param blocks with positions as in at().
   void find(const IndexNumbering& blocks, ThreadPool& pool);
   /// The void voxels of a block, after find().
-  const VoxelMask& voidsOf(std::size_t block) const { return masks_[block]; }
+  const VoxelMask& voidsOf(std::size_t block) const { return voids_[block]; }
 
  private:
   std::vector<SeenVoxels> seen_;
-  std::vector<VoxelMask> masks_, before_;
+  std::vector<VoxelMask> empty_;              ///< crossed or bridged
+  std::vector<VoxelMask> along_x_, along_y_;  ///< seen, with both neighbours along an axis
+  std::vector<VoxelMask> voids_;
 };
 
 }  // namespace bki_mapping

@@ -251,30 +251,44 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
   const Value free = unlimited(voxel, kFreeClass);
   const double above = free.sum - config_.scan_limit.free_threshold - config_.scan_limit.free,
                tolerance = free.tolerance(scale);
-  Seen result = {Answer::kNo, Answer::kNo};
+  Seen result = {Answer::kNo, Answer::kNo, Answer::kNo};
   const bool is_free = above > tolerance;
   if (close || (!fixed && !may_move && std::abs(above) <= tolerance)) {
-    result = {Answer::kUndecided, Answer::kUndecided};
+    result = {Answer::kUndecided, Answer::kUndecided, close ? Answer::kUndecided : Answer::kNo};
   } else if (!fixed && !may_move) {
     if (is_free) result.crossed = Answer::kYes;
-  } else if (!may_move) {
-    result.fixed = Answer::kYes;
+  } else {
+    result.hit = Answer::kYes;
+    if (!may_move) result.fixed = Answer::kYes;
   }
   return seen_[key] = result;
 }
 
+ScanReference::Answer ScanReference::isEmpty(const VoxelIndex& voxel) const {
+  const Seen own = seen(voxel);
+  if (own.crossed == Answer::kYes || own.hit == Answer::kYes) return own.crossed;
+  const auto crossed = [&](int step) {
+    const VoxelIndex at{{voxel.x, voxel.y, voxel.z + step}};
+    return isUpdated(at) ? seen(at).crossed : Answer::kNo;
+  };
+  const Answer no_hit = own.hit == Answer::kNo ? Answer::kYes : Answer::kUndecided;
+  return std::max(own.crossed, std::min({no_hit, crossed(-1), crossed(1)}));
+}
+
+bool ScanReference::isUpdated(const VoxelIndex& voxel) const {
+  return config_.free_space.extent != FreeSpaceExtent::kMapped || config_.free_space.mode != "line" ||
+         blockIsHit(GridGeometry::blockOf(voxel));
+}
+
 ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
-  Answer answer = seen(voxel).crossed;
+  Answer answer = isEmpty(voxel);
   for (int z = -1; z <= 1; ++z) {
     for (int y = -1; y <= 1; ++y) {
       for (int x = -1; x <= 1 && answer != Answer::kNo; ++x) {
+        if (std::abs(x) + std::abs(y) + std::abs(z) == 3) continue;  // across a corner
         const VoxelIndex neighbour{{voxel.x + x, voxel.y + y, voxel.z + z}};
-        if (config_.free_space.extent == FreeSpaceExtent::kMapped && config_.free_space.mode == "line" &&
-            !blockIsHit(GridGeometry::blockOf(neighbour))) {
-          return Answer::kNo;
-        }
-        const Seen beside = seen(neighbour);
-        answer = std::min(answer, std::max(beside.crossed, beside.fixed));
+        if (!isUpdated(neighbour)) return Answer::kNo;
+        answer = std::min(answer, std::max(isEmpty(neighbour), seen(neighbour).fixed));
       }
     }
   }

@@ -65,11 +65,15 @@ class ScanReference {
   Value unlimited(const VoxelIndex& voxel, ClassId label) const;
   enum class Answer { kNo, kUndecided, kYes };
   struct Seen {
-    Answer crossed, fixed;
+    Answer crossed, fixed, hit;
   };
   /// What the scan says of one voxel, for isVoid.
   Seen seen(const VoxelIndex& voxel) const;
-  /// Whether the scan sees the voxel and its neighbours empty.
+  /// Whether the scan adds evidence to the block of a voxel.
+  bool isUpdated(const VoxelIndex& voxel) const;
+  /// Whether the scan sees a voxel empty: beams cross it, or the voxels below and above it.
+  Answer isEmpty(const VoxelIndex& voxel) const;
+  /// Whether the scan sees the voxel and its neighbours across faces and edges empty.
   Answer isVoid(const VoxelIndex& voxel) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;

@@ -11,7 +11,7 @@ struct ScanLimitConfig {
   double free = 0.0;  ///< for `free`; larger sums are cut off
   /// Evidence for `free` that one scan must exceed in a voxel: only the excess counts, and is limited.
   double free_threshold = 0.0;
-  /// Further evidence for `free` where a voxel and its 26 neighbours are all seen, and all empty but for
+  /// Further evidence for `free` where a voxel and its 18 neighbours are all seen, and all empty but for
   /// classes that cannot move; needs `free`. 0: none.
   double void_space = 0.0;
   /// Largest number of blocks that the hits of a scan, or its free space, may touch; 0: the number within the
