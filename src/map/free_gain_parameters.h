@@ -40,16 +40,16 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
           "evidence is at least this factor times that for free, and a quarter of that for what has left: "
           "the floor under the feet of a walker, for example. Smaller values keep more; 0 switches the rule "
           "off."),
-      realParameter(
-          "neighbourhood", &C::neighbourhood, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 10.0),
-          "", Changes::kWhileMapping,
-          "Where the likeliest class of a voxel has the flag dynamic and not the flag living, the voxels up "
-          "to two "
-          "away decide together: it is occupied if the evidence for such classes in those that their own "
-          "evidence "
-          "keeps is at least this factor times that in those that it clears. Set it to about 2 to clear "
-          "remains "
-          "of what has left, and to keep the roofs of parked cars; 0 lets each voxel decide by itself."),
+      realParameter("neighbourhood", &C::neighbourhood,
+                    NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 10.0), "",
+                    Changes::kWhileMapping,
+                    "A voxel whose likeliest class has the flag dynamic and not the flag living is occupied "
+                    "only if, up to "
+                    "two voxels away, the evidence for such classes in those that their own evidence keeps "
+                    "is at least this "
+                    "factor times that in those that it clears. Set it to about 2 to clear remains of what "
+                    "has left; 0 lets "
+                    "each voxel decide by itself."),
   };
 }
 

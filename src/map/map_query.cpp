@@ -147,11 +147,10 @@ void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& blo
 VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block,
                              int offset) {
   OwnEvidence own = ownEvidence(map, block, offset);
-  bool holds = own.holds, restored = false, has_left = false;
-  if (map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
+  bool holds = own.holds, has_left = false;
+  if (holds && map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
     holds = areKept(map, votesAround(map, GridGeometry::voxelOf(index, offset)));
-    restored = holds && !own.holds;
-    has_left = !holds && own.holds;
+    has_left = !holds;
   }
   if (!holds && map.remainingGain() > 0.0f && own.fixed != own.label &&
       own.fixed_best > (own.best - 1) >> kRemainingShift &&
@@ -180,8 +179,8 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, co
   view.evidence = static_cast<float>(of_classes + free);
   view.probability = static_cast<float>(alpha / sum);
   view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
-  view.occupancy = static_cast<float>(
-      occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), restored ? 0.0 : free));
+  view.occupancy =
+      static_cast<float>(occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), free));
   view.class_probability = static_cast<float>(1.0 / squaredRatios(map, block, offset, prior + best));
   return view;
 }

@@ -99,11 +99,8 @@ bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const Blo
   sumWindows(kept, kept_sums);
   sumWindows(cleared, cleared_sums);
   for (std::size_t v = 0; v < overruled.size(); ++v) {
-    overruled[v] = kNotOverruled;
-    if (own.kept[v] == 0 && own.cleared[v] == 0) continue;
-    const bool are_kept = areKept(map, {kept_sums[v], cleared_sums[v]});
-    if (are_kept && own.cleared[v] > 0) overruled[v] = kKept;
-    if (!are_kept && own.kept[v] > 0) overruled[v] = kCleared;
+    const bool is_kept = own.kept[v] == 0 || areKept(map, {kept_sums[v], cleared_sums[v]});
+    overruled[v] = is_kept ? kNotOverruled : kCleared;
   }
   return true;
 }

@@ -9,9 +9,9 @@
 
 namespace bki_mapping {
 
-/// The voxels of a block of whose states those around decide otherwise than their own evidence (12b).
+/// The voxels of a block that their own evidence keeps, and those around clear (12b).
 using Overruled = std::array<std::int32_t, kBlockVoxels>;
-constexpr std::int32_t kNotOverruled = 0, kKept = 1, kCleared = -1;
+constexpr std::int32_t kNotOverruled = 0, kCleared = -1;
 
 /// The planes of a block, and what else the posterior of its voxels depends on.
 struct BlockPlanes {

@@ -224,7 +224,7 @@ template <bool kEntropy>
                  something = prior.something + unless(has_left, best),
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
                  nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something +
-                           weight * unless(overruling == kKept, evidenceOf(free));
+                           weight * evidenceOf(free);
   // The sum of (prior + e)^2 over the classes.
   const FloatVec squares = prior.squares + 2.0f * prior.once * found.classes.evidence() + found.squares.sum;
   StoreU(evidence, view.evidence.data() + v);
@@ -269,7 +269,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       if constexpr (!kPosterior) findGains(planes, found);
       decay(planes, free, found);
       is_occupied &= occupied(found, free);
-      is_occupied = (is_occupied | (overruling == kKept)) & (overruling != kCleared);
+      is_occupied &= overruling != kCleared;
       is_occupied = keepRemaining(planes, free, v, is_occupied, found);
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);

@@ -19,9 +19,9 @@ struct FreeGainConfig {
   /// evidence is at least this factor times that for free, and a quarter of that for what has left; 0: never.
   double remaining = 0.0;
 
-  /// A voxel whose likeliest class is flagged dynamic, but not living, is occupied if, up to two voxels away,
-  /// the evidence in such voxels that are occupied by themselves is at least this factor times that in those
-  /// that are not; 0: each voxel decides by itself.
+  /// A voxel whose likeliest class is flagged dynamic, but not living, is occupied only if, up to two voxels
+  /// away, the evidence in such voxels that are occupied by themselves is at least this factor times that in
+  /// those that are not; 0: each voxel decides by itself.
   double neighbourhood = 0.0;
 };
 
