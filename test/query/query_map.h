@@ -27,7 +27,7 @@ inline SemanticMap queryMap(unsigned seed, const QueryMapKind& kind = {}) {
   SemanticMap map(GridGeometry(kind.resolution), 0.001, 8);
   map.setFreeGain(7, 2.0);
   map.setGainPersistence(3.0);
-  map.setNeighbourhoodRatio(1.5, 0b10001000);
+  map.setNeighbourhoodRatio(0.15, 0b10001000);
   for (int z = -kind.blocks; z < kind.blocks; ++z) {
     for (int y = -kind.blocks; y < kind.blocks; ++y) {
       for (int x = -kind.blocks; x < kind.blocks; ++x) {
