@@ -30,10 +30,10 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
           "void", &C::void_space, evidence, "", Changes::kWhileMapping,
           "Further evidence for free that a scan adds to a voxel which it sees empty together with its 18 "
           "neighbours across faces and edges: each of them without a hit and with as much evidence for free "
-          "as "
-          "scan_limit/free, in it or in the voxels below and above it, or hit only by classes that cannot "
-          "move. Set it several times as high as "
-          "scan_limit/hits to clear what waited for seconds and left; 0 adds none."),
+          "as scan_limit/free, in it or in the voxels below and above it, or hit only by classes that cannot "
+          "move. Set it several times as high as scan_limit/hits to clear what waited for seconds and left; "
+          "0 "
+          "adds none."),
       integerParameter(
           "blocks", &C::blocks, NumberRange::atLeast(0).upTo(1e9), Changes::kWhileMapping,
           "Largest number of blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "
