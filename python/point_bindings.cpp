@@ -7,7 +7,6 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "arrays.h"
@@ -32,12 +31,11 @@ py::array_t<std::uint8_t> statesAt(const FixedMap& map, py::handle object) {
 }
 
 /// @tparam kField the member of PointValues that is asked for.
-template <auto kField>
-auto valuesAt(const FixedMap& map, py::handle object) {
+template <typename Value, Value* PointValues::*kField>
+py::array_t<Value> valuesAt(const FixedMap& map, py::handle object) {
   const Points points(object, "points");
   PointValues values;
-  py::array_t<std::remove_pointer_t<std::decay_t<decltype(values.*kField)>>> result(
-      static_cast<py::ssize_t>(points.size()));
+  py::array_t<Value> result(static_cast<py::ssize_t>(points.size()));
   values.*kField = result.mutable_data();
   read(map, points, values);
   return result;
@@ -235,16 +233,16 @@ py::array_t<float> posterior(const FixedMap& map, py::handle object) {
 void addPoints(MapClass& map) {
   map.def("states", &statesAt, py::arg("points"),
           "The state of each voxel: UNKNOWN, FREE, OCCUPIED or OCCLUDED; (N,), uint8.")
-      .def("labels", &valuesAt<&PointValues::labels>, py::arg("points"),
+      .def("labels", &valuesAt<ClassId, &PointValues::labels>, py::arg("points"),
            "The class id of each occupied voxel; FREE_CLASS elsewhere; (N,), uint8.")
-      .def("probabilities", &valuesAt<&PointValues::probability>, py::arg("points"),
+      .def("probabilities", &valuesAt<float, &PointValues::probability>, py::arg("points"),
            "The expected probability of the voxel's class if it is occupied, otherwise of free; (N,), "
            "float32.")
-      .def("variances", &valuesAt<&PointValues::variance>, py::arg("points"),
+      .def("variances", &valuesAt<float, &PointValues::variance>, py::arg("points"),
            "The variance of `probabilities` under the posterior; (N,), float32.")
-      .def("occupancies", &valuesAt<&PointValues::occupancy>, py::arg("points"),
+      .def("occupancies", &valuesAt<float, &PointValues::occupancy>, py::arg("points"),
            "The probability that something, of any class, is there: 0 to 0.91; (N,), float32.")
-      .def("class_probabilities", &valuesAt<&PointValues::class_probability>, py::arg("points"),
+      .def("class_probabilities", &valuesAt<float, &PointValues::class_probability>, py::arg("points"),
            "The probability of the most likely class, given that something is there; (N,), float32.")
       .def("posterior", &posterior, py::arg("points"),
            "The expected probability of every class, in the order of the class table, and, last, of free; "
