@@ -51,6 +51,10 @@ po::options_description options() {
   return options;
 }
 
+std::string coordinates(const Eigen::Vector3d& point) {
+  return numberText(point.x()) + "," + numberText(point.y()) + "," + numberText(point.z());
+}
+
 /// Three numbers, separated by commas or spaces. @return nothing if the text is anything else.
 std::optional<Eigen::Vector3d> parsePoint(std::string text) {
   std::replace(text.begin(), text.end(), ',', ' ');
@@ -183,13 +187,12 @@ class PointQuery {
         << (with_nearest ? ",nearest_distance,nearest_class,nearest_x,nearest_y,nearest_z" : "") << "\n";
     for (std::size_t n = 0; n < points_.size(); ++n) {
       const Answer& a = answers_[n];
-      for (const double coordinate : points_[n]) out << numberText(coordinate) << ",";
-      out << kStates[static_cast<std::size_t>(a.state)] << "," << nameOf(classes, a.label) << ","
-          << a.occupancy << "," << a.class_probability << "," << a.probability << "," << a.variance;
+      out << coordinates(points_[n]) << "," << kStates[static_cast<std::size_t>(a.state)] << ","
+          << nameOf(classes, a.label) << "," << a.occupancy << "," << a.class_probability << ","
+          << a.probability << "," << a.variance;
       if (with_nearest && a.nearest) {
-        out << "," << a.nearest->distance << "," << nameOf(classes, a.nearest->label);
-        for (const double coordinate : grid_.voxelCentre(a.nearest->voxel))
-          out << "," << numberText(coordinate);
+        out << "," << a.nearest->distance << "," << nameOf(classes, a.nearest->label) << ","
+            << coordinates(grid_.voxelCentre(a.nearest->voxel));
       } else if (with_nearest) {
         out << ",,,,,";
       }
