@@ -8,8 +8,9 @@ namespace bki_mapping {
 /// how much evidence outweighs them: some hundredths of that of one hit.
 constexpr double kPriorOfSomething = 0.1, kPriorOfNothing = 6.0;
 /// Weight of the evidence for `free`: beams that pass through a voxel without hitting what is in it are that
-/// common. A gain above 1 multiplies it.
-constexpr double kWeightOfFree = 0.05;
+/// common: kFreeOfOneHit units of it are worth a unit of hits. A gain above 1 multiplies it.
+constexpr int kFreeOfOneHit = 20;
+constexpr double kWeightOfFree = 1.0 / kFreeOfOneHit;
 /// Evidence for nothing that comes with each unit of evidence of hits: kernels reach voxels beside the
 /// surfaces that were hit.
 constexpr double kBesideSurfaces = 0.1;

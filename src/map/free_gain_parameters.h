@@ -43,13 +43,11 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
       realParameter("neighbourhood", &C::neighbourhood,
                     NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 10.0), "",
                     Changes::kWhileMapping,
-                    "A voxel whose likeliest class has the flag dynamic and not the flag living is occupied "
-                    "only if, up to "
-                    "two voxels away, the evidence for such classes in those that their own evidence keeps "
-                    "is at least this "
-                    "factor times that in those that it clears. Set it to about 2 to clear remains of what "
-                    "has left; 0 lets "
-                    "each voxel decide by itself."),
+                    "Where the likeliest class has the flag dynamic and not the flag living, or no class "
+                    "has the flag dynamic, the voxels up to two away decide together: a voxel is occupied "
+                    "if the evidence in those that their own evidence keeps is at least this factor times "
+                    "that in those that it clears. Set it to about 2 to clear remains of what has left and "
+                    "to keep roofs that beams graze; 0 lets each voxel decide by itself."),
   };
 }
 

@@ -57,7 +57,7 @@ OwnEvidence ownEvidence(const SemanticMap& map, const Block& block, int offset) 
 VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
   VoteSums sums;
   constexpr int kReach = kNeighbourhoodReach;
-  for (int z = -kReach; z <= kReach; ++z) {
+  for (int z = map.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
@@ -65,7 +65,8 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
         if (!block) continue;
         const OwnEvidence own = ownEvidence(map, *block, GridGeometry::offsetInBlock(at));
         if (own.best == 0 || !map.asksNeighbourhood(own.label)) continue;
-        (own.holds ? sums.kept : sums.cleared) += std::min(own.best, kMostVote);
+        (own.holds ? sums.kept : sums.cleared) += std::min(own.best, map.mostVote());
+        sums.keeping += own.holds;
       }
     }
   }
@@ -106,6 +107,7 @@ float decayedGain(const SemanticMap& map, ClassId id, float hits) {
 BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
   BlockPlanes planes;
   planes.map = &map;
+  planes.most_vote = map.mostVote();
   planes.free = kNoEvidence;
   for (std::size_t p = 0; p < block.classes().size(); ++p) {
     const ClassId id = block.classes()[p];
@@ -147,10 +149,14 @@ void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& blo
 VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block,
                              int offset) {
   OwnEvidence own = ownEvidence(map, block, offset);
-  bool holds = own.holds, has_left = false;
-  if (holds && map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
-    holds = areKept(map, votesAround(map, GridGeometry::voxelOf(index, offset)));
-    has_left = !holds;
+  bool holds = own.holds, restored = false, has_left = false;
+  if (map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
+    const VoteSums sums = votesAround(map, GridGeometry::voxelOf(index, offset));
+    const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
+    holds = own.holds ? areKept(map, sums)
+                      : is_doubtful && isRestored(map, std::min(own.best, map.mostVote()), sums);
+    restored = holds && !own.holds;
+    has_left = !holds && own.holds;
   }
   if (!holds && map.remainingGain() > 0.0f && own.fixed != own.label &&
       own.fixed_best > (own.best - 1) >> kRemainingShift &&
@@ -179,8 +185,8 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, co
   view.evidence = static_cast<float>(of_classes + free);
   view.probability = static_cast<float>(alpha / sum);
   view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
-  view.occupancy =
-      static_cast<float>(occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), free));
+  view.occupancy = static_cast<float>(
+      occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), restored ? 0.0 : free));
   view.class_probability = static_cast<float>(1.0 / squaredRatios(map, block, offset, prior + best));
   return view;
 }

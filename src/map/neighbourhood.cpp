@@ -35,9 +35,11 @@ void copyPart(const std::array<EvidenceUnits, kBlockVoxels>& from, const Part& x
   }
 }
 
-/// Sums over the window of each voxel of the block, one axis after the other.
-void sumWindows(const Votes& votes, std::array<EvidenceUnits, kBlockVoxels>& sums) {
-  static_assert(std::int64_t{kMostVote} * kWindow * kWindow * kWindow <= kMostUnits, "sums do not overflow");
+/// Sums over the window of each voxel of the block, one axis after the other. @param first_layer of the
+/// window, along z.
+void sumWindows(const Votes& votes, std::size_t first_layer, std::array<EvidenceUnits, kBlockVoxels>& sums) {
+  static_assert(std::int64_t{SemanticMap::kMostVote} * kWindow * kWindow * kWindow <= kMostUnits,
+                "sums do not overflow");
   static_assert(kWindow == 5, "as many terms");
   constexpr std::size_t kInner = kBlockEdge, kRows = kEdge;
   std::array<std::array<std::array<std::int32_t, kInner>, kRows>, kRows> along_x;
@@ -57,7 +59,7 @@ void sumWindows(const Votes& votes, std::array<EvidenceUnits, kBlockVoxels>& sum
   }
   sums.fill(0);
   for (std::size_t z = 0; z < kInner; ++z) {
-    for (std::size_t n = 0; n < kWindow; ++n) {
+    for (std::size_t n = first_layer; n < kWindow; ++n) {
       const std::int32_t* const layer = along_y[z + n][0].data();
       for (std::size_t v = 0; v < kInner * kInner; ++v) sums[kInner * kInner * z + v] += layer[v];
     }
@@ -76,31 +78,37 @@ bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const Blo
                    const Block& block, Overruled& overruled) {
   if (!mayAskNeighbourhood(map, block)) return false;
   BlockVotes own;
-  if (!kernels.votes(planesOf(map, block), own)) return false;
-  Votes kept{}, cleared{};
+  if (!kernels.votes(planesOf(map, block), {}, own)) return false;
+  Votes kept{}, cleared{}, keeping{};
   BlockVotes beside;
-  for (int z = -1; z <= 1; ++z) {
+  for (int z = map.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
+    const Part layers(z);
     for (int y = -1; y <= 1; ++y) {
       for (int x = -1; x <= 1; ++x) {
         const BlockVotes* votes = &own;
         if (x != 0 || y != 0 || z != 0) {
           const Block* const neighbour = map.find({{index.x + x, index.y + y, index.z + z}});
           if (!neighbour || !mayAskNeighbourhood(map, *neighbour) ||
-              !kernels.votes(planesOf(map, *neighbour), beside))
+              !kernels.votes(planesOf(map, *neighbour), {layers.from, layers.from + layers.count}, beside))
             continue;
           votes = &beside;
         }
-        copyPart(votes->kept, Part(x), Part(y), Part(z), kept);
-        copyPart(votes->cleared, Part(x), Part(y), Part(z), cleared);
+        copyPart(votes->kept, Part(x), Part(y), layers, kept);
+        copyPart(votes->cleared, Part(x), Part(y), layers, cleared);
+        copyPart(votes->is_kept, Part(x), Part(y), layers, keeping);
       }
     }
   }
-  std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums;
-  sumWindows(kept, kept_sums);
-  sumWindows(cleared, cleared_sums);
+  std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums, keeping_sums;
+  const std::size_t first_layer = map.neighbourhoodIsBelow() ? 0 : kReach;
+  sumWindows(kept, first_layer, kept_sums);
+  sumWindows(cleared, first_layer, cleared_sums);
+  sumWindows(keeping, first_layer, keeping_sums);
   for (std::size_t v = 0; v < overruled.size(); ++v) {
-    const bool is_kept = own.kept[v] == 0 || areKept(map, {kept_sums[v], cleared_sums[v]});
-    overruled[v] = is_kept ? kNotOverruled : kCleared;
+    const VoteSums sums{kept_sums[v], cleared_sums[v], keeping_sums[v]};
+    overruled[v] = kNotOverruled;
+    if (own.kept[v] > 0 && !areKept(map, sums)) overruled[v] = kCleared;
+    if (own.doubtful[v] > 0 && isRestored(map, own.doubtful[v], sums)) overruled[v] = kKept;
   }
   return true;
 }

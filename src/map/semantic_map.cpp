@@ -143,6 +143,7 @@ SemanticMap SemanticMap::emptyLikeThis() const {
   empty.remaining_gain_ = remaining_gain_;
   empty.neighbourhood_ratio_ = neighbourhood_ratio_;
   empty.asking_ = asking_;
+  empty.neighbourhood_is_below_ = neighbourhood_is_below_;
   empty.fixed_ = fixed_;
   return empty;
 }

@@ -9,9 +9,9 @@
 
 namespace bki_mapping {
 
-/// The voxels of a block that their own evidence keeps, and those around clear (12b).
+/// The voxels of a block of whose states those around decide otherwise than their own evidence (12b).
 using Overruled = std::array<std::int32_t, kBlockVoxels>;
-constexpr std::int32_t kNotOverruled = 0, kCleared = -1;
+constexpr std::int32_t kNotOverruled = 0, kKept = 1, kCleared = -1;
 
 /// The planes of a block, and what else the posterior of its voxels depends on.
 struct BlockPlanes {
@@ -25,6 +25,7 @@ struct BlockPlanes {
   };
 
   const SemanticMap* map;
+  EvidenceUnits most_vote;                ///< SemanticMap::mostVote
   std::array<Plane, kMaxClasses> planes;  ///< of classes, by rising id; the first `count`
   std::size_t count = 0;
   const EvidenceUnits* free = nullptr;  ///< zeros if the block has no plane for `free`
@@ -32,11 +33,14 @@ struct BlockPlanes {
   const Overruled* overruled = nullptr;  ///< by the voxels around; nullptr: none is
 };
 
-/// What the voxels of a block say to those around that ask (12b) [units, at most kMostVote]: the evidence for
-/// the likeliest class where that asks its neighbourhood, too, and the voxel's own evidence keeps or clears
-/// it.
+/// What the voxels of a block say to those around that ask (12b) [units, at most SemanticMap::mostVote]: the
+/// evidence for the likeliest class where that asks its neighbourhood, too, and the voxel's own evidence
+/// keeps or clears it.
 struct BlockVotes {
   alignas(64) std::array<EvidenceUnits, kBlockVoxels> kept, cleared;
+  /// Of the cleared ones, those in which hits outweigh `free` by its weight in (13): they may be kept.
+  alignas(64) std::array<EvidenceUnits, kBlockVoxels> doubtful;
+  alignas(64) std::array<std::int32_t, kBlockVoxels> is_kept;  ///< 1 where it is, otherwise 0
 };
 
 /// The loops for one instruction set: they set all fields of the view that they are named for, and state
@@ -48,8 +52,9 @@ struct ViewKernels {
   Read states;     ///< state and label
   Read posterior;  ///< all but entropy
   Read all;
-  /// @return whether any voxel asks its neighbourhood; otherwise all votes are 0.
-  bool (*votes)(const BlockPlanes& planes, BlockVotes& votes);
+  /// Sets the votes of some layers along z. @return whether any voxel of these asks its neighbourhood;
+  /// otherwise all these votes are 0.
+  bool (*votes)(const BlockPlanes& planes, Block::Layers layers, BlockVotes& votes);
 };
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.
@@ -67,8 +72,6 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIn
 
 /// Whether a voxel with evidence is occupied: Equation 11 in docs/method.md, decided on whole units.
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free);
-/// The most that one voxel counts for in (12b), so that the sum over a neighbourhood stays whole [units].
-constexpr EvidenceUnits kMostVote = 1 << 23;
 /// log2 of the share that (12a) asks of what remains: a quarter of the evidence of what has left.
 constexpr int kRemainingShift = 2;
 /// SemanticMap::freeGain, compiled for any processor.

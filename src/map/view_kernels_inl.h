@@ -224,7 +224,7 @@ template <bool kEntropy>
                  something = prior.something + unless(has_left, best),
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
                  nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something +
-                           weight * evidenceOf(free);
+                           weight * unless(overruling == kKept, evidenceOf(free));
   // The sum of (prior + e)^2 over the classes.
   const FloatVec squares = prior.squares + 2.0f * prior.once * found.classes.evidence() + found.squares.sum;
   StoreU(evidence, view.evidence.data() + v);
@@ -269,7 +269,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       if constexpr (!kPosterior) findGains(planes, found);
       decay(planes, free, found);
       is_occupied &= occupied(found, free);
-      is_occupied &= overruling != kCleared;
+      is_occupied = (is_occupied | (overruling == kKept)) & (overruling != kCleared);
       is_occupied = keepRemaining(planes, free, v, is_occupied, found);
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
@@ -288,20 +288,27 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
   }
 }
 
-inline bool readVotes(const BlockPlanes& planes, BlockVotes& votes) {
+inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVotes& votes) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  static_assert(kLayer % kLanes == 0, "vectors end with a layer");
   IntVec any = {};
-  for (int v = 0; v < kBlockVoxels; v += kLanes) {
+  for (int v = kLayer * layers.begin; v < kLayer * layers.end; v += kLanes) {
     const IntVec free = Max(LoadU(planes.free + v), IntVec{});
     Likeliest found = findLikeliest<true>(planes, v);
     IntVec asks = {};
     for (std::size_t p = 0; p < planes.count; ++p) {
       if (planes.planes[p].asks) asks |= found.label == planes.planes[p].id;
     }
-    const IntVec vote = Min(found.best, Set(kMostVote)) & asks;
+    const IntVec vote = Min(found.best, Set(planes.most_vote)) & asks;
     any |= vote;
     decay(planes, free, found);
     const Mask is_kept = occupied(found, free);
     StoreU(vote & is_kept, votes.kept.data() + v);
+    constexpr EvidenceUnits kMostHits = kMostUnits / kFreeOfOneHit;  // more outweigh all
+    const Mask outweighs =
+        (found.best > kMostHits) | (kFreeOfOneHit * Min(found.best, Set(kMostHits)) >= free);
+    StoreU(vote & ~is_kept & outweighs, votes.doubtful.data() + v);
+    StoreU((vote > 0) & is_kept & 1, votes.is_kept.data() + v);
     StoreU(vote & ~is_kept, votes.cleared.data() + v);
   }
   return AnyTrue(any != 0);

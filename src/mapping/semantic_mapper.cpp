@@ -59,11 +59,18 @@ SemanticMap::Classes fixedClasses(const ClassTable& classes) {
   return fixed;
 }
 
-/// The classes of what moves, and may also be parked.
-SemanticMap::Classes parkingClasses(const ClassTable& classes) {
-  SemanticMap::Classes parking;
-  for (const SemanticClass& c : classes.classes()) parking[c.id] = c.dynamic && !c.living && !c.unlabelled;
-  return parking;
+/// The classes that ask their neighbourhood: what can be parked; or all, if nothing says what can move.
+SemanticMap::Classes askingClasses(const ClassTable& classes, bool says_what_moves) {
+  SemanticMap::Classes asking;
+  for (const SemanticClass& c : classes.classes()) {
+    asking[c.id] = !c.unlabelled && (!says_what_moves || (c.dynamic && !c.living));
+  }
+  return asking;
+}
+
+bool saysWhatMoves(const ClassTable& classes) {
+  const auto& all = classes.classes();
+  return std::any_of(all.begin(), all.end(), [](const SemanticClass& c) { return c.dynamic; });
 }
 
 UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
@@ -160,7 +167,10 @@ SemanticMapper::~SemanticMapper() = default;
 void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
   map_.setRemainingGain(config_.free_gain.remaining, fixedClasses(*classes_));
-  map_.setNeighbourhoodRatio(config_.free_gain.neighbourhood, parkingClasses(*classes_));
+  // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
+  const bool says_what_moves = saysWhatMoves(*classes_);
+  map_.setNeighbourhoodRatio(config_.free_gain.neighbourhood, askingClasses(*classes_, says_what_moves),
+                             says_what_moves);
   for (const SemanticClass& c : classes_->classes()) {
     const FreeGainConfig& gain = config_.free_gain;
     double of_kind = gain.static_classes;

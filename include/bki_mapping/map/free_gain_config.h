@@ -19,9 +19,11 @@ struct FreeGainConfig {
   /// evidence is at least this factor times that for free, and a quarter of that for what has left; 0: never.
   double remaining = 0.0;
 
-  /// A voxel whose likeliest class is flagged dynamic, but not living, is occupied only if, up to two voxels
-  /// away, the evidence in such voxels that are occupied by themselves is at least this factor times that in
-  /// those that are not; 0: each voxel decides by itself.
+  /// A voxel whose likeliest class is flagged dynamic, but not living, is occupied if, up to two voxels away,
+  /// the evidence in such voxels that are occupied by themselves is at least this factor times that in those
+  /// that are not; 0: each voxel decides by itself. One that is not occupied by itself stays free if it has
+  /// less than a quarter of the mean evidence of those that are, or less than a twentieth of its evidence for
+  /// free. If no class is flagged dynamic, all classes count, and no voxel below.
   double neighbourhood = 0.0;
 };
 

@@ -74,14 +74,26 @@ class SemanticMap {
   /// default: each voxel decides by itself (Equation 12b in docs/method.md).
   float neighbourhoodRatio() const { return neighbourhood_ratio_; }
   bool asksNeighbourhood(ClassId id) const { return asking_[id]; }
-  void setNeighbourhoodRatio(double ratio, const Classes& asking) {
+  /// Whether the neighbourhood of a voxel includes voxels below it.
+  bool neighbourhoodIsBelow() const { return neighbourhood_is_below_; }
+  void setNeighbourhoodRatio(double ratio, const Classes& asking, bool is_below = true) {
     neighbourhood_ratio_ = finite(ratio);
     asking_ = asking;
+    neighbourhood_is_below_ = is_below;
   }
+  /// The most that one voxel counts for in a neighbourhood [units].
+  EvidenceUnits mostVote() const {
+    constexpr float kPersistences = 8.0f, kMost = kMostVote * kEvidenceUnit;
+    if (!(gain_persistence_ > 0.0f)) return kMostVote;
+    return std::max(unitsOf(std::min(kPersistences * gain_persistence_, kMost)), 1);
+  }
+  /// That of persistences above 16, so that the sum over a neighbourhood stays whole [units].
+  static constexpr EvidenceUnits kMostVote = 1 << 23;
   /// Whether equal blocks of both maps, with equal blocks around, have the same states and labels.
   bool decidesAs(const SemanticMap& other) const {
     return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_ &&
-           (neighbourhood_ratio_ == 0.0f || asking_ == other.asking_) &&
+           (neighbourhood_ratio_ == 0.0f ||
+            (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_)) &&
            neighbourhood_ratio_ == other.neighbourhood_ratio_ && remaining_gain_ == other.remaining_gain_ &&
            (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
   }
@@ -209,6 +221,7 @@ class SemanticMap {
   std::array<float, 256> free_gains_;
   float gain_persistence_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
   Classes fixed_, asking_;
+  bool neighbourhood_is_below_ = true;
   std::vector<SharedRegion> regions_;
   GridTable region_position_;  ///< of each region in regions_
   std::size_t size_ = 0;       ///< number of blocks
