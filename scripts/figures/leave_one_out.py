@@ -1,7 +1,8 @@
 """Tunes on all drives but one, and judges on the one left out.
 
 For each drive, chooses the setting whose worst drive among the others is best, and prints what it does on that drive. The
-figure of a drive is sqrt(parked DA), which takes parked cars as seriously as ghosts; where SA is below 99 %, it is 0.
+figure of a drive is sqrt(parked DA), which takes parked cars as seriously as ghosts; where SA is below --least-sa, it is 0.
+DA is that of decidable points (da_decidable), so that no drive decides all choices by points of which no map can tell.
 """
 import argparse
 import itertools
@@ -11,41 +12,41 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-GAINS = {'persistence': (0.03, 0.04, 0.05), 'dynamic': (50, 100, 200), 'remaining': (0.05, 0.2)}
+GAINS = {'persistence': (0.02, 0.03, 0.04), 'dynamic': (50, 100, 200), 'neighbourhood': (0, 1.5, 2, 2.5)}  # of robot
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
              'crowd': {'scene': 'crowd', 'scans': 200}}
-LEAST_SA = 0.99
 
 
-def judgements():
+def judgements(gains=None):
     """All settings of free_gain, as --judge of evaluate_map takes them."""
-    return [','.join(f'free_gain/{name}={value:g}' for name, value in zip(GAINS, values))
-            for values in itertools.product(*GAINS.values())]
+    gains = gains or GAINS
+    return [','.join(f'free_gain/{name}={value:g}' for name, value in zip(gains, values))
+            for values in itertools.product(*gains.values())]
 
 
-def figure_of(figures):
-    """What a setting is worth on a drive; 1 at best. Drives on which nothing that can move stands have no `parked`."""
-    if figures['sa'] < LEAST_SA:
+def figure_of(figures, least_sa):
+    """What a setting is worth on a drive; 1 at best. Where nothing is known to stand that can move, SA stands in."""
+    if figures['sa'] < least_sa:
         return 0.0
-    parked = 1.0 if figures['sa_standing'] is None else figures['sa_standing']
-    return math.sqrt(parked * (1.0 if figures['da'] is None else figures['da']))
+    parked = figures['sa'] if figures['sa_standing'] is None else figures['sa_standing']
+    return math.sqrt(parked * (1.0 if figures['da_decidable'] is None else figures['da_decidable']))
 
 
-def chosen(figures_of, drives):
+def chosen(figures_of, drives, least_sa):
     """The setting whose worst drive is best; of equals, the first. figures_of[setting][drive] are figures."""
-    return max(figures_of, key=lambda setting: min(figure_of(figures_of[setting][drive]) for drive in drives))
+    return max(figures_of, key=lambda setting: min(figure_of(figures_of[setting][drive], least_sa) for drive in drives))
 
 
-def left_out(figures_of):
+def left_out(figures_of, least_sa):
     """For each drive, what was chosen on the others, and its figures there; and what is chosen on all."""
     drives = list(next(iter(figures_of.values())))
     rows = []
     for drive in drives:
-        setting = chosen(figures_of, [other for other in drives if other != drive])
+        setting = chosen(figures_of, [other for other in drives if other != drive], least_sa)
         rows.append((drive, setting, figures_of[setting][drive]))
-    return rows, chosen(figures_of, drives)
+    return rows, chosen(figures_of, drives, least_sa)
 
 
 def table(rows):
@@ -56,13 +57,13 @@ def table(rows):
                      for drive, setting, figures in rows])
 
 
-def measured(programs, sequences, preset, voids, gains=None):
+def measured(programs, sequences, preset, voids, gains=None, more=()):
     """figures_of, with one pass over each sequence for each value of scan_limit/void, which changes evidence."""
     judged = [word for gain in gains or judgements() for word in ('--judge', gain)]
     figures_of = {}
     for void in voids:
         for name, sequence in sequences.items():
-            figures = programs.evaluate(sequence, {'scan_limit/void': void}, ['--config', preset, *judged])
+            figures = programs.evaluate(sequence, {'scan_limit/void': void}, ['--config', preset, *more, *judged])
             for each in figures['judged']:
                 figures_of.setdefault(f'scan_limit/void={void:g},' + each['settings'], {})[name] = each
     return figures_of
@@ -73,6 +74,11 @@ def main():
     parser.add_argument('--programs', default='build/devel/lib/bki_mapping', help='folder with the programs of the package')
     parser.add_argument('--presets', default='config/presets', help='folder with the presets')
     parser.add_argument('--scratch', required=True, help='folder for simulated drives')
+    parser.add_argument('--preset', default='robot', help='the preset to start from')
+    parser.add_argument('--classes', help='class table, as for evaluate_map')
+    parser.add_argument('--gain', action='append', nargs='+', default=[], metavar=('NAME', 'VALUE'),
+                        help='values of free_gain/NAME to compare, instead of those for robot; repeatable')
+    parser.add_argument('--least-sa', type=float, default=0.994, help='SA below which a setting is not chosen')
     parser.add_argument('--void', type=float, nargs='+', default=[2.4], help='values of scan_limit/void to compare')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
@@ -80,7 +86,10 @@ def main():
     programs = Programs(given.programs, os.path.abspath(given.scratch))
     sequences = {name: programs.simulate(name, **options) for name, options in SIMULATED.items()}
     sequences.update({os.path.basename(os.path.abspath(path)): path for path in given.sequence})
-    rows, best = left_out(measured(programs, sequences, os.path.join(given.presets, 'robot.yaml'), given.void))
+    gains = {name: [float(value) for value in values] for name, *values in given.gain}
+    preset = os.path.join(given.presets, given.preset + '.yaml')
+    more = ['--classes', given.classes] if given.classes else []
+    rows, best = left_out(measured(programs, sequences, preset, given.void, judgements(gains), more), given.least_sa)
     print(table(rows) + f'\nchosen on all: {best}')
 
 

@@ -55,11 +55,11 @@ class Figures(unittest.TestCase):
 
     def test_the_drive_left_out_has_no_say(self):
         def figures(sa, parked, da):
-            return {'sa': sa, 'sa_standing': parked, 'da': da, 'aa': 0.0, 'floor_holes': 0.0}
+            return {'sa': sa, 'sa_standing': parked, 'da': 0.5, 'da_decidable': da, 'aa': 0.0, 'floor_holes': 0.0}
         good, bad = figures(1.0, 0.95, 0.95), figures(1.0, 0.95, 0.5)
         figures_of = {'a': {'x': bad, 'y': good, 'z': good}, 'b': {'x': good, 'y': figures(1.0, 0.5, 0.9), 'z': good},
                       'c': {'x': figures(1.0, None, 1.0), 'y': figures(0.98, 1.0, 1.0), 'z': figures(1.0, 1.0, None)}}
-        rows, best = leave_one_out.left_out(figures_of)
+        rows, best = leave_one_out.left_out(figures_of, 0.99)
         self.assertEqual([(drive, setting) for drive, setting, _ in rows], [('x', 'a'), ('y', 'c'), ('z', 'a')])
         self.assertEqual(best, 'a')
         self.assertIs(rows[0][2], bad)  # on x, the choice of the others is bad, which only leaving out shows
