@@ -241,7 +241,7 @@ void addPoints(MapClass& map) {
       .def("variances", &valuesAt<float, &PointValues::variance>, py::arg("points"),
            "The variance of `probabilities` under the posterior; (N,), float32.")
       .def("occupancies", &valuesAt<float, &PointValues::occupancy>, py::arg("points"),
-           "The probability that something, of any class, is there: 0 to 0.91; (N,), float32.")
+           "The probability that something, of any class, is there: 0.029 to 0.91; (N,), float32.")
       .def("class_probabilities", &valuesAt<float, &PointValues::class_probability>, py::arg("points"),
            "The probability of the most likely class, given that something is there; (N,), float32.")
       .def("posterior", &posterior, py::arg("points"),

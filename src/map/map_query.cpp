@@ -75,9 +75,9 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
 
 /// Equation 13: the probability that something is in a voxel. @param best evidence of the likeliest class.
 double occupancyOf(double prior, double best, double gain, double free) {
-  const double something = kPriorOfSomething * prior + best;
-  const double nothing =
-      kPriorOfNothing * prior + kBesideSurfaces * something + kWeightOfFree * std::max(gain, 1.0) * free;
+  const double weighted_free = kWeightOfFree * std::max(gain, 1.0) * free;
+  const double something = kPriorOfSomething * prior + best + kInFreeSpace * weighted_free;
+  const double nothing = kPriorOfNothing * prior + kBesideSurfaces * something + weighted_free;
   return something / (something + nothing);
 }
 

@@ -221,10 +221,11 @@ template <bool kEntropy>
                  not_p = (prior.classes + others.evidence()) * inverse_sum;
   const Mask has_left = (overruling == kCleared) & ~is_occupied;  // otherwise a fixed class remains
   const FloatVec best = evidenceOf(found.best), alpha = prior.once + best,
-                 something = prior.something + unless(has_left, best),
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
-                 nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something +
-                           weight * unless(overruling == kKept, evidenceOf(free));
+                 weighted_free = weight * unless(overruling == kKept, evidenceOf(free)),
+                 something = prior.something + unless(has_left, best) +
+                             static_cast<float>(kInFreeSpace) * weighted_free,
+                 nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something + weighted_free;
   // The sum of (prior + e)^2 over the classes.
   const FloatVec squares = prior.squares + 2.0f * prior.once * found.classes.evidence() + found.squares.sum;
   StoreU(evidence, view.evidence.data() + v);

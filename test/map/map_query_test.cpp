@@ -43,8 +43,8 @@ VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
 
 /// Equation 13, for the class with the most evidence.
 double occupancyOf(double best, double gain_times_free) {
-  const double something = 0.1 * kPrior + best;
-  return something / (1.1 * something + 6 * kPrior + 0.05 * gain_times_free);
+  const double free = 0.05 * gain_times_free, something = 0.2 * kPrior + best + 0.03 * free;
+  return something / (1.1 * something + 6 * kPrior + free);
 }
 
 TEST(MapQuery, OccupiedVoxel) {
@@ -135,7 +135,7 @@ TEST(MapQuery, StatesAgreeWithTheOccupancy) {
     const RandomVoxel voxel(random);
     const VoxelView view = voxel.view();
     if (view.state == VoxelState::kUnknown) continue;
-    const double threshold = 1.0 / (1.1 + 0.05 / std::min(voxel.gain(), 1.0));
+    const double threshold = 1.0 / (1.1 + 0.05 / (std::min(voxel.gain(), 1.0) + 0.0015));
     if (view.state == VoxelState::kFree) {
       EXPECT_LT(static_cast<double>(view.occupancy), threshold + 1e-6) << n;
       ++free;

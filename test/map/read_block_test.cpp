@@ -247,7 +247,7 @@ TEST(ReadBlock, ATinyPriorIsANumberStill) {
     readBlock(viewKernelsFor(set), map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll, view);
     for (std::size_t v = 0; v < 2; ++v) {
       EXPECT_NEAR(view.probability[v], v == 0 ? 1.0 : 0.25, 1e-6);
-      EXPECT_NEAR(view.occupancy[v], v == 0 ? 1.0 / 1.1 : 0.1 / (1.1 * 0.1 + 6.0), 1e-6);
+      EXPECT_NEAR(view.occupancy[v], v == 0 ? 1.0 / 1.1 : 0.2 / (1.1 * 0.2 + 6.0), 1e-6);
       EXPECT_NEAR(view.class_probability[v], v == 0 ? 1.0 : 1.0 / 3.0, 1e-6);
       EXPECT_NEAR(view.entropy[v], v == 0 ? 0.0 : std::log(4.0), 1e-6);
     }

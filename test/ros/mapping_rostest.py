@@ -110,7 +110,7 @@ class MappingTest(unittest.TestCase):
         # Evidence: 2 for the car, 1 for free of the beam that ends beyond the voxel's centre; prior 21 * 0.001.
         block = next(b for b in message.blocks if (b.x, b.y, b.z) == (0, 0, 0))
         self.assertAlmostEqual(block.probability[4], (2 + 0.001) / (3 + 21 * 0.001), places=5)
-        self.assertAlmostEqual(block.occupancy[4], 2.0001 / (1.1 * 2.0001 + 6 * 0.001 + 0.05), places=5)
+        self.assertAlmostEqual(block.occupancy[4], 2.0017 / (1.1 * 2.0017 + 6 * 0.001 + 0.05), places=5)
         self.assertAlmostEqual(block.class_probability[4], 1.0, places=5)
 
         cloud = self.latest('voxel_cloud', PointCloud2, stamp)

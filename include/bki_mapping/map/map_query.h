@@ -41,7 +41,7 @@ struct VoxelView {
   ClassId label = kFreeClass;  ///< the class of an occupied voxel (ties: the smaller id), else kFreeClass
   float probability = 0.0f;    ///< p = alpha / sum(alpha) of `label`
   float variance = 0.0f;       ///< p (1 - p) / (sum(alpha) + 1)
-  /// Probability that something is there; calibrated on drives whose truth is known. It is at most 0.91, and
+  /// Probability that something is there; calibrated on drives whose truth is known. It is 0.029 to 0.91, and
   /// below a threshold that depends on the gain if the voxel is free (below 0.87 in any case).
   float occupancy = 0.0f;
   /// Probability of the likeliest class, given that something is there; in a free voxel, too. Wrong labels
