@@ -12,7 +12,7 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-GAINS = {'persistence': (0.02, 0.03, 0.04), 'dynamic': (50, 100, 200), 'neighbourhood': (0, 1.5, 2, 2.5)}  # of robot
+GAINS = {'persistence': (0.03, 0.04), 'dynamic': (100, 200), 'neighbourhood': (0, 1.5, 1.75, 2)}  # for robot
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
@@ -79,7 +79,7 @@ def main():
     parser.add_argument('--gain', action='append', nargs='+', default=[], metavar=('NAME', 'VALUE'),
                         help='values of free_gain/NAME to compare, instead of those for robot; repeatable')
     parser.add_argument('--least-sa', type=float, default=0.994, help='SA below which a setting is not chosen')
-    parser.add_argument('--void', type=float, nargs='+', default=[2.4], help='values of scan_limit/void to compare')
+    parser.add_argument('--void', type=float, nargs='+', default=[0.6], help='values of scan_limit/void to compare')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
     given = parser.parse_args()
