@@ -416,6 +416,28 @@ TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
   }
 }
 
+TEST(Laws, NeighbourhoodsAreAskedByTheFlagsOfClasses) {
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();  // the first is unlabelled
+  MapperConfig config;
+  config.free_gain.neighbourhood = 2.0;
+  const auto asking = [&] {
+    const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
+    EXPECT_EQ(mapper.map().neighbourhoodRatio(), 2.0f);
+    std::vector<int> asked;
+    for (const SemanticClass& c : classes) {
+      if (mapper.map().asksNeighbourhood(c.id)) asked.push_back(c.id);
+    }
+    return std::pair(asked, mapper.map().neighbourhoodIsBelow());
+  };
+  std::vector<int> labelled;
+  for (std::size_t n = 1; n < classes.size(); ++n) labelled.push_back(classes[n].id);
+  EXPECT_EQ(asking(), std::pair(labelled, false)) << "nothing says what can move";
+  classes[2].dynamic = true;
+  EXPECT_EQ(asking(), std::pair(std::vector<int>{classes[2].id}, true)) << "what can be parked";
+  classes[2].living = true;
+  EXPECT_EQ(asking(), std::pair(std::vector<int>{}, true));
+}
+
 TEST(Laws, GainsFollowTheFlagsOfClasses) {
   std::vector<SemanticClass> classes = reference::smallTable()->classes();
   classes[2].dynamic = true;
