@@ -1,6 +1,7 @@
 #include "bki_mapping/map/map_query.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -55,13 +56,22 @@ OwnEvidence ownEvidence(const SemanticMap& map, const Block& block, int offset) 
 
 /// Equation 12b: what the voxels around say of one that asks them.
 VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
-  VoteSums sums;
   constexpr int kReach = kNeighbourhoodReach;
+  static_assert(2 * kReach < kBlockEdge, "they are in at most two blocks along each axis");
+  const BlockIndex first = GridGeometry::blockOf({{voxel.x - kReach, voxel.y - kReach, voxel.z - kReach}});
+  std::array<const Block*, 8> blocks;
+  for (int n = 0; n < 8; ++n) {
+    blocks[static_cast<std::size_t>(n)] =
+        map.find({{first.x + (n & 1), first.y + (n >> 1 & 1), first.z + (n >> 2)}});
+  }
+  VoteSums sums;
   for (int z = map.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
-        const Block* const block = map.find(GridGeometry::blockOf(at));
+        const BlockIndex index = GridGeometry::blockOf(at);
+        const int n = index.x - first.x + 2 * (index.y - first.y) + 4 * (index.z - first.z);
+        const Block* const block = blocks[static_cast<std::size_t>(n)];
         if (!block) continue;
         const OwnEvidence own = ownEvidence(map, *block, GridGeometry::offsetInBlock(at));
         if (own.best == 0 || !map.asksNeighbourhood(own.label)) continue;
