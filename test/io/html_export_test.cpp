@@ -28,6 +28,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 SemanticMap mapWithGain(unsigned seed = 4) {
   SemanticMap map = randomMap(seed, 60, 12);
   map.setFreeGain(80, 0.1);
+  Block::Occlusion marks;  // in a block of their own, whatever the random ones have
+  marks.set(5).set(300);
+  map.getOrAllocate({{20, -20, 3}}).setOcclusion(marks);
   return map;
 }
 
