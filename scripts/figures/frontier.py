@@ -10,7 +10,7 @@ def line(extent='mapped', weight='bilinear'):
     return {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
 
 
-# The steps from plain lines to the preset `robot`.
+# Steps from plain lines towards the preset `robot`.
 STEPS = {
     '+ hits before misses': {'free_space/hits_before_misses': 'true'},
     '+ free_gain/static 0.1': {'free_gain/static': 0.1},

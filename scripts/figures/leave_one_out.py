@@ -2,7 +2,7 @@
 
 For each drive, chooses the setting whose worst drive among the others is best, and prints what it does on that drive. The
 figure of a drive is sqrt(parked DA), which takes parked cars as seriously as ghosts; where SA is below --least-sa, it is 0.
-DA is that of decidable points (da_decidable), so that no drive decides all choices by points of which no map can tell.
+DA is that of decidable points (da_decidable), so that no drive decides all choices through points that no map can decide.
 """
 import argparse
 import itertools
@@ -27,7 +27,7 @@ def judgements(gains=None):
 
 
 def figure_of(figures, least_sa):
-    """What a setting is worth on a drive; 1 at best. Where nothing is known to stand that can move, SA stands in."""
+    """What a setting is worth on a drive; 1 at best. Where nothing that can move is known to stand still, it takes SA."""
     if figures['sa'] < least_sa:
         return 0.0
     parked = figures['sa'] if figures['sa_standing'] is None else figures['sa_standing']

@@ -32,7 +32,9 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
           Changes::kWhileMapping,
           "Evidence from hits over which a gain g above 1 falls, to 1 + (g - 1) exp(-evidence / "
           "persistence). Set it to the evidence of a few scans to keep what is hit again and again, "
-          "such as parked cars; 0 keeps gains constant."),
+          "such as parked cars; 0 keeps gains constant. Eight times it is the most that a voxel counts for "
+          "in "
+          "free_gain/neighbourhood."),
       realParameter(
           "remaining", &C::remaining, NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6), "",
           Changes::kWhileMapping,
@@ -46,8 +48,10 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
                     "Where the likeliest class has the flag dynamic and not the flag living, or no class "
                     "has the flag dynamic, the voxels up to two away decide together: a voxel is occupied "
                     "if the evidence in those that their own evidence keeps is at least this factor times "
-                    "that in those that it clears. Set it to about 2 to clear remains of what has left and "
-                    "to keep roofs that beams graze; 0 lets each voxel decide by itself."),
+                    "that in those that it clears. One that its own evidence clears also needs a quarter of "
+                    "the mean evidence of those kept, and a twentieth of its evidence for free. Set it to "
+                    "about 2 to clear remains of what has left and to keep roofs that beams graze; 0 lets "
+                    "each voxel decide by itself."),
   };
 }
 

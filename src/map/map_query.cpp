@@ -65,6 +65,7 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
         map.find({{first.x + (n & 1), first.y + (n >> 1 & 1), first.z + (n >> 2)}});
   }
   VoteSums sums;
+  const EvidenceUnits most = map.mostVote();
   for (int z = map.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
@@ -75,7 +76,7 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
         if (!block) continue;
         const OwnEvidence own = ownEvidence(map, *block, GridGeometry::offsetInBlock(at));
         if (own.best == 0 || !map.asksNeighbourhood(own.label)) continue;
-        (own.holds ? sums.kept : sums.cleared) += std::min(own.best, map.mostVote());
+        (own.holds ? sums.kept : sums.cleared) += std::min(own.best, most);
         sums.keeping += own.holds;
       }
     }

@@ -123,7 +123,8 @@ std::vector<GridIndex> withDependents(const SemanticMap& map, Span<const GridInd
   for (const GridIndex& index : blocks) insert(index);
   if (!(map.neighbourhoodRatio() > 0.0f)) return all;
   for (const GridIndex& index : blocks) {
-    for (int n = 0; n < 27; ++n) {
+    // Where no voxel asks those below, nothing depends on what is below it.
+    for (int n = 0; n < (map.neighbourhoodIsBelow() ? 27 : 18); ++n) {
       const GridIndex beside{index.x + n % 3 - 1, index.y + n / 3 % 3 - 1, index.z + n / 9 - 1};
       if (known.find(beside) != kNoPosition) continue;
       const Block* const block = map.find({beside});

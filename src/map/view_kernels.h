@@ -9,7 +9,7 @@
 
 namespace bki_mapping {
 
-/// The voxels of a block of whose states those around decide otherwise than their own evidence (12b).
+/// The voxels of a block whose own evidence is overruled by the voxels around them (12b).
 using Overruled = std::array<std::int32_t, kBlockVoxels>;
 constexpr std::int32_t kNotOverruled = 0, kKept = 1, kCleared = -1;
 
@@ -38,7 +38,8 @@ struct BlockPlanes {
 /// keeps or clears it.
 struct BlockVotes {
   alignas(64) std::array<EvidenceUnits, kBlockVoxels> kept, cleared;
-  /// Of the cleared ones, those in which hits outweigh `free` by its weight in (13): they may be kept.
+  /// Of the cleared ones, those in which hits outweigh a twentieth of the evidence for `free`: they may be
+  /// kept.
   alignas(64) std::array<EvidenceUnits, kBlockVoxels> doubtful;
   alignas(64) std::array<std::int32_t, kBlockVoxels> is_kept;  ///< 1 where it is, otherwise 0
 };

@@ -70,14 +70,14 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
   if (kind.neighbours) {
     SemanticMap::Classes asking;
     for (std::size_t id = 0; id < kind.classes; ++id) asking[id] = random() % 2 == 0;
-    map.setNeighbourhoodRatio(std::exp2(static_cast<double>(random() % 5) - 2.0), asking);
+    map.setNeighbourhoodRatio(std::exp2(static_cast<double>(random() % 5) - 2.0), asking, random() % 2 == 0);
   }
   if (kind.occlusion) {
     Block::Occlusion marks;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) marks[v] = random() % 2 == 0;
     block.setOcclusion(marks);
   }
-  constexpr double kGains[] = {1.0, 0.1, 0.5, 2.0, 8.0, 1e-6, 1e6};
+  constexpr double kGains[] = {1.0, 0.1, 0.5, 2.0, 8.0, 1e-6, 1e6, 1e300};
   for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
     map.setFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
   }

@@ -13,6 +13,7 @@ struct FreeGainConfig {
   double ofLiving() const { return living_classes > 0.0 ? living_classes : dynamic_classes; }
 
   /// Evidence of hits over which a gain g > 1 decays, to 1 + (g - 1) exp(-hits / persistence); 0: never.
+  /// Eight times it is the most that a voxel counts for in `neighbourhood`.
   double persistence = 0.0;
 
   /// Where something movable has left, the likeliest class that cannot move still occupies a voxel if its
@@ -23,7 +24,8 @@ struct FreeGainConfig {
   /// the evidence in such voxels that are occupied by themselves is at least this factor times that in those
   /// that are not; 0: each voxel decides by itself. One that is not occupied by itself stays free if it has
   /// less than a quarter of the mean evidence of those that are, or less than a twentieth of its evidence for
-  /// free. If no class is flagged dynamic, all classes count, and no voxel below.
+  /// free. If no class is flagged dynamic, all but the unlabelled one count, and no
+  /// voxel below.
   double neighbourhood = 0.0;
 };
 

@@ -87,7 +87,7 @@ class SemanticMap {
     if (!(gain_persistence_ > 0.0f)) return kMostVote;
     return std::max(unitsOf(std::min(kPersistences * gain_persistence_, kMost)), 1);
   }
-  /// That of persistences above 16, so that the sum over a neighbourhood stays whole [units].
+  /// The same without a persistence, or with one above 16; sums over a neighbourhood then still fit 32 bits.
   static constexpr EvidenceUnits kMostVote = 1 << 23;
   /// Whether equal blocks of both maps, with equal blocks around, have the same states and labels.
   bool decidesAs(const SemanticMap& other) const {
@@ -190,7 +190,7 @@ class SemanticMap {
  private:
   /// Not infinite, whose product with no evidence would be no number.
   static float finite(double gain) {
-    constexpr double kMost = std::numeric_limits<float>::max();
+    constexpr double kMost = 1e30;  // its product with the largest evidence is finite, too
     return static_cast<float>(std::min(gain, kMost));
   }
 
