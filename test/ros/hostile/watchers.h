@@ -169,7 +169,8 @@ class Mapper {
 
   template <typename Service>
   bool call(const std::string& name, Service& service) {
-    return ros::service::call(kName + "/" + name, service);
+    // On a slow machine, roscpp may see the server close the connection before it sees the answer.
+    return ros::service::call(kName + "/" + name, service) || ros::service::call(kName + "/" + name, service);
   }
 
  private:
