@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/map/map_query.h"
 #include "reference/content.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
@@ -178,6 +180,39 @@ TEST_F(City, TilesAreReadWhole) {
   EXPECT_EQ(city.readTilesAt({}).map.size(), 0u);
   for (const char* spelt : {"/", "/index.json"}) {
     EXPECT_EQ(TiledMap(folder_.path() + spelt).path(), folder_.path()) << spelt;
+  }
+}
+
+TEST(TilesAtPoints, ComeWithTheirNeighbourhood) {
+  // What is left of a car, in the last voxel of a tile; beams crossed the car's other voxels, in the next
+  // tile.
+  MapInfo info = infoOf();
+  std::vector<SemanticClass> classes = info.classes->classes();
+  const auto car = std::find_if(classes.begin(), classes.end(), [](const auto& c) { return c.id == 40; });
+  car->dynamic = true;
+  car->living = false;
+  info.classes = std::make_shared<ClassTable>("a table", classes);
+  const Eigen::Vector3d point(63.5 * info.resolution, 0.5 * info.resolution, 0.5 * info.resolution);
+  for (const bool asks : {true, false}) {
+    info.parameters = asks ? "free_gain: {dynamic: 50, neighbourhood: 1.5}\n" : "free_gain: {dynamic: 50}\n";
+    SemanticMap map = info.emptyMap();
+    for (int x = 63; x < 66; ++x) {
+      const VoxelIndex voxel{{x, 0, 0}};
+      std::vector<EvidenceUnits> hits(kBlockVoxels), misses(kBlockVoxels);
+      const auto at = static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel));
+      hits[at] = 1000;
+      misses[at] = x > 63 ? 1000 : 0;
+      Block& block = map.getOrAllocate(GridGeometry::blockOf(voxel));
+      block.add(40, hits.data());
+      block.add(kFreeClass, misses.data());
+    }
+    const TemporaryFolder folder;
+    const std::string path = folder / "map.bkm";
+    saveMap(path, info, {driveOf("a")}, map);
+    TiledMap tiles(path);
+    const StoredMap read = tiles.readTilesAt({point});
+    EXPECT_EQ(tiles.reading().tiles, asks ? 2u : 1u);
+    EXPECT_EQ(viewPoint(read.map, point).state, asks ? VoxelState::kFree : VoxelState::kOccupied);
   }
 }
 
