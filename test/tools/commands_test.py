@@ -4,6 +4,7 @@
 A block of commands is what a user types: what does not end by itself (roslaunch, rviz) goes on in a terminal of its own
 until the block's last command has ended. Launch files must map what is played to them.
 """
+import importlib.util
 import os
 import re
 import shutil
@@ -19,6 +20,7 @@ import xmlrpc.client
 SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
 DEVEL = os.environ['BKI_MAPPING_DEVEL']
 DOCUMENTS = ['README.md', *(f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md'))]
+OF_DASK = {'docs/city.md'}  # Debian 11 has no python3-distributed
 TIMEOUT = 60.0  # maximum duration of a command, and of waiting for an event [s]
 SCANS = 6
 
@@ -331,6 +333,9 @@ class Commands(unittest.TestCase):
                 seen |= {without_comment(command) for command in block}
                 commands = [command for command in block if without_comment(command) not in LEFT_OUT]
                 if not commands:
+                    continue
+                if document in OF_DASK and not importlib.util.find_spec('distributed'):
+                    print(f'SKIPPED, for lack of python3-distributed: {commands}', file=sys.stderr)
                     continue
                 count += 1
                 with self.subTest(document=document, block=commands):
