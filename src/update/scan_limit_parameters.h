@@ -32,8 +32,7 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
           "neighbours across faces and edges: each of them without a hit and with as much evidence for free "
           "as scan_limit/free, in it or in the voxels below and above it, or hit only by classes that cannot "
           "move. Set it several times as high as scan_limit/hits to clear what waited for seconds and left; "
-          "0 "
-          "adds none."),
+          "0 adds none."),
       integerParameter(
           "blocks", &C::blocks, NumberRange::atLeast(0).upTo(1e9), Changes::kWhileMapping,
           "Largest number of blocks of 8 x 8 x 8 voxels that the hits of one scan, or its free space, may "

@@ -24,8 +24,7 @@ struct FreeGainConfig {
   /// the evidence in such voxels that are occupied by themselves is at least this factor times that in those
   /// that are not; 0: each voxel decides by itself. One that is not occupied by itself stays free if it has
   /// less than a quarter of the mean evidence of those that are, or less than a twentieth of its evidence for
-  /// free. If no class is flagged dynamic, all but the unlabelled one count, and no
-  /// voxel below.
+  /// free. If no class is flagged dynamic, all but the unlabelled one count, and no voxel below.
   double neighbourhood = 0.0;
 };
 

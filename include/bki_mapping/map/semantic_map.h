@@ -76,6 +76,7 @@ class SemanticMap {
   bool asksNeighbourhood(ClassId id) const { return asking_[id]; }
   /// Whether the neighbourhood of a voxel includes voxels below it.
   bool neighbourhoodIsBelow() const { return neighbourhood_is_below_; }
+  /// @param is_below false where floors ask, too: they would keep whatever moves on them.
   void setNeighbourhoodRatio(double ratio, const Classes& asking, bool is_below = true) {
     neighbourhood_ratio_ = finite(ratio);
     asking_ = asking;

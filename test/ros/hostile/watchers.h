@@ -169,7 +169,7 @@ class Mapper {
 
   template <typename Service>
   bool call(const std::string& name, Service& service) {
-    // On a slow machine, roscpp may see the server close the connection before it sees the answer.
+    // Again, because under load a call was once seen to end without the answer that the node had logged.
     return ros::service::call(kName + "/" + name, service) || ros::service::call(kName + "/" + name, service);
   }
 
