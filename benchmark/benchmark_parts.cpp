@@ -6,16 +6,11 @@
 #include <algorithm>
 
 #include "beams/line_evidence.h"
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/query/distance_field.h"
-#include "bki_mapping/query/frontiers.h"
-#include "bki_mapping/query/nearest_obstacle.h"
-#include "bki_mapping/query/points.h"
-#include "bki_mapping/query/rays.h"
-#include "bki_mapping/query/section.h"
-#include "bki_mapping/query/shapes.h"
+#include "bki_mapping/query/queries.h"
 #include "io/voxel_points.h"
 #include "map/view_kernels.h"
 #include "mapping/scan_preprocessor.h"

@@ -10,7 +10,7 @@
 #include <iostream>
 #include <thread>
 
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/quantile.h"
 #include "core/stopwatch.h"

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cases.h"
 #include "core/atomic_file.h"

@@ -35,7 +35,7 @@ function(bki_mapping_core_room room)
   endif()
 endfunction()
 
-bki_mapping_core_room(core SOURCES atomic_file.cpp class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)
+bki_mapping_core_room(core SOURCES atomic_file.cpp class_filter.cpp class_table.cpp named_parameter.cpp LINK Eigen3::Eigen)
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES
@@ -49,7 +49,7 @@ bki_mapping_core_room(update SOURCES
     sum_sink.cpp update_rules.cpp void_search.cpp voxel_sums.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(query SOURCES
-    class_filter.cpp distance_field.cpp
+    distance_field.cpp
     distance_kernels.cpp distance_kernels_avx2.cpp distance_kernels_avx512.cpp distance_kernels_generic.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)

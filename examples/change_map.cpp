@@ -1,5 +1,5 @@
 // Reads a map while it grows, merges another robot's map, and takes a scan back.
-#include <bki_mapping/io/class_table_yaml.h>
+#include <bki_mapping/io/yaml.h>
 #include <bki_mapping/map/map_query.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
 

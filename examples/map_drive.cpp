@@ -1,6 +1,6 @@
 // Maps scans that are in memory, and keeps the map in a file. Usage: map_drive FILE.bkm
-#include <bki_mapping/io/class_table_yaml.h>
 #include <bki_mapping/io/mapper_file.h>
+#include <bki_mapping/io/yaml.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
 
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include <bki_mapping/map/column_map.h>
 #include <bki_mapping/query/distance_field.h>
-#include <bki_mapping/query/shapes.h>
+#include <bki_mapping/query/queries.h>
 
 #include <algorithm>
 #include <array>

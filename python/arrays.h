@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/core/span.h"
 #include "bki_mapping/core/types.h"
 
 namespace bki_mapping::python {

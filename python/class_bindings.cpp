@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "arrays.h"
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 
 namespace bki_mapping::python {
 namespace {

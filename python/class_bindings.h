@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/query/class_filter.h"
 
 namespace bki_mapping::python {
 

@@ -9,10 +9,9 @@
 #include <utility>
 
 #include "arrays.h"
-#include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "io/share_path.h"
 #include "map_bindings.h"

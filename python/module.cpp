@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "arrays.h"
-#include "bki_mapping/core/scan_refused.h"
+#include "bki_mapping/core/scan.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/map/map_query.h"
-#include "bki_mapping/query/rays.h"
+#include "bki_mapping/query/queries.h"
 #include "bki_mapping/store/map_merge.h"
 #include "city_bindings.h"
 #include "class_bindings.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "arrays.h"
-#include "bki_mapping/query/points.h"
+#include "bki_mapping/query/queries.h"
 
 namespace bki_mapping::python {
 namespace {

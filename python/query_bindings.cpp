@@ -12,11 +12,7 @@
 #include <vector>
 
 #include "arrays.h"
-#include "bki_mapping/query/frontiers.h"
-#include "bki_mapping/query/nearest_obstacle.h"
-#include "bki_mapping/query/rays.h"
-#include "bki_mapping/query/section.h"
-#include "bki_mapping/query/shapes.h"
+#include "bki_mapping/query/queries.h"
 #include "class_bindings.h"
 #include "distance_bindings.h"
 #include "point_bindings.h"

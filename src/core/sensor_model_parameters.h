@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/core/sensor_model.h"
+#include "bki_mapping/core/scan.h"
 
 namespace bki_mapping {
 

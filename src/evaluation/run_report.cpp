@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "bki_mapping/map/map_query.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "core/quantile.h"
 
 namespace bki_mapping {

@@ -1,9 +1,9 @@
-#include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/yaml.h"
 
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "io/yaml_file.h"
 
 namespace bki_mapping {

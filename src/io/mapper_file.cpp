@@ -4,8 +4,8 @@
 #include <map>
 #include <stdexcept>
 
-#include "bki_mapping/io/config_yaml.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping {
 

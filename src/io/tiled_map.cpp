@@ -13,7 +13,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "io/city_index.h"
 #include "map/neighbourhood.h"
 #include "store/box_tiles.h"

@@ -1,4 +1,4 @@
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "bki_mapping/core/span.h"
+#include "bki_mapping/core/types.h"
 #include "map/view_kernels.h"
 
 namespace bki_mapping {

@@ -1,6 +1,6 @@
 // The mapper's parameters: those without a group; the groups stand in ROOM/*_parameters.h, defaults in
 // *_config.h.
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 #include <algorithm>
 #include <cmath>

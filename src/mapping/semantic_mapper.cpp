@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "beams/occlusion.h"
-#include "bki_mapping/map/clear_box.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "core/stopwatch.h"
 #include "free_space/beam_samples.h"
 #include "free_space/registry.h"

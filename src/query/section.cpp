@@ -1,4 +1,4 @@
-#include "bki_mapping/query/section.h"
+#include "bki_mapping/query/queries.h"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/core/soft_labels.h"
+#include "bki_mapping/core/scan.h"
 #include "ros/input_config.h"
 #include "ros/point_field.h"
 

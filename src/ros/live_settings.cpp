@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <new>
 
-#include "bki_mapping/query/frontiers.h"
+#include "bki_mapping/query/queries.h"
 #include "ros/queued_call.h"
 
 namespace bki_mapping::ros_interface {

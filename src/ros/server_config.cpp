@@ -5,7 +5,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

@@ -55,7 +55,7 @@ struct ServerConfig {
 /// `mapper.sensor_model`.
 std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfig& mapper);
 
-/// The server's own parameters; the mapper's are in mapping/parameters.h.
+/// The server's own parameters; the mapper's are in mapping/mapper_config.h.
 std::vector<NamedParameter<ServerConfig>> serverParameters();
 
 /// Reads all parameters of a private namespace.

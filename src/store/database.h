@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "bki_mapping/store/map_info.h"
+#include "bki_mapping/store/map_file.h"
 
 struct sqlite3;
 struct sqlite3_stmt;

@@ -1,4 +1,4 @@
-#include "bki_mapping/store/map_clear.h"
+#include "bki_mapping/store/map_file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/map/clear_box.h"
-#include "bki_mapping/store/map_file.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "store/box_tiles.h"
 
 namespace bki_mapping {

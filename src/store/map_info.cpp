@@ -1,4 +1,4 @@
-#include "bki_mapping/store/map_info.h"
+#include "bki_mapping/store/map_file.h"
 
 #include <algorithm>
 #include <sstream>

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "store/tile_store.h"
 
 namespace bki_mapping {

@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/store/map_clear.h"
+#include "bki_mapping/store/map_file.h"
 #include "tools/options.h"
 
 namespace {

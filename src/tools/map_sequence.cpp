@@ -5,10 +5,10 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/sequence.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "evaluation/run_report.h"

@@ -8,10 +8,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/tiled_map.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::tools {
 namespace {

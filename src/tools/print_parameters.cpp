@@ -3,7 +3,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "ros/live_settings.h"
 #include "ros/server_config.h"
 

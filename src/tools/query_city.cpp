@@ -11,8 +11,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/tiled_map.h"
-#include "bki_mapping/query/nearest_obstacle.h"
-#include "bki_mapping/query/points.h"
+#include "bki_mapping/query/queries.h"
 #include "core/atomic_file.h"
 #include "core/stopwatch.h"
 #include "io/map_picture.h"

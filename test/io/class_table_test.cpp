@@ -5,7 +5,7 @@
 #include <functional>
 #include <map>
 
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {

@@ -6,8 +6,8 @@
 
 #include <map>
 
-#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/io/yaml.h"
 #include "io/map_statistics.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"

@@ -5,8 +5,7 @@
 
 #include <fstream>
 
-#include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "core/stopwatch.h"
 #include "simulation/drive_file.h"
 #include "temporary_folder.h"

@@ -1,5 +1,5 @@
 // A cleared box: no evidence in it, and all of it elsewhere.
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 
 #include <gtest/gtest.h>
 

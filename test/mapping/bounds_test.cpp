@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "bki_mapping/map/map_query.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
 #include "reference/scenes.h"

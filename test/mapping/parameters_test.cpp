@@ -7,9 +7,9 @@
 #include <set>
 #include <tuple>
 
-#include "bki_mapping/io/config_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/map/map_query.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
 #include "other_value.h"

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <random>
 
-#include "bki_mapping/io/class_table_yaml.h"
 #include "bki_mapping/io/sequence.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"

@@ -1,5 +1,5 @@
 // Points read in batches equal points read one by one.
-#include "bki_mapping/query/points.h"
+#include "bki_mapping/query/queries.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Rays meet the voxels whose boxes they cross, found here by looking at every voxel.
-#include "bki_mapping/query/rays.h"
+#include "bki_mapping/query/queries.h"
 
 #include <gtest/gtest.h>
 

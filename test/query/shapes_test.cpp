@@ -1,7 +1,7 @@
 // Boxes and spheres overlap the voxels that they overlap, the nearest obstacle is the nearest, sections show
 // the voxels at their cells, and frontiers are free voxels beside unknown ones: each found by looking at
 // every voxel.
-#include "bki_mapping/query/shapes.h"
+#include "bki_mapping/query/queries.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "bki_mapping/query/nearest_obstacle.h"
-#include "bki_mapping/query/section.h"
 #include "query/query_map.h"
 #include "query/slow_frontiers.h"
 

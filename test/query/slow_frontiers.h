@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/map/map_query.h"
-#include "bki_mapping/query/frontiers.h"
+#include "bki_mapping/query/queries.h"
 
 namespace bki_mapping {
 

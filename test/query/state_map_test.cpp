@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "query/slow_frontiers.h"
 #include "reference/scenes.h"

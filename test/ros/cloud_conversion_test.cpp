@@ -6,7 +6,7 @@
 #include <cstring>
 #include <functional>
 
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "cloud_maker.h"
 #include "ros/cloud_conversion.h"
 #include "ros/no_returns.h"

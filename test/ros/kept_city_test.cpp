@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "ros/kept_map.h"
 #include "store/file_content.h"
 #include "store/kept_mapper.h"

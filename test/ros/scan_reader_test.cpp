@@ -7,7 +7,7 @@
 #include <limits>
 #include <tuple>
 
-#include "bki_mapping/io/class_table_yaml.h"
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/map/map_query.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "cloud_maker.h"

@@ -7,7 +7,7 @@
 #include <set>
 #include <sstream>
 
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "other_value.h"
 #include "ros/live_settings.h"
 #include "ros/point_account.h"

@@ -15,10 +15,9 @@
 #include <sstream>
 #include <vector>
 
-#include "bki_mapping/io/class_table_yaml.h"
-#include "bki_mapping/io/config_yaml.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/mapping/parameters.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/mapper_config.h"
 #include "examples/planner.h"
 #include "simulation/lidar.h"
 #include "temporary_folder.h"

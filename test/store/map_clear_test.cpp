@@ -1,11 +1,11 @@
 // A box cleared in a map file: as in a map in memory, in all parts.
-#include "bki_mapping/store/map_clear.h"
+#include "bki_mapping/store/map_file.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "bki_mapping/map/clear_box.h"
+#include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/map_merge.h"
 #include "reference/content.h"
 #include "store/map_maker.h"

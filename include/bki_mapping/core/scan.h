@@ -1,18 +1,61 @@
-/// @file One labelled lidar scan.
+/// @file One labelled lidar scan, and the exception for one that was not added to the map.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/core/sensor_model.h"
-#include "bki_mapping/core/soft_labels.h"
-#include "bki_mapping/core/span.h"
+#include "bki_mapping/core/types.h"
 
 namespace bki_mapping {
+
+struct SensorModelConfig {
+  double min_range = 0.0;   ///< hits closer than this are dropped [m]
+  double max_range = -1.0;  ///< hits beyond this do not occupy voxels [m]; -1: not known
+
+  /// With an unknown max_range, points beyond this are taken for faults of the driver [m]: they neither
+  /// occupy nor clear. Lidars see up to about 250 m, but a corrupt point may lie anywhere.
+  static constexpr double kFarthest = 300.0;
+  bool knowsRange() const { return max_range > 0.0; }
+  double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< range of the farthest hit [m]
+};
+
+/// The probability of one class for a point.
+struct ClassShare {
+  ClassId id;
+  float share;  ///< probability, > 0
+};
+
+/// The shares of the classes for each point of a scan. Those of a point sum to 1, or it has none.
+class SoftLabels {
+ public:
+  bool empty() const { return begin_.empty(); }  ///< whether there are no points
+  std::size_t size() const { return begin_.size(); }
+
+  void clear() {
+    begin_.clear();
+    shares_.clear();
+  }
+  /// Starts a new point.
+  void startPoint() { begin_.push_back(shares_.size()); }
+  /// Adds a class to the last point.
+  void add(const ClassShare& share) { shares_.push_back(share); }
+
+  const ClassShare* begin(std::size_t point) const { return shares_.data() + begin_[point]; }
+  const ClassShare* end(std::size_t point) const {
+    return shares_.data() + (point + 1 < begin_.size() ? begin_[point + 1] : shares_.size());
+  }
+
+ private:
+  std::vector<std::size_t> begin_;
+  std::vector<ClassShare> shares_;
+};
 
 /// Relative tolerance for treating a point as being at max_range (1 cm at 100 m); covers drivers' rounding.
 constexpr double kAtMaxRange = 1e-4;
@@ -95,5 +138,20 @@ inline Scan scanFromSensorFrame(const Eigen::Isometry3d& T_map_sensor,
   for (const Eigen::Vector3f& point : points) scan.points.push_back(rotation * point);
   return scan;
 }
+
+/// A scan was refused; what() says why and what to do. The map is as it was before the scan.
+class ScanRefused : public std::runtime_error {
+ public:
+  enum class Reason {
+    kTooLarge,  ///< it would touch more blocks, or take more samples, than the limits allow
+    kMemory,    ///< it would exceed memory_limit or the computer's memory
+  };
+
+  ScanRefused(Reason reason, const std::string& sentence) : std::runtime_error(sentence), reason_(reason) {}
+  Reason reason() const { return reason_; }
+
+ private:
+  Reason reason_;
+};
 
 }  // namespace bki_mapping

@@ -6,7 +6,6 @@
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/core/scan_refused.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/scan_stats.h"

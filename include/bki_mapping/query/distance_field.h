@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include "bki_mapping/core/span.h"
-#include "bki_mapping/query/class_filter.h"
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/types.h"
 #include "bki_mapping/query/state_map.h"
 
 namespace bki_mapping {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/store/map_info.h"
+#include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "bki_mapping/query/nearest_obstacle.h"
+#include "bki_mapping/query/queries.h"
 #include "queries.h"
 #include "requests.h"
 

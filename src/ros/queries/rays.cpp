@@ -1,4 +1,4 @@
-#include "bki_mapping/query/rays.h"
+#include "bki_mapping/query/queries.h"
 
 #include <limits>
 

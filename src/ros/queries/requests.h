@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/query/class_filter.h"
 
 namespace bki_mapping::ros_interface {
 

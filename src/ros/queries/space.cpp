@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "bki_mapping/query/shapes.h"
+#include "bki_mapping/query/queries.h"
 #include "queries.h"
 #include "requests.h"
 

@@ -1,4 +1,4 @@
-#include "bki_mapping/query/class_filter.h"
+#include "bki_mapping/core/class_table.h"
 
 #include <stdexcept>
 

@@ -1,12 +1,19 @@
-/// @file Parameters from YAML files.
+/// @file Class tables and parameters from YAML files.
 #pragma once
 
 #include <map>
 #include <string>
 
+#include "bki_mapping/core/class_table.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping {
+
+/// Reads a class table; docs/classes.md describes the format.
+/// @param name_or_file a table of config/classes (its name without .yaml), or the path of a file.
+/// @throws std::invalid_argument in one sentence: unknown name or file, invalid YAML, unknown key or bad
+/// value.
+ClassTable loadClassTable(const std::string& name_or_file);
 
 /// Reads a YAML file of nested maps into a flat map: names joined by `/`, values as text.
 /// @throws std::invalid_argument in one sentence: no such file, invalid YAML (see yaml_file.h), a value that
