@@ -374,8 +374,8 @@ class Tools(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             with open(self.path('figures.json')) as file:
                 figures[name[:-len('.yaml')]] = json.load(file)
-        self.assertEqual(set(figures), {'baseline_even', 'occupancy_only', 'paper_line', 'paper_linear', 'paper_none',
-                                        'robot', 'small_cpu'})
+        self.assertEqual(set(figures), {'baseline_even', 'crowded', 'occupancy_only', 'paper_line', 'paper_linear',
+                                        'paper_none', 'robot', 'small_cpu'})
         self.assertEqual(figures['paper_none']['sa'], 1.0)
         for figure in ('sa', 'sa_ground', 'sa_standing', 'sa_other'):
             self.assertGreater(figures['robot'][figure], figures['paper_line'][figure], figure)
