@@ -7,7 +7,7 @@
 
 #include "beams/line_evidence.h"
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/query/distance_field.h"
 #include "bki_mapping/query/queries.h"

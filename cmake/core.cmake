@@ -39,7 +39,7 @@ bki_mapping_core_room(core SOURCES atomic_file.cpp class_filter.cpp class_table.
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES
-    clear_box.cpp column_map.cpp map_query.cpp neighbourhood.cpp semantic_map.cpp
+    clear_box.cpp column_map.cpp neighbourhood.cpp semantic_map.cpp voxel_state.cpp
     view_kernels.cpp view_kernels_avx2.cpp view_kernels_avx512.cpp view_kernels_generic.cpp
   LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)

@@ -1,6 +1,6 @@
 // Asks a map file what is at a point. Usage: ask_map FILE.bkm X Y Z, in the map frame [m]
 #include <bki_mapping/io/mapper_file.h>
-#include <bki_mapping/map/map_query.h>
+#include <bki_mapping/map/voxel_state.h>
 #include <bki_mapping/store/map_file.h>
 
 #include <iostream>

@@ -1,6 +1,6 @@
 // Reads a map while it grows, merges another robot's map, and takes a scan back.
 #include <bki_mapping/io/yaml.h>
-#include <bki_mapping/map/map_query.h>
+#include <bki_mapping/map/voxel_state.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
 
 #include <future>

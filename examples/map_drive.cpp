@@ -30,7 +30,7 @@ Scan scanAt(double x, std::uint64_t stamp) {
 
 int main(int argc, char** argv) try {
   if (argc != 2) throw std::invalid_argument("give one file for the map: map_drive FILE.bkm");
-  MapperConfig config;  // the paper's settings; parameters.h sets them by name
+  MapperConfig config;  // the paper's settings; setParameters() sets them by name
   config.resolution = 0.3;
   const auto classes = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
   SemanticMapper mapper(config, classes);

@@ -13,7 +13,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "class_bindings.h"
 #include "io/export_file.h"
 #include "query_bindings.h"

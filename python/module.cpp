@@ -7,7 +7,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/sequence.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/query/queries.h"
 #include "bki_mapping/store/map_merge.h"
 #include "city_bindings.h"

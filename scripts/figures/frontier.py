@@ -99,7 +99,7 @@ def draw_frontier(rows, name, title, output):
     figure, axes = plt.subplots(figsize=(12, 5.6))
     for number, row in enumerate(rows, 1):
         preset = row[0].startswith('preset')
-        lacking = max(100.0 - float(row[6]), 0.1)
+        lacking = max(100.0 - float(row[6]), 0.1)  # a logarithmic axis has no place for 0
         axes.plot(float(row[1]), lacking, 's' if preset else 'o', color='tab:red' if preset else 'tab:blue',
                   label=f'{number}  {row[0]}')
         axes.annotate(number, (float(row[1]), lacking), fontsize=8, textcoords='offset points', xytext=(4, 3))

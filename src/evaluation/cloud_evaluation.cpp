@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "io/pcd_file.h"
 #include "parallel/thread_pool.h"
 

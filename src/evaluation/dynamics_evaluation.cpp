@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 

@@ -1,6 +1,6 @@
 #include "evaluation/occupancy_evaluation.h"
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping {

@@ -13,7 +13,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 

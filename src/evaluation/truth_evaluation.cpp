@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping::simulation {

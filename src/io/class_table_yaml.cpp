@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/core/named_parameter.h"
 #include "io/share_path.h"
 #include "io/yaml_file.h"
 

@@ -5,7 +5,7 @@
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/map/column_map.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "io/html_export.h"
 
 namespace bki_mapping {

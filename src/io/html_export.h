@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {

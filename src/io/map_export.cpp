@@ -81,7 +81,7 @@ std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable&
   return voxels;
 }
 
-void checkMapFileName(const std::string& path) {
+void checkExportName(const std::string& path) {
   const std::string ending = endingOf(path);
   if (ending != ".ply" && ending != ".pcd") {
     throw std::invalid_argument("map file '" + path + "' must end in .ply or .pcd");
@@ -90,7 +90,7 @@ void checkMapFileName(const std::string& path) {
 
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states) {
-  checkMapFileName(path);
+  checkExportName(path);
   ThreadPool pool(kThreads);
   const VoxelPoints points(map, classes, {states}, sortedBlocks(map), pool);
   AtomicFile file(path);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "map/voxel_color.h"
 
 namespace bki_mapping {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "bki_mapping/core/types.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {

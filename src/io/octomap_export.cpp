@@ -10,7 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "core/atomic_file.h"
 
 namespace bki_mapping {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 

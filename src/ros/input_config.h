@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/core/scan.h"
 
 namespace bki_mapping::ros_interface {
 

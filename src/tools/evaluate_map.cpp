@@ -6,7 +6,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/sequence.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "core/quantile.h"

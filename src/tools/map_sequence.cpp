@@ -89,7 +89,7 @@ int mapSequence(const po::variables_map& given) {
   }
   const auto states = parseStates(given["include"].as<std::string>());
   if (given.count("output") && !isMapFileName(given["output"].as<std::string>())) {
-    checkMapFileName(given["output"].as<std::string>());
+    checkExportName(given["output"].as<std::string>());
   }
   if (given.count("points")) checkPointFileName(given["points"].as<std::string>());
   for (const char* file : {"output", "points", "report"}) {

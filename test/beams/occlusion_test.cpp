@@ -1,7 +1,7 @@
 // Occlusion equals brute force, and is right on scenes worked out by hand.
 #include <gtest/gtest.h>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"

@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "reference/content.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"

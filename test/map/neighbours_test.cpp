@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "map/neighbourhood.h"
 
 namespace bki_mapping {

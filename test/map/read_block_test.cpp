@@ -14,7 +14,7 @@
 namespace bki_mapping {
 namespace {
 
-constexpr float kError = 1e-6f;  // what map_query.h promises
+constexpr float kError = 1e-6f;  // what voxel_state.h promises
 
 /// What a random map is made of.
 struct Kind {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <limits>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"

@@ -8,7 +8,7 @@
 #include <set>
 #include <tuple>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
 #include "reference/scenes.h"

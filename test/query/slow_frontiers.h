@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/query/queries.h"
 
 namespace bki_mapping {

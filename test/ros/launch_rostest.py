@@ -21,7 +21,7 @@ class Launch(unittest.TestCase):
 
     def test_every_preset_maps_and_says_what_it_did(self):
         presets = glob.glob(os.path.join(roslib.packages.get_pkg_dir('bki_mapping'), 'config/presets/*.yaml'))
-        self.assertGreaterEqual(len(presets), 7)
+        self.assertGreaterEqual(len(presets), 8)
         for number, preset in enumerate(sorted(presets)):
             plain = ['labelled:=false', 'classes:=occupancy'] if 'occupancy_only' in preset else []
             nodelet = 'true' if number % 2 else 'false'

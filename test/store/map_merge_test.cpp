@@ -11,7 +11,7 @@
 #include <new>
 #include <sstream>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "reference/content.h"
 #include "store/grid_transform.h"
 #include "store/map_maker.h"

@@ -1,4 +1,4 @@
-/// @file One labelled lidar scan, and the exception for one that was not added to the map.
+/// @file One labelled lidar scan, what it consists of, and the exception for a scan that was refused.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,6 +15,7 @@
 
 namespace bki_mapping {
 
+/// The range limits of a sensor.
 struct SensorModelConfig {
   double min_range = 0.0;   ///< hits closer than this are dropped [m]
   double max_range = -1.0;  ///< hits beyond this do not occupy voxels [m]; -1: not known
@@ -25,6 +26,9 @@ struct SensorModelConfig {
   bool knowsRange() const { return max_range > 0.0; }
   double reach() const { return knowsRange() ? max_range : kFarthest; }  ///< range of the farthest hit [m]
 };
+
+/// Relative tolerance for treating a point as being at max_range (1 cm at 100 m); covers drivers' rounding.
+constexpr double kAtMaxRange = 1e-4;
 
 /// The probability of one class for a point.
 struct ClassShare {
@@ -56,9 +60,6 @@ class SoftLabels {
   std::vector<std::size_t> begin_;
   std::vector<ClassShare> shares_;
 };
-
-/// Relative tolerance for treating a point as being at max_range (1 cm at 100 m); covers drivers' rounding.
-constexpr double kAtMaxRange = 1e-4;
 
 /// The hits of one sweep. Points are relative to the sensor, so that single precision is enough however far
 /// the sensor is from the map's origin.

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 
-/// One voxel of a map file, laid out as a vertex of a PLY file; docs/files.md describes the fields.
+/// One voxel of an exported map, laid out as a vertex of a PLY file; docs/files.md describes the fields.
 struct [[gnu::packed]] VoxelRecord {
   float x, y, z;  ///< centre, map frame [m]
   std::uint8_t red, green, blue;
@@ -25,11 +25,12 @@ VoxelStates parseStates(const std::string& list);
 std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
                                        const VoxelStates& states);
 
-/// Writes a map file by AtomicFile. The extension, .ply or .pcd, chooses the format (both binary).
+/// Exports a map; the file appears complete or not at all. The extension, .ply or .pcd, chooses the format
+/// (both binary).
 /// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states);
 /// Checks the extension before long work. @throws std::invalid_argument if exportMap does not support it.
-void checkMapFileName(const std::string& path);
+void checkExportName(const std::string& path);
 
 }  // namespace bki_mapping

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 

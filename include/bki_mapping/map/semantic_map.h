@@ -1,5 +1,5 @@
 /// @file The map: a sparse grid of blocks, shared with its snapshots and copied when written. (The state of a
-/// voxel: map_query.h.)
+/// voxel: voxel_state.h.) clearBox() erases a part of it.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-/// @file All settings of the mapper with their defaults, and their names.
+/// @file All settings of the mapper, their defaults, and their names as parameters.
 #pragma once
 
 #include <map>

@@ -1,4 +1,5 @@
-/// @file What can be asked of a map: points, rays, nearest obstacles, shapes, sections and frontiers.
+/// @file What can be asked of a map: points, rays, shapes, nearest obstacles, sections and frontiers.
+/// Distances at many points: distance_field.h.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -81,29 +82,6 @@ RayHit castRay(const StateMap& states, const Ray& ray, const RayStops& stops = {
 /// unchanged.
 void castRays(const StateMap& states, Span<const Ray> rays, const RayStops& stops, Span<RayHit> hits);
 
-struct NearestObstacle {
-  VoxelIndex voxel;
-  ClassId label;
-  double distance;  ///< from the point to the voxel's centre [m]
-};
-
-/// The occupied voxel of one of the classes whose centre is nearest to a point; of several, the first in the
-/// order of GridIndex. Exact. The time grows with the blocks within the distance of what it finds: for many
-/// points of one region, a DistanceField is faster.
-/// @param point map frame [m]. @param max_distance to the centre [m], >= 0; may be infinite.
-/// @return nothing if there is none within max_distance.
-/// @throws std::invalid_argument if a coordinate is not finite or beyond the grid, or max_distance is
-/// negative or NaN.
-std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
-                                               const ClassFilter& classes = ClassFilter::all(),
-                                               double max_distance = std::numeric_limits<double>::infinity());
-
-/// The same for many points, on all threads. @param found as long as `points`.
-/// @throws std::invalid_argument as nearestObstacle, naming the point, or if the lengths differ; `found` is
-/// then unchanged.
-void nearestObstacles(const StateMap& states, Span<const Eigen::Vector3d> points, const ClassFilter& classes,
-                      double max_distance, Span<std::optional<NearestObstacle>> found);
-
 struct Sphere {
   Eigen::Vector3d centre;  ///< map frame [m]
   double radius;           ///< [m], > 0
@@ -150,6 +128,30 @@ void contentsOf(const StateMap& states, Span<const Sphere> spheres, Span<SpaceCo
 void contentsAlong(const StateMap& states, const OrientedBox& box,
                    Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents);
 
+/// What nearestObstacle() finds.
+struct NearestObstacle {
+  VoxelIndex voxel;
+  ClassId label;
+  double distance;  ///< from the point to the voxel's centre [m]
+};
+
+/// The occupied voxel of one of the classes whose centre is nearest to a point; of several, the first in the
+/// order of GridIndex. Exact. The time grows with the blocks within the distance of what it finds: for many
+/// points of one region, a DistanceField is faster.
+/// @param point map frame [m]. @param max_distance to the centre [m], >= 0; may be infinite.
+/// @return nothing if there is none within max_distance.
+/// @throws std::invalid_argument if a coordinate is not finite or beyond the grid, or max_distance is
+/// negative or NaN.
+std::optional<NearestObstacle> nearestObstacle(const StateMap& states, const Eigen::Vector3d& point,
+                                               const ClassFilter& classes = ClassFilter::all(),
+                                               double max_distance = std::numeric_limits<double>::infinity());
+
+/// The same for many points, on all threads. @param found as long as `points`.
+/// @throws std::invalid_argument as nearestObstacle, naming the point, or if the lengths differ; `found` is
+/// then unchanged.
+void nearestObstacles(const StateMap& states, Span<const Eigen::Vector3d> points, const ClassFilter& classes,
+                      double max_distance, Span<std::optional<NearestObstacle>> found);
+
 /// A grid of square cells of the map's resolution. Cell (column, row) says what the voxel is at its centre.
 struct Section {
   std::size_t width = 0, height = 0;  ///< columns and rows
@@ -180,9 +182,9 @@ Section horizontalSection(const StateMap& states, double z, const Eigen::Aligned
 Section verticalSection(const StateMap& states, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                         double min_z, double max_z);
 
-/// A cluster of frontier voxels: free ones with an unknown or occluded voxel on at least one of the six sides
-/// (Yamauchi, A Frontier-Based Approach for Autonomous Exploration, 1997). Two voxels that share a face, an
-/// edge or a corner belong to the same cluster.
+/// Where known free space ends, and exploration goes on: a cluster of frontier voxels. These are free, with
+/// an unknown or occluded voxel on at least one of the six sides (Yamauchi, A Frontier-Based Approach for
+/// Autonomous Exploration, 1997). Two that share a face, an edge or a corner belong to the same cluster.
 struct Frontier {
   Eigen::Vector3d centre;          ///< mean of the centres of its voxels [m]
   std::size_t size;                ///< number of its voxels
@@ -204,11 +206,11 @@ struct FrontierRules {
 /// first.
 /// @throws std::invalid_argument if the box is not finite, inside out, or reaches beyond the grid.
 std::vector<Frontier> frontiers(const StateMap& states, const FrontierRules& rules = {});
+/// The frontiers of the whole map, with their voxels.
+std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size);
 /// Finds ahead what frontiers() of the whole map keeps, in another thread than those that ask. A search
 /// meanwhile shares the work: it starts with the regions that this comes to last.
 /// @param goes_on asked between two regions; returns false to stop.
 void prepareFrontiers(const StateMap& states, const std::function<bool()>& goes_on);
-/// Those of the whole map, with their voxels.
-std::vector<Frontier> frontiers(const StateMap& states, std::size_t min_size);
 
 }  // namespace bki_mapping

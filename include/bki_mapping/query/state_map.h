@@ -1,4 +1,5 @@
-/// @file The states of a map's voxels, decided when they are first read: what all queries work on.
+/// @file The states of a map's voxels, kept once they have been read: what all queries work on. (How a state
+/// is decided: map/voxel_state.h.)
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 

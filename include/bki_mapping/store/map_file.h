@@ -74,13 +74,6 @@ struct DriveRecord {
   void addScan(std::uint64_t stamp, const GridGeometry& geometry, const std::vector<GridIndex>& touched);
 };
 
-/// Checks that two maps can be added: they must have the same resolution, unit and prior, and classes with
-/// the same ids and names. Colours and flags of classes may differ.
-/// @param name, other_name names of the two maps for the error, such as their files.
-/// @throws std::invalid_argument in one sentence with both values of the first difference.
-void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,
-                   const MapInfo& other);
-
 /// Names a tile of 8 x 8 x 8 blocks: its index, as Region::regionOf gives it, and the part of the file that
 /// holds it. Part 0 is the map, the sum of all drives. Each other part holds the evidence of a single drive,
 /// or the sum of several (DriveRecord::part).
@@ -227,6 +220,13 @@ void copyMap(MapFile& file, const std::string& path);
 StoredMap loadMap(const std::string& path, std::size_t memory_limit = 0);
 /// The same of an open file.
 StoredMap readMap(MapFile& file, std::size_t memory_limit = 0);
+
+/// Checks that two maps can be added: they must have the same resolution, unit and prior, and classes with
+/// the same ids and names. Colours and flags of classes may differ.
+/// @param name, other_name names of the two maps for the error, such as their files.
+/// @throws std::invalid_argument in one sentence with both values of the first difference.
+void checkSameGrid(const std::string& name, const MapInfo& info, const std::string& other_name,
+                   const MapInfo& other);
 
 /// Checks that another map can be added to the map in a file: they must have the same frame and grid.
 /// @param own describes the other map; an empty frame matches every frame.

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "map/voxel_color.h"
 #include "ros/map_publisher.h"
 #include "streamed_markers.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {

@@ -1,4 +1,4 @@
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-/// @file Queries: the state and the posterior of a voxel.
+/// @file How the state of a voxel is decided, and its posterior.
 #pragma once
 
 #include <array>

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/map_query.h"
+#include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
 namespace {
@@ -47,7 +47,7 @@ double occupancyOf(double best, double gain_times_free) {
   return something / (1.1 * something + 6 * kPrior + free);
 }
 
-TEST(MapQuery, OccupiedVoxel) {
+TEST(VoxelState, OccupiedVoxel) {
   const VoxelView view = viewOf({{2, 0.75f}, {kFreeClass, 0.25f}});
   const double sum = 1.0 + 4 * kPrior, p = (0.75 + kPrior) / sum, f = (0.25 + kPrior) / sum, o = kPrior / sum;
   EXPECT_EQ(view.state, VoxelState::kOccupied);
@@ -61,7 +61,7 @@ TEST(MapQuery, OccupiedVoxel) {
   EXPECT_NEAR(view.class_probability, square / (square + 2 * kPrior * kPrior), 1e-6);
 }
 
-TEST(MapQuery, EvidenceForFreeLowersOccupancyAndNotTheClass) {
+TEST(VoxelState, EvidenceForFreeLowersOccupancyAndNotTheClass) {
   const auto hit = viewOf({{1, 0.6f}, {2, 0.2f}}),
              crossed = viewOf({{1, 0.6f}, {2, 0.2f}, {kFreeClass, 0.4f}}),
              cleared = viewOf({{1, 0.6f}, {2, 0.2f}, {kFreeClass, 40.0f}});
@@ -78,7 +78,7 @@ TEST(MapQuery, EvidenceForFreeLowersOccupancyAndNotTheClass) {
   EXPECT_NEAR(only_free.occupancy, occupancyOf(0.0, 1.0), 1e-6);
 }
 
-TEST(MapQuery, WrongLabelsHardlyLowerTheClass) {
+TEST(VoxelState, WrongLabelsHardlyLowerTheClass) {
   // Three labels in ten are wrong, and say anything else: the class is that of the other seven.
   EXPECT_GT(viewOf({{0, 0.15f}, {1, 0.7f}, {2, 0.15f}}).class_probability, 0.9f);
   // Two classes share the voxel: the larger part is that of a point in it.
@@ -128,7 +128,7 @@ struct RandomVoxel {
   }
 };
 
-TEST(MapQuery, StatesAgreeWithTheOccupancy) {
+TEST(VoxelState, StatesAgreeWithTheOccupancy) {
   std::mt19937 random(3);
   int occupied = 0, free = 0, above = 0;
   for (int n = 0; n < 2000; ++n) {
@@ -162,7 +162,7 @@ double evidenceOf(const RandomVoxel& voxel, int id) {
   return sum;
 }
 
-TEST(MapQuery, WhatCannotMoveRemains) {
+TEST(VoxelState, WhatCannotMoveRemains) {
   // Equations 11, 12 and 12a, written down plainly.
   std::mt19937 random(5);
   int remained = 0, cleared = 0;
@@ -212,7 +212,7 @@ TEST(MapQuery, WhatCannotMoveRemains) {
   EXPECT_GT(cleared, 300);
 }
 
-TEST(MapQuery, WhatRemainsIsAtLeastAQuarter) {
+TEST(VoxelState, WhatRemainsIsAtLeastAQuarter) {
   const auto state = [](EvidenceUnits moved, EvidenceUnits fixed) {
     SemanticMap map(GridGeometry(1.0), kPrior, 3);
     for (const auto& [id, units] : {std::pair{1, moved}, {2, fixed}, {int{kFreeClass}, 1}}) {
@@ -232,7 +232,7 @@ TEST(MapQuery, WhatRemainsIsAtLeastAQuarter) {
   }
 }
 
-TEST(MapQuery, ProbabilitiesGrowWithTheirEvidence) {
+TEST(VoxelState, ProbabilitiesGrowWithTheirEvidence) {
   std::mt19937 random(4);
   int labelled = 0;
   for (int n = 0; n < 1000; ++n) {
@@ -257,7 +257,7 @@ TEST(MapQuery, ProbabilitiesGrowWithTheirEvidence) {
   EXPECT_GT(labelled, 300);
 }
 
-TEST(MapQuery, ProbabilitiesDoNotDependOnTheUnitOfEvidence) {
+TEST(VoxelState, ProbabilitiesDoNotDependOnTheUnitOfEvidence) {
   const auto view = [](float unit) {
     SemanticMap map(GridGeometry(1.0), static_cast<double>(unit) * kPrior, 3);
     for (const auto& [id, value] : {std::pair{1, 0.5f}, {2, 0.25f}, {int{kFreeClass}, 0.75f}}) {
@@ -271,7 +271,7 @@ TEST(MapQuery, ProbabilitiesDoNotDependOnTheUnitOfEvidence) {
   EXPECT_FLOAT_EQ(view(64.0f).class_probability, view(1.0f).class_probability);
 }
 
-TEST(MapQuery, TheLastUnitDecides) {
+TEST(VoxelState, TheLastUnitDecides) {
   // Floats hold 24 bits: these numbers of units are equal as floats.
   const auto viewOfUnits = [](EvidenceUnits one, EvidenceUnits two, EvidenceUnits free) {
     SemanticMap map(GridGeometry(1.0), kPrior, 3);
@@ -291,7 +291,7 @@ TEST(MapQuery, TheLastUnitDecides) {
   EXPECT_EQ(viewOfUnits(-5, -5, -5).state, VoxelState::kUnknown) << "taken back without having been added";
 }
 
-TEST(MapQuery, FreeVoxelAndTies) {
+TEST(VoxelState, FreeVoxelAndTies) {
   EXPECT_EQ(viewOf({{1, 0.1f}, {kFreeClass, 0.2f}}).state, VoxelState::kFree);
   EXPECT_EQ(viewOf({{1, 0.1f}, {kFreeClass, 0.2f}}).label, kFreeClass);
   EXPECT_EQ(viewOf({{1, 0.2f}, {kFreeClass, 0.2f}}).state, VoxelState::kOccupied);  // a tie is occupied
@@ -299,7 +299,7 @@ TEST(MapQuery, FreeVoxelAndTies) {
   EXPECT_EQ(viewOf({{1, 0.2f}, {2, 0.2f}}).label, 1);
 }
 
-TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
+TEST(VoxelState, GainsDecideTheStateAndLeaveThePosterior) {
   SemanticMap map = mapWith({{1, 0.375f}, {2, 0.25f}, {kFreeClass, 0.5f}}, 77);
   const auto view = [&map] { return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77); };
   const double sum = 1.125 + 4 * kPrior;
@@ -317,7 +317,7 @@ TEST(MapQuery, GainsDecideTheStateAndLeaveThePosterior) {
   EXPECT_EQ(view().state, VoxelState::kFree);
 }
 
-TEST(MapQuery, RepeatedHitsOutweighTheGain) {
+TEST(VoxelState, RepeatedHitsOutweighTheGain) {
   // With a gain of 4, free wins with over a quarter of the hits' evidence; persistence lowers the gain.
   const auto state = [](float hits, float free, double persistence) {
     SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
@@ -332,13 +332,13 @@ TEST(MapQuery, RepeatedHitsOutweighTheGain) {
   EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
 }
 
-TEST(MapQuery, GainsWithoutEvidenceForFreeMakeNothingFree) {
+TEST(VoxelState, GainsWithoutEvidenceForFreeMakeNothingFree) {
   SemanticMap map = mapWith({{1, 0.4f}}, 77);
   map.setFreeGain(1, 1000.0);
   EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
 }
 
-TEST(MapQuery, UnknownVoxelHasThePrior) {
+TEST(VoxelState, UnknownVoxelHasThePrior) {
   const SemanticMap map = mapWith({{1, 1.0f}}, 0);
   for (const VoxelView& view :
        {viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
@@ -351,7 +351,7 @@ TEST(MapQuery, UnknownVoxelHasThePrior) {
   }
 }
 
-TEST(MapQuery, OccludedOnlyWithoutEvidence) {
+TEST(VoxelState, OccludedOnlyWithoutEvidence) {
   SemanticMap map = mapWith({{1, 1.0f}}, 0);
   Block::Occlusion marks;
   marks.set(0).set(1);
@@ -361,7 +361,7 @@ TEST(MapQuery, OccludedOnlyWithoutEvidence) {
   EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
 }
 
-TEST(MapQuery, VisitsKnownVoxelsInSortedOrder) {
+TEST(VoxelState, VisitsKnownVoxelsInSortedOrder) {
   SemanticMap map(GridGeometry(1.0), kPrior, 3);
   EvidenceUnits plane[kBlockVoxels] = {};
   plane[3] = unitsOf(1.0);
