@@ -183,7 +183,8 @@ Sequence::Sequence(const std::string& folder, const std::string& labels, const s
       fail((root / labels).string() + " is not a folder; give one with labels");
     if (timed) times = readNumberLines(times_file, "check its rights");
     for (const auto& [number, name] : scanNames(pcd, ".pcd")) {
-      addScan(number, name, readPcdViewpoint((pcd / (name + ".pcd")).string()), secondsOf(number, name));
+      const double seconds = secondsOf(number, name);
+      addScan(number, name, readPcdViewpoint((pcd / (name + ".pcd")).string()), seconds);
     }
     return;
   }
@@ -198,7 +199,8 @@ Sequence::Sequence(const std::string& folder, const std::string& labels, const s
   };
   const Eigen::Isometry3d T_first = map_poses.empty() ? pose(0, sixDigits(0)) : Eigen::Isometry3d::Identity();
   for (const auto& [number, name] : names) {
-    addScan(number, name, T_first.inverse() * pose(number, name), secondsOf(number, name));
+    const double seconds = secondsOf(number, name);
+    addScan(number, name, T_first.inverse() * pose(number, name), seconds);
   }
 }
 
