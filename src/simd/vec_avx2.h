@@ -46,6 +46,9 @@ namespace {
 [[gnu::always_inline]] inline bool AnyTrue(Mask mask) {
   return _mm256_movemask_ps(reinterpret_cast<__m256>(mask)) != 0;
 }
+[[gnu::always_inline]] inline std::uint64_t BitsFromMask(Mask mask) {
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+}
 [[gnu::always_inline]] inline FloatVec TableLookupLanes(FloatVec v, IntVec index) {
   return _mm256_permutevar8x32_ps(v, reinterpret_cast<__m256i>(index));
 }

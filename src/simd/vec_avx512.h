@@ -49,6 +49,9 @@ namespace {
 [[gnu::always_inline]] inline bool AnyTrue(Mask mask) {
   return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask)) != 0;
 }
+[[gnu::always_inline]] inline std::uint64_t BitsFromMask(Mask mask) {
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
+}
 [[gnu::always_inline]] inline FloatVec TableLookupLanes(FloatVec v, IntVec index) {
   return _mm512_permutexvar_ps(reinterpret_cast<__m512i>(index), v);
 }

@@ -27,6 +27,9 @@ namespace {
 [[gnu::always_inline]] inline bool AnyTrue(Mask mask) {
   return _mm_movemask_epi8(reinterpret_cast<__m128i>(mask)) != 0;
 }
+[[gnu::always_inline]] inline std::uint64_t BitsFromMask(Mask mask) {
+  return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(mask)));
+}
 [[gnu::always_inline]] inline void StoreInterleaved2(FloatVec a, FloatVec b, float* to) {
   StoreU(_mm_unpacklo_ps(a, b), to);
   StoreU(_mm_unpackhi_ps(a, b), to + kLanes);
@@ -46,6 +49,9 @@ namespace {
 }
 [[gnu::always_inline]] inline bool AnyTrue(Mask mask) {
   return (mask[0] | mask[1] | mask[2] | mask[3]) != 0;
+}
+[[gnu::always_inline]] inline std::uint64_t BitsFromMask(Mask mask) {
+  return static_cast<std::uint64_t>((mask[0] & 1) | (mask[1] & 2) | (mask[2] & 4) | (mask[3] & 8));
 }
 [[gnu::always_inline]] inline void StoreInterleaved2(FloatVec a, FloatVec b, float* to) {
   StoreU(FloatVec{a[0], b[0], a[1], b[1]}, to);

@@ -1,7 +1,9 @@
-/// @file The loop that adds sums to a plane of evidence, compiled for each instruction set.
+/// @file The loops over the sums of a block, compiled for each instruction set: limits of a scan, and adding
+/// to a plane of evidence.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "bki_mapping/map/block.h"
@@ -22,15 +24,22 @@ struct SumCounts {
   }
 };
 
-/// The loop for one instruction set.
+/// The loops for one instruction set. All instruction sets give the same bits.
 struct SumKernels {
   const char* instruction_set;
   /// Rounds sums to the nearest unit, halves up, and adds them to a plane, or subtracts them. Evidence
-  /// saturates at kMostUnits and -kMostUnits. All instruction sets give the same bits.
+  /// saturates at kMostUnits and -kMostUnits.
   /// @param sums 512 of them, >= 0. @param layers those that may hold sums other than 0.
   /// @param[in,out] counts increased. @return whether any evidence in those layers is not 0.
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   bool (*withdraw)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
+  /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. What is not a number remains.
+  /// @param[in,out] sums 512 of them. @param[in,out] reached adds the voxels that now have `most`, as
+  /// LayerBits.
+  void (*limit)(float threshold, float most, float* sums, std::uint64_t* reached);
+  /// Finds sums of at least `least`. @param sums 512 of them. @param layers those that may hold sums other
+  /// than 0. @param[in,out] found adds their voxels, as LayerBits.
+  void (*find)(const float* sums, Block::Layers layers, float least, std::uint64_t* found);
 };
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.

@@ -9,7 +9,7 @@
 namespace bki_mapping {
 
 const SumKernels& sumKernelsAvx512() {
-  static const SumKernels kernels = {"avx512", addSums<false>, addSums<true>};
+  static const SumKernels kernels = {"avx512", addSums<false>, addSums<true>, limitSums, findSums};
   return kernels;
 }
 

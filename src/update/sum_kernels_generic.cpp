@@ -7,7 +7,7 @@
 namespace bki_mapping {
 
 const SumKernels& sumKernelsGeneric() {
-  static const SumKernels kernels = {"generic", addSums<false>, addSums<true>};
+  static const SumKernels kernels = {"generic", addSums<false>, addSums<true>, limitSums, findSums};
   return kernels;
 }
 

@@ -1,4 +1,4 @@
-/// @file Rounding sums to units and adding them, over the vocabulary of simd/vec.h.
+/// @file Limiting sums, rounding them to units and adding them, over the vocabulary of simd/vec.h.
 #pragma once
 
 #include "bki_mapping/map/block.h"
@@ -46,6 +46,32 @@ bool addSums(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumC
   const auto all = static_cast<std::size_t>((layers.end - layers.begin) * kLayer);
   counts += {all - countOf(numbers), countOf(saturated), countOf(negative)};
   return AnyTrue(any != 0);
+}
+
+inline void limitSums(float threshold, float most, float* sums, std::uint64_t* reached) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  for (int layer = 0; layer < kBlockEdge; ++layer, sums += kLayer) {
+    std::uint64_t bits = 0;
+    for (int v = 0; v < kLayer; v += kLanes) {
+      const FloatVec excess = LoadU(sums + v) - threshold;
+      const FloatVec positive = IfThenElse(excess < 0.0f, FloatVec{}, excess);
+      const FloatVec kept = IfThenElse(positive > most, Set(most), positive);
+      StoreU(kept, sums + v);
+      bits |= BitsFromMask(kept >= most) << v;
+    }
+    reached[layer] |= bits;
+  }
+}
+
+inline void findSums(const float* sums, Block::Layers layers, float least, std::uint64_t* found) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  for (int layer = layers.begin; layer < layers.end; ++layer) {
+    std::uint64_t bits = 0;
+    for (int v = 0; v < kLayer; v += kLanes) {
+      bits |= BitsFromMask(LoadU(sums + layer * kLayer + v) >= least) << v;
+    }
+    found[layer] |= bits;
+  }
 }
 
 }  // namespace

@@ -25,11 +25,11 @@ void SumSink::startEvidence(Kind kind, const std::vector<int>& slots, const std:
 void SumSink::close() {
   const auto slot = static_cast<std::size_t>((*slots_)[current_]);
   if (kind_ == Kind::kHits) {
-    applyToHits(rules_, sums_, protected_[slot]);
-    if (rules_.seeksVoids()) noteHits(rules_, sums_, *(*seen_)[current_], hit_[slot]);
+    applyToHits(rules_, *kernels_, sums_, protected_[slot]);
+    if (rules_.seeksVoids()) noteHits(rules_, *kernels_, sums_, *(*seen_)[current_], hit_[slot]);
   } else {
-    applyToFree(rules_, protected_[slot], sums_);
-    if (rules_.seeksVoids()) noteFree(rules_, sums_, hit_[slot], *(*seen_)[current_]);
+    const VoxelMask reached = applyToFree(rules_, *kernels_, protected_[slot], sums_);
+    if (rules_.seeksVoids()) (*seen_)[current_]->crossed = reached & ~hit_[slot];
   }
   const auto add = withdraws_ ? kernels_->withdraw : kernels_->add;
   for (const BlockSums::Plane& sums : sums_) {

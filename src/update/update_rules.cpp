@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 
 namespace bki_mapping {
@@ -24,19 +23,9 @@ void limitHits(float most, BlockSums& hits) {
 }
 
 /// The voxels with sums of at least `least`, which is above 0.
-VoxelMask atLeast(float least, const BlockSums::Plane& plane) {
-  constexpr int kLayer = kBlockEdge * kBlockEdge, kByte = 8;
+VoxelMask atLeast(float least, const BlockSums::Plane& plane, const SumKernels& kernels) {
   LayerBits bits = {};
-  for (int layer = plane.layers.begin; layer < plane.layers.end; ++layer) {
-    const float* const values = plane.values + layer * kLayer;
-    std::uint8_t is[kLayer];
-    for (int v = 0; v < kLayer; ++v) is[v] = values[v] >= least;
-    for (int v = 0; v < kLayer; v += kByte) {
-      std::uint64_t eight;  // bytes of 0 or 1; the product has the n-th of them in bit 56 + n
-      std::memcpy(&eight, is + v, sizeof(eight));
-      bits[static_cast<std::size_t>(layer)] |= eight * 0x0102040810204080 >> 56 << v;
-    }
-  }
+  kernels.find(plane.values, plane.layers, least, bits.data());
   return maskOf(bits);
 }
 
@@ -51,46 +40,42 @@ void clear(std::uint64_t voxels, float* values) {
 
 }  // namespace
 
-void applyToHits(const UpdateRules& rules, BlockSums& hits, VoxelMask& is_protected) {
+void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
+                 VoxelMask& is_protected) {
   if (rules.hits_before_misses) is_protected |= hits.occupied;
   if (rules.evidence_before_misses) {
     for (const BlockSums::Plane& plane : hits) {
-      is_protected |= atLeast(std::numeric_limits<float>::denorm_min(), plane);
+      is_protected |= atLeast(std::numeric_limits<float>::denorm_min(), plane, kernels);
     }
   }
   if (std::isfinite(rules.most_hits)) limitHits(rules.most_hits, hits);
 }
 
-void applyToFree(const UpdateRules& rules, const VoxelMask& is_protected, BlockSums& free) {
+VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
+                      BlockSums& free) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
-  const float threshold = rules.free_threshold, most = rules.most_free;
+  const bool limits = rules.free_threshold > 0.0f || std::isfinite(rules.most_free) || rules.seeksVoids();
   const LayerBits cleared = bitsOf(is_protected);
+  LayerBits reached = {};
   for (BlockSums::Plane& plane : free) {
     for (int layer = 0; layer < kBlockEdge; ++layer) {
       clear(cleared[static_cast<std::size_t>(layer)], plane.values + layer * kLayer);
     }
-    if (threshold > 0.0f) {
-      for (float& value : plane.values) {
-        value = std::min(std::max(value - threshold, 0.0f), most);
-      }
-    } else if (std::isfinite(most)) {
-      for (float& value : plane.values) value = std::min(value, most);
-    }
+    if (limits) kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
   }
+  return maskOf(reached);
 }
 
-void noteHits(const UpdateRules& rules, const BlockSums& hits, SeenVoxels& seen, VoxelMask& hit) {
+void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
+              VoxelMask& hit) {
   VoxelMask may_move;
   for (const BlockSums::Plane& plane : hits) {
-    (rules.fixed[plane.label] ? seen.fixed : may_move) |= atLeast(std::numeric_limits<float>::min(), plane);
+    (rules.fixed[plane.label] ? seen.fixed : may_move) |=
+        atLeast(std::numeric_limits<float>::min(), plane, kernels);
   }
   hit = seen.fixed | may_move;
   seen.fixed &= ~may_move;
   seen.moving = may_move;
-}
-
-void noteFree(const UpdateRules& rules, const BlockSums& free, const VoxelMask& hit, SeenVoxels& seen) {
-  for (const BlockSums::Plane& plane : free) seen.crossed = atLeast(rules.most_free, plane) & ~hit;
 }
 
 }  // namespace bki_mapping

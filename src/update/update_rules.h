@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "update/block_sums.h"
+#include "update/sum_kernels.h"
 #include "update/void_search.h"
 
 namespace bki_mapping {
@@ -28,15 +29,16 @@ struct UpdateRules {
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
 /// @param[out] is_protected adds the voxels that take no evidence for `free` from this scan.
-void applyToHits(const UpdateRules& rules, BlockSums& hits, VoxelMask& is_protected);
+void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
+                 VoxelMask& is_protected);
 
-/// Applies the rules to the free space of one block.
-void applyToFree(const UpdateRules& rules, const VoxelMask& is_protected, BlockSums& free);
+/// Applies the rules to the free space of one block. @return the voxels whose evidence reaches most_free, if
+/// voids are sought.
+VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
+                      BlockSums& free);
 
-/// Notes what the hits of one block say of its voxels. To be called before noteFree.
-void noteHits(const UpdateRules& rules, const BlockSums& hits, SeenVoxels& seen, VoxelMask& hit);
-/// Notes the voxels that beams cross. @param free after applyToFree. @param hit voxels to which hits add
-/// evidence.
-void noteFree(const UpdateRules& rules, const BlockSums& free, const VoxelMask& hit, SeenVoxels& seen);
+/// Notes what the hits of one block say of its voxels. @param[out] hit voxels to which hits add evidence.
+void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
+              VoxelMask& hit);
 
 }  // namespace bki_mapping

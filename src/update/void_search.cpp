@@ -35,18 +35,26 @@ GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
   return block;
 }
 
-/// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
-template <typename MaskOfBlock>
-VoxelMask betweenIn(const IndexNumbering& blocks, std::size_t b, std::size_t axis,
-                    const MaskOfBlock& maskOfBlock) {
-  const auto beside = [&](int step) -> LayerBits {
-    const std::uint32_t position = blocks.find(neighbour(blocks.members()[b], axis, step));
-    return position == kNoPosition ? LayerBits{} : bitsOf(maskOfBlock(position));
-  };
-  return maskOf(between(axis, beside(-1), bitsOf(maskOfBlock(b)), beside(1)));
+}  // namespace
+
+VoidSearch::Beside VoidSearch::besideOf(const IndexNumbering& blocks, std::size_t b) {
+  Beside beside;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const int step : {-1, 1}) {
+      beside[axis][step > 0] = blocks.find(neighbour(blocks.members()[b], axis, step));
+    }
+  }
+  return beside;
 }
 
-}  // namespace
+template <typename MaskOfBlock>
+VoxelMask VoidSearch::betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const {
+  const auto bits = [&](std::uint32_t position) {
+    return position == kNoPosition ? LayerBits{} : bitsOf(maskOfBlock(position));
+  };
+  const auto [previous, next] = beside_[b][axis];
+  return maskOf(between(axis, bits(previous), bitsOf(maskOfBlock(b)), bits(next)));
+}
 
 void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
   const Chunks chunks(seen_.size());
@@ -58,18 +66,19 @@ void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
   forEachBlock([&](std::size_t b) {
     const SeenVoxels& seen = seen_[b];
     empty_[b] = seen.crossed;
+    if ((seen.crossed | seen.fixed).none()) return;
+    beside_[b] = besideOf(blocks, b);
     if (seen.crossed.none()) return;
-    empty_[b] |=
-        betweenIn(blocks, b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
-        ~(seen.fixed | seen.moving);
+    empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
+                 ~(seen.fixed | seen.moving);
   });
   const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].fixed; };
   forEachBlock([&](std::size_t b) {
     const VoxelMask own = seen(b);
     along_x_[b] = along_y_[b] = own;
     if (own.none()) return;
-    along_x_[b] &= betweenIn(blocks, b, 0, seen);
-    along_y_[b] &= betweenIn(blocks, b, 1, seen);
+    along_x_[b] &= betweenIn(b, 0, seen);
+    along_y_[b] &= betweenIn(b, 1, seen);
   });
   // With both neighbours across the faces, those across an edge are two steps away, along different axes.
   forEachBlock([&](std::size_t b) {
@@ -77,8 +86,7 @@ void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
     if (voids_[b].none()) return;
     const auto along_x = [&](std::size_t n) -> const VoxelMask& { return along_x_[n]; };
     const auto along_y = [&](std::size_t n) -> const VoxelMask& { return along_y_[n]; };
-    voids_[b] &= betweenIn(blocks, b, 1, along_x) & betweenIn(blocks, b, 2, along_x) &
-                 betweenIn(blocks, b, 2, along_y);
+    voids_[b] &= betweenIn(b, 1, along_x) & betweenIn(b, 2, along_x) & betweenIn(b, 2, along_y);
   });
 }
 

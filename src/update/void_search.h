@@ -1,6 +1,8 @@
 /// @file Finds the voxels that a scan sees empty together with their neighbours.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "parallel/index_numbering.h"
@@ -24,6 +26,7 @@ class VoidSearch {
   /// Forgets the last scan, and takes all memory for this one. @param blocks number of those that it touches.
   void start(std::size_t blocks) {
     seen_.assign(blocks, {});
+    beside_.resize(blocks);
     for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &along_y_, &voids_}) masks->resize(blocks);
   }
   /// What the scan says of a block; different threads may write to different blocks.
@@ -34,7 +37,16 @@ class VoidSearch {
   const VoxelMask& voidsOf(std::size_t block) const { return voids_[block]; }
 
  private:
+  /// Positions of the blocks across the faces of a block: before and after it along each axis.
+  using Beside = std::array<std::array<std::uint32_t, 2>, 3>;
+
+  static Beside besideOf(const IndexNumbering& blocks, std::size_t b);
+  /// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
+  template <typename MaskOfBlock>
+  VoxelMask betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const;
+
   std::vector<SeenVoxels> seen_;
+  std::vector<Beside> beside_;                ///< of blocks with crossed or fixed voxels
   std::vector<VoxelMask> empty_;              ///< crossed or bridged
   std::vector<VoxelMask> along_x_, along_y_;  ///< seen, with both neighbours along an axis
   std::vector<VoxelMask> voids_;
