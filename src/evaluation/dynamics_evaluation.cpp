@@ -28,6 +28,7 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     voxel.other_points += !moving && !known.ground && !known.dynamic;
     voxel.hit_late |= late;
     if (!moving) continue;
+    voxel.moved = true;
     voxel.last_moved = added_;
     if (early && voxel.early_moving_points++ == 0) unseen_.push_back(n);
     if (!voxel.seen_again) continue;
@@ -53,6 +54,12 @@ void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
 bool DynamicsEvaluation::hasBeenLeft(const VoxelIndex& index, const Taken& taken) const {
   const std::uint32_t n = index_of_.find(index);
   return n == kNoPosition ? !(taken && taken(index)) : !mayBeOccupied(voxels_[n], taken);
+}
+
+bool DynamicsEvaluation::isStillThere(const VoxelIndex& index, const Taken& taken) const {
+  if (taken) return taken(index);
+  const std::uint32_t n = index_of_.find(index);
+  return n != kNoPosition && voxels_[n].moved && voxels_[n].last_moved + 1 == added_;
 }
 
 std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,

@@ -95,6 +95,10 @@ class DynamicsEvaluation {
   /// Whether what moved through a voxel has left it: no point of the last scans hits the voxel, and it is not
   /// taken. @param taken may be empty.
   bool hasBeenLeft(const VoxelIndex& index, const Taken& taken = {}) const;
+  /// Whether what moves is in a voxel at the end of the drive: the voxel is taken; if the truth is not known,
+  /// a moving point of the last scan is in it. Where beams are too far apart to hit the voxel, neither this
+  /// nor hasBeenLeft() needs to be true. @param taken may be empty.
+  bool isStillThere(const VoxelIndex& index, const Taken& taken = {}) const;
   /// @param taken may be empty.
   DynamicsQuality compare(const SemanticMap& map, const Taken& taken = {}) const;
   /// The outcome for each voxel that has points of static or of early moving objects.
@@ -104,8 +108,8 @@ class DynamicsEvaluation {
   struct Voxel {
     VoxelIndex index;
     std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
-    std::size_t last_moved = 0;  ///< the last scan with a moving point
-    bool hit_late = false;
+    std::size_t last_moved = 0;  ///< the last scan with a moving point, if moved
+    bool moved = false, hit_late = false;
     bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
 
     bool isShared() const { return ground_points + standing_points + other_points > 0; }

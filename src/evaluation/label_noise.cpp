@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kObjectEdge = 2.0, kBorderEdge = 0.5;  ///< of the cubes [m]
 constexpr double kFarDistance = 20.0;                   ///< where the rate is the one asked for [m]
-constexpr std::uint64_t kObjectTime = 1000000000;       ///< [ns]
 
 using Cube = std::tuple<int, int, int>;
 
@@ -96,7 +95,7 @@ class Errors {
     const auto [x, y, z] = cubeAt(scan_, i, kObjectEdge);
     std::uint64_t key = own ? own->id : kFreeClass;
     for (const int coordinate : {x, y, z}) key = mixBits(key ^ static_cast<std::uint32_t>(coordinate));
-    const std::uint64_t when = scan_.stamp / kObjectTime;
+    const std::uint64_t when = scan_.stamp / static_cast<std::uint64_t>(1e9 * noise_.object_seconds);
     if (counterRandom(noise_.seed, when, key, 0) >= rate) return scan_.labels[i];
     return otherLabel(i, counterRandom(noise_.seed, when, key, 1), true);
   }

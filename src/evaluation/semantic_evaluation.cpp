@@ -125,12 +125,13 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
   }
 }
 
-SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const Left& left) const {
+SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const StillThere& still_there) const {
   SemanticQuality quality;
   std::vector<Ranked> ranked;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
-    const bool occupied = view.state == VoxelState::kOccupied, has_left = left && left(voxels_[n]);
+    const bool occupied = view.state == VoxelState::kOccupied;
+    const bool has_left = still_there && !still_there(voxels_[n]);
     Ranked voxel{static_cast<double>(view.variance), 0, 0};
     for (const Points& p : points_[n]) {
       quality.map.add(p.truth, view.label, p.count);

@@ -89,11 +89,11 @@ class SemanticEvaluation {
   /// @param predicted the labels given to the mapper, one for each of scan.labels, which are the true ones.
   void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes);
 
-  /// Whether what moved through a voxel has left it by the end.
-  using Left = std::function<bool(const VoxelIndex&)>;
+  /// Whether what moves is in a voxel at the end.
+  using StillThere = std::function<bool(const VoxelIndex&)>;
 
-  /// @param left may be empty: nothing has left.
-  SemanticQuality compare(const SemanticMap& map, const Left& left = {}) const;
+  /// @param still_there may be empty: all is.
+  SemanticQuality compare(const SemanticMap& map, const StillThere& still_there = {}) const;
   /// Occupied voxels whose class is not the true one of any point in them.
   std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map) const;
 

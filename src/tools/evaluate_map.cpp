@@ -38,6 +38,9 @@ po::options_description options() {
       "probability that a label is replaced by a wrong one")(
       "label-errors", po::value<std::string>()->value_name("KIND")->default_value("even"),
       "which labels --label-noise replaces: even, similar, objects, borders, far or network")(
+      "label-error-seconds",
+      tools::realOption("--label-error-seconds", 0.001, 3600.0)->value_name("S")->default_value(1.0),
+      "how long whole objects keep their wrong label, with --label-errors objects or network [s]")(
       "predictions", po::value<std::string>()->value_name("FOLDER"),
       "name of a folder with predicted labels to map; those of --labels are the truth")(
       "write-predictions", po::value<std::string>()->value_name("FOLDER"),
@@ -108,7 +111,8 @@ struct Evaluation {
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map, taken());
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
-    quality.semantics = semantics.compare(map, left);
+    const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
+    quality.semantics = semantics.compare(map, still_there);
     quality.occupancy = occupancy.compare(map, left);
     if (truth) quality.truth = truth->compare(map, end);
     if (cloud) quality.cloud = cloud->compare(map);
@@ -220,7 +224,7 @@ int evaluate(const po::variables_map& given) {
   const auto [first, last] = tools::frameRange(given, sequence);
   const LabelNoise label_noise{given["label-noise"].as<double>(),
                                labelErrorsNamed(given["label-errors"].as<std::string>()),
-                               tools::count(given, "noise-seed")};
+                               tools::count(given, "noise-seed"), given["label-error-seconds"].as<double>()};
   std::optional<PoseNoise> pose_noise = poseNoise(given);
   std::optional<Sequence> predictions;
   if (given.count("predictions"))

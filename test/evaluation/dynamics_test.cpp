@@ -59,6 +59,12 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_DOUBLE_EQ(quality.accuracy(), std::sqrt(0.5));
   EXPECT_DOUBLE_EQ(quality.harmonicAccuracy(), 12.0 / 17.0);
 
+  // What the last scan does not see move has left; the last scan sees only something static, in the voxel
+  // of 9.5.
+  for (const int x : {5, 7, 9, 11, 13}) EXPECT_FALSE(evaluation.isStillThere({x, 0, 0})) << x;
+  EXPECT_TRUE(evaluation.hasBeenLeft({7, 0, 0}));
+  EXPECT_FALSE(evaluation.hasBeenLeft({9, 0, 0}));
+
   // A voxel that something is in at the end need not be cleared.
   const auto taken = [](const VoxelIndex& voxel) { return voxel.x == 7; };
   const DynamicsQuality known = evaluation.compare(map, taken);
@@ -66,6 +72,12 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_EQ(known.moving_removed, 2u);
   EXPECT_EQ(known.static_kept, 3u);
   for (const auto& [voxel, fate] : evaluation.fates(map, taken)) EXPECT_NE(fate, VoxelFate::kLeft) << voxel.x;
+  EXPECT_TRUE(evaluation.isStillThere({7, 0, 0}, taken));
+  EXPECT_FALSE(evaluation.isStillThere({5, 0, 0}, taken));
+
+  evaluation.add(scanOf({{{7.2f, 0, 0}, 20}}), *classes);
+  EXPECT_TRUE(evaluation.isStillThere({7, 0, 0}));
+  EXPECT_FALSE(evaluation.isStillThere({5, 0, 0}));
 }
 
 TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {

@@ -79,18 +79,26 @@ TEST(LabelNoise, ErrsMoreOftenFarAway) {
   EXPECT_EQ(wrongAt(80.0f), 1.0);
 }
 
-TEST(LabelNoise, ErrsInWholeObjectsForASecond) {
-  int wrong = 0;
+TEST(LabelNoise, ErrsInWholeObjectsForTheTimeAskedFor) {
+  const LabelNoise noise{0.3, LabelErrors::kObjects, 1}, short_lived{0.3, LabelErrors::kObjects, 1, 0.1};
+  int wrong = 0, first = 0, second = 0, both = 0;
   for (int n = 0; n < 400; ++n) {
     Scan scan = scanAt({10.0f * static_cast<float>(n) + 1.0f, 0.0f, 0.0f}, {10}, 20);
-    const LabelNoise noise{0.3, LabelErrors::kObjects, 1};
     const auto noisy = withLabelNoise(scan, streetTable(), noise);
+    const bool before = withLabelNoise(scan, streetTable(), short_lived)[0] != 10;
     EXPECT_EQ(std::set<std::uint32_t>(noisy.begin(), noisy.end()).size(), 1u) << n;
-    wrong += noisy[0] != 10;
     scan.stamp += 100000000;
     EXPECT_EQ(withLabelNoise(scan, streetTable(), noise), noisy) << n;
+    const bool after = withLabelNoise(scan, streetTable(), short_lived)[0] != 10;
+    wrong += noisy[0] != 10;
+    first += before;
+    second += after;
+    both += before && after;
   }
   EXPECT_NEAR(wrong, 120, 30);
+  EXPECT_NEAR(first, 120, 30);
+  EXPECT_NEAR(second, 120, 30);
+  EXPECT_NEAR(both, 36, 20) << "each tenth of a second anew";
 }
 
 TEST(LabelNoise, ErrsAtBordersOnly) {

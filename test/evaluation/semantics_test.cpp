@@ -88,8 +88,8 @@ TEST_F(Quality, WhatHasLeftDoesNotCountAsPresent) {
   set(2, kFreeClass, 1.0f);
   set(3, 2, 1.0f);
   set(4, 2, 1.0f);
-  const auto left = [](const VoxelIndex& voxel) { return voxel.x <= 3; };
-  const SemanticQuality quality = evaluation_.compare(map_, left), all = evaluation_.compare(map_);
+  const auto still_there = [](const VoxelIndex& voxel) { return voxel.x == 4; };
+  const SemanticQuality quality = evaluation_.compare(map_, still_there), all = evaluation_.compare(map_);
   EXPECT_EQ(quality.map.count(2, kFreeClass), 4u) << "all points";
   EXPECT_EQ(quality.input.points(2), 15u);
   EXPECT_EQ(quality.map_of_present.points(1), 5u);

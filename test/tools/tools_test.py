@@ -238,6 +238,10 @@ class Tools(unittest.TestCase):
             noisy = self.evaluation(more=('--label-noise', '0.5', '--label-errors', kind))
             self.assertLess(noisy['miou_input'], 0.99, kind)
             self.assertEqual(noisy['static_points'], clean['static_points'], kind)
+        # Wrong labels of objects that change with each scan are outvoted more often than those that stay.
+        objects = ('--label-noise', '0.5', '--label-errors', 'objects', '--label-error-seconds')
+        brief, lasting = (self.evaluation(more=(*objects, seconds))['miou_map'] for seconds in ('0.1', '10'))
+        self.assertGreater(brief, lasting)
         # Predictions that take every building for a fence.
         self.labels('predicted', lambda label: 51 if label == 50 else label)
         predicted = {each['name']: each for each in self.evaluation(more=('--predictions', 'predicted'))['classes']}
@@ -332,6 +336,8 @@ class Tools(unittest.TestCase):
         self.fails('--noise-seed is -1', 'evaluate_map', *sequence, '--noise-seed', '-1')
         for share in ('nan', '-0.1', '1.1', 'inf'):
             self.fails('--label-noise is ', 'evaluate_map', *sequence, '--label-noise', share)
+        for seconds in ('nan', '0', '-1', '1e9'):
+            self.fails('--label-error-seconds is ', 'evaluate_map', *sequence, '--label-error-seconds', seconds)
         for option in ('--pose-noise', '--pose-drift'):
             for errors in ('0.1', '0.1,', '0.1,2,3', '-0.1,2', '0.1,nan', 'a,b', ''):
                 self.fails(option + ' is ' + errors, 'evaluate_map', *sequence, option, errors)
