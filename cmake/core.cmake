@@ -22,7 +22,7 @@ endfunction()
 
 # A room in which scans are computed.
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same. Not -O3
-# with a Debug build's sanitizers: with their checks of each pointer, it takes minutes for one file of vector loops.
+# with a Debug build's sanitizers: with their checks, it takes minutes for one file of vector loops.
 function(bki_mapping_core_room room)
   bki_mapping_room(${room} ${ARGN})
   target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math

@@ -7,7 +7,7 @@ function(bki_mapping_warnings target)
 endfunction()
 
 # Flags for the ROS shell and the tests.
-set(BKI_MAPPING_OUTER_FLAGS "" CACHE STRING "More compiler flags for the ROS shell and the tests, as to sanitize less of them")
+set(BKI_MAPPING_OUTER_FLAGS "" CACHE STRING "More compiler flags for the ROS shell and the tests")
 function(bki_mapping_outer_flags target)
   target_compile_options(${target} PRIVATE ${BKI_MAPPING_OUTER_FLAGS})
 endfunction()
