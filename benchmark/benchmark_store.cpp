@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/store/map_keeper.h"
 #include "core/quantile.h"
 #include "core/stopwatch.h"

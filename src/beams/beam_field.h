@@ -8,7 +8,7 @@
 #include "beams/beams.h"
 #include "beams/raster/beam_box.h"
 #include "beams/row_walk.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/core/grid_geometry.h"
 #include "kernel/sparse_kernel.h"
 #include "parallel/thread_pool.h"
 #include "update/block_group.h"
