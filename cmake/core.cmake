@@ -21,8 +21,8 @@ function(bki_mapping_room room)
 endfunction()
 
 # A room in which scans are computed.
-# Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same. Not -O3
-# with a Debug build's sanitizers: with their checks, it takes minutes for one file of vector loops.
+# Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same. Not -O3 in
+# Debug builds, which are for debuggers and sanitizers.
 function(bki_mapping_core_room room)
   bki_mapping_room(${room} ${ARGN})
   target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math

@@ -139,7 +139,8 @@ run_hostile() {
 }
 
 # A build for a sanitizer. $1: build folder, $2: sanitizer, $3: debug flags, $4: those of the ROS shell and of the tests, if
-# others. Checks of each pointer double the time of compiling; the address sanitizer sees a wrong pointer when it is used.
+# others. Checks of each pointer double the time of compiling, so they are left to scripts/fuzz --target; the address sanitizer
+# sees most wrong pointers when they are used.
 configure_sanitizer() {
   configure_build "$1" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="$3" \
     -DCMAKE_CXX_FLAGS="-O1 -fsanitize=$2 -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr -fno-omit-frame-pointer" \

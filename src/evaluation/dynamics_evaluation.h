@@ -95,9 +95,9 @@ class DynamicsEvaluation {
   /// Whether what moved through a voxel has left it: no point of the last scans hits the voxel, and it is not
   /// taken. @param taken may be empty.
   bool hasBeenLeft(const VoxelIndex& index, const Taken& taken = {}) const;
-  /// Whether what moves is in a voxel at the end of the drive: the voxel is taken; if the truth is not known,
-  /// a moving point of the last scan is in it. Where beams are too far apart to hit the voxel, neither this
-  /// nor hasBeenLeft() needs to be true. @param taken may be empty.
+  /// Whether something that can move is in a voxel at the end of the drive: the voxel is taken; if the truth
+  /// is not known, a moving point of the last scan is in it. Where beams are too far apart to hit the voxel,
+  /// neither this nor hasBeenLeft() needs to be true. @param taken may be empty.
   bool isStillThere(const VoxelIndex& index, const Taken& taken = {}) const;
   /// @param taken may be empty.
   DynamicsQuality compare(const SemanticMap& map, const Taken& taken = {}) const;

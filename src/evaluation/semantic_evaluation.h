@@ -89,7 +89,7 @@ class SemanticEvaluation {
   /// @param predicted the labels given to the mapper, one for each of scan.labels, which are the true ones.
   void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes);
 
-  /// Whether what moves is in a voxel at the end.
+  /// Whether something that can move is in a voxel at the end.
   using StillThere = std::function<bool(const VoxelIndex&)>;
 
   /// @param still_there may be empty: all is.

@@ -199,7 +199,8 @@ Sequence::Sequence(const std::string& folder, const std::string& labels, const s
   };
   const Eigen::Isometry3d T_first = map_poses.empty() ? pose(0, sixDigits(0)) : Eigen::Isometry3d::Identity();
   for (const auto& [number, name] : names) {
-    const double seconds = secondsOf(number, name);
+    const double seconds =
+        secondsOf(number, name);  // before the pose: where both lack a line, the error names the times
     addScan(number, name, T_first.inverse() * pose(number, name), seconds);
   }
 }

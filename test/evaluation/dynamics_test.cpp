@@ -37,6 +37,8 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
   evaluation.add(scanOf({{{0.5f, 0, 0}, 10}, {{0.6f, 0, 0}, 10}, {{5.5f, 0, 0}, 20}, {{7.5f, 0, 0}, 20}}),
                  *classes);
+  EXPECT_TRUE(evaluation.isStillThere({5, 0, 0}));
+  EXPECT_FALSE(evaluation.isStillThere({0, 0, 0}));
   evaluation.add(scanOf({{{2.5f, 0, 0}, 10}, {{5.6f, 0, 0}, 20}, {{9.5f, 0, 0}, 20}, {{9.5f, 0, 0}, 0}}),
                  *classes);
   evaluation.add(scanOf({{{11.5f, 0, 0}, 20}, {{3.5f, 0, 0}, 99}, {{NAN, 0, 0}, 10}}), *classes);

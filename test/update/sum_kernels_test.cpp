@@ -1,4 +1,4 @@
-// Sums are rounded, added and taken back as a plain loop would, on every instruction set.
+// Sums are limited, searched, rounded, added and taken back as a plain loop would, on every instruction set.
 #include <gtest/gtest.h>
 
 #include <algorithm>

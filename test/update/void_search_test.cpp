@@ -30,6 +30,7 @@ bool isEmpty(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex&
 
 TEST(VoidSearch, EqualsALookAtAllNeighbours) {
   std::mt19937 random(5);
+  VoidSearch search;  // keeps its memory, but nothing of the scan before
   for (const unsigned unseen_of_thousand : {0u, 5u, 30u, 200u}) {
     for (const std::size_t threads : {1, 3}) {
       IndexNumbering blocks;
@@ -37,9 +38,9 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         const auto coordinate = [&] { return static_cast<std::int32_t>(random() % 4) - 2; };
         blocks.insert({coordinate(), coordinate(), coordinate()});
       }
-      VoidSearch search;
       search.start(blocks.size());
       for (std::size_t b = 0; b < blocks.size(); ++b) {
+        if (b % 7 == 3) continue;  // neither crossed nor hit
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
           if (random() % 1000 < unseen_of_thousand) continue;
           const auto kind = random() % 50;
