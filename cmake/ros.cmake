@@ -47,12 +47,12 @@ bki_mapping_precompile(bki_mapping_ros
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 
 bki_mapping_join(bki_mapping_ros)
-bki_mapping_outer_flags(bki_mapping_ros)
+bki_mapping_shell_flags(bki_mapping_ros)
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)
 target_link_libraries(bki_mapping_nodelets PRIVATE bki_mapping_ros)
 bki_mapping_warnings(bki_mapping_nodelets)
-bki_mapping_outer_flags(bki_mapping_nodelets)
+bki_mapping_shell_flags(bki_mapping_nodelets)
 
 add_executable(mapping_node src/ros/mapping_node.cpp)
 target_link_libraries(mapping_node PRIVATE bki_mapping_ros)

@@ -51,7 +51,6 @@ endif()
 function(bki_mapping_test_options target)
   target_compile_options(${target} PRIVATE -O1)
   bki_mapping_warnings(${target})
-  bki_mapping_outer_flags(${target})
 endfunction()
 
 unset(BKI_MAPPING_FIRST_TEST CACHE)

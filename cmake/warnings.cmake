@@ -6,8 +6,8 @@ function(bki_mapping_warnings target)
   endif()
 endfunction()
 
-# Flags for the ROS shell and the tests.
-set(BKI_MAPPING_OUTER_FLAGS "" CACHE STRING "More compiler flags for the ROS shell and the tests")
-function(bki_mapping_outer_flags target)
-  target_compile_options(${target} PRIVATE ${BKI_MAPPING_OUTER_FLAGS})
+# Flags for the ROS shell.
+set(BKI_MAPPING_SHELL_FLAGS "" CACHE STRING "More compiler flags for the ROS shell")
+function(bki_mapping_shell_flags target)
+  target_compile_options(${target} PRIVATE ${BKI_MAPPING_SHELL_FLAGS})
 endfunction()

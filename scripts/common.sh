@@ -138,11 +138,11 @@ run_hostile() {
   rm -rf "$folder"
 }
 
-# A build for a sanitizer. $1: build folder, $2: sanitizer, $3: debug flags, $4: those of the ROS shell and of the tests, if
-# others. Checks of each pointer double the time of compiling, so they are left to scripts/fuzz --target; the address sanitizer
-# sees most wrong pointers when they are used.
+# A build for a sanitizer. $1: build folder, $2: sanitizer, $3: debug flags, $4: more flags for the ROS shell. Checks of each
+# pointer double the time of compiling, so they are left to scripts/fuzz --target; the address sanitizer sees most wrong pointers
+# when they are used.
 configure_sanitizer() {
   configure_build "$1" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="$3" \
     -DCMAKE_CXX_FLAGS="-O1 -fsanitize=$2 -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr -fno-omit-frame-pointer" \
-    -DBKI_MAPPING_OUTER_FLAGS="${4-}" -DBKI_MAPPING_JOIN=ON >/dev/null
+    -DBKI_MAPPING_SHELL_FLAGS="${4-}" -DBKI_MAPPING_JOIN=ON >/dev/null
 }
