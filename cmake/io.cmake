@@ -15,15 +15,21 @@ target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJ
 target_link_libraries(bki_mapping_io PRIVATE pcl_common pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ZLIB::ZLIB ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
 target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 # In debug builds OctoMap would print what it writes to standard error.
-set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG)
+set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
 bki_mapping_room(simulation SOURCES city.cpp drive_file.cpp lidar.cpp scene.cpp street.cpp street_parts.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp quality_report.cpp run_report.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation bki_mapping_beams)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree)
 bki_mapping_join(bki_mapping_io bki_mapping_simulation bki_mapping_evaluation)
+bki_mapping_precompile(bki_mapping_io
+  <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
 bki_mapping_room(tools SOURCES draw.cpp options.cpp LINK bki_mapping_evaluation bki_mapping_query Boost::program_options)
-target_compile_definitions(bki_mapping_tools PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
+# Of one file: precompiled headers serve only targets with all the definitions of theirs.
+set_source_files_properties(src/tools/options.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
+target_compile_options(bki_mapping_tools PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the other libraries
+bki_mapping_precompile(bki_mapping_tools
+  <Eigen/Geometry> <boost/program_options.hpp> <filesystem> <functional> <iostream> <map> <string> <vector>)
 
 function(bki_mapping_tool target)
   target_link_libraries(${target} PRIVATE bki_mapping_tools ${ARGN})
@@ -32,12 +38,8 @@ endfunction()
 foreach(name map_sequence clear_map evaluate_map export_map inspect_map merge_maps migrate_map query_city simulate_city simulate_drive)
   add_executable(${name} src/tools/${name}.cpp)
   bki_mapping_tool(${name})
-  if(name STREQUAL map_sequence)
-    bki_mapping_precompile(${name}
-      <Eigen/Geometry> <boost/program_options.hpp> <filesystem> <functional> <iostream> <map> <string> <vector>)
-  else()
-    bki_mapping_precompile(${name} REUSE map_sequence)
-  endif()
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the libraries
+  bki_mapping_precompile(${name} REUSE bki_mapping_tools)
 endforeach()
 target_link_libraries(inspect_map PRIVATE nlohmann_json::nlohmann_json)
 add_executable(benchmark_sequence benchmark/benchmark_sequence.cpp benchmark/curves.cpp)

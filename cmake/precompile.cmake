@@ -6,7 +6,8 @@ else()
   option(BKI_MAPPING_PRECOMPILE "Precompile the headers that most files read" ON)
 endif()
 
-# bki_mapping_precompile(TARGET header...), or bki_mapping_precompile(TARGET REUSE OTHER), if both have the same flags.
+# bki_mapping_precompile(TARGET header...), or bki_mapping_precompile(TARGET REUSE OTHER). GCC then compiles TARGET with OTHER's
+# level of optimisation, and leaves the headers unused, with a warning, if OTHER has definitions that TARGET has not.
 function(bki_mapping_precompile target)
   if(NOT BKI_MAPPING_PRECOMPILE)
     return()
@@ -23,6 +24,6 @@ endfunction()
 option(BKI_MAPPING_JOIN "Compile several files as one: faster from scratch, slower after a change" OFF)
 function(bki_mapping_join)
   if(BKI_MAPPING_JOIN)
-    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
   endif()
 endfunction()

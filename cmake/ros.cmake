@@ -41,22 +41,29 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
   LINK bki_mapping_io bki_mapping_query pcl_common ${catkin_LIBRARIES})
-bki_mapping_precompile(bki_mapping_ros
+set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
+bki_mapping_precompile(bki_mapping_ros ${BKI_MAPPING_ROS_HEADERS})
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 
 bki_mapping_join(bki_mapping_ros)
 bki_mapping_shell_flags(bki_mapping_ros)
+# bki_mapping_uses_ros(TARGET): includes ROS, so it is compiled as the shell is.
+function(bki_mapping_uses_ros target)
+  bki_mapping_shell_flags(${target})
+  bki_mapping_precompile(${target} REUSE bki_mapping_ros)
+endfunction()
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)
 target_link_libraries(bki_mapping_nodelets PRIVATE bki_mapping_ros)
 bki_mapping_warnings(bki_mapping_nodelets)
-bki_mapping_shell_flags(bki_mapping_nodelets)
+bki_mapping_uses_ros(bki_mapping_nodelets)
 
 add_executable(mapping_node src/ros/mapping_node.cpp)
 target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
 bki_mapping_warnings(mapping_node)
+bki_mapping_uses_ros(mapping_node)
 
 add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
@@ -67,6 +74,9 @@ bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
 add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
 bki_mapping_tool(benchmark_publishing bki_mapping_ros)
+foreach(name play_sequence sequence_to_bag print_parameters benchmark_publishing)
+  bki_mapping_uses_ros(${name})
+endforeach()
 
 install(TARGETS bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}

@@ -53,6 +53,18 @@ function(bki_mapping_test_options target)
   bki_mapping_warnings(${target})
 endfunction()
 
+unset(BKI_MAPPING_FIRST_ROS_TEST CACHE)
+# bki_mapping_ros_test(TARGET): precompiled headers and definitions of tests that include ROS.
+function(bki_mapping_ros_test target)
+  target_compile_definitions(${target} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  if(NOT BKI_MAPPING_FIRST_ROS_TEST)
+    bki_mapping_precompile(${target} <gtest/gtest.h> ${BKI_MAPPING_ROS_HEADERS})
+    set(BKI_MAPPING_FIRST_ROS_TEST ${target} CACHE INTERNAL "Whose precompiled headers the other tests that include ROS use")
+  elseif(NOT target STREQUAL BKI_MAPPING_FIRST_ROS_TEST)
+    bki_mapping_precompile(${target} REUSE ${BKI_MAPPING_FIRST_ROS_TEST})
+  endif()
+endfunction()
+
 unset(BKI_MAPPING_FIRST_TEST CACHE)
 # bki_mapping_unit_tests(ROOM name...): test/ROOM/NAME_test.cpp, linked with the room and the reference.
 function(bki_mapping_unit_tests room)
@@ -62,7 +74,9 @@ function(bki_mapping_unit_tests room)
     target_link_libraries(${name} PRIVATE bki_mapping_${room} bki_mapping_reference GTest::gtest GTest::gtest_main)
     target_compile_definitions(${name} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     bki_mapping_test_options(${name})
-    if(NOT BKI_MAPPING_FIRST_TEST)
+    if(room STREQUAL ros)
+      bki_mapping_ros_test(${name})
+    elseif(NOT BKI_MAPPING_FIRST_TEST)
       bki_mapping_precompile(${name}
         <gtest/gtest.h> <Eigen/Geometry> <algorithm> <cmath> <fstream> <map> <random> <string> <vector>)
       set(BKI_MAPPING_FIRST_TEST ${name} CACHE INTERNAL "Whose precompiled headers the other tests use")
@@ -168,13 +182,10 @@ target_link_libraries(html_export_test PRIVATE nlohmann_json::nlohmann_json ZLIB
 target_link_libraries(map_export_test PRIVATE pcl_io)
 target_link_libraries(map_picture_test PRIVATE PNG::PNG)
 target_link_libraries(cleaned_points_test PRIVATE pcl_io)
-set_target_properties(cleaned_points_test PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # likewise
 target_link_libraries(pcd_file_test PRIVATE pcl_io)
-set_target_properties(pcd_file_test PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # likewise
 target_link_libraries(grid_export_test PRIVATE yaml-cpp)
 target_link_libraries(octomap_export_test PRIVATE ${OCTOMAP_LIBRARIES})
 target_include_directories(octomap_export_test SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
-set_target_properties(map_export_test PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)  # VTK brings Qt, which wants -fPIC
 target_link_libraries(yaml_file_test PRIVATE bki_mapping_simulation yaml-cpp)
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
@@ -290,6 +301,7 @@ if(CATKIN_ENABLE_TESTING)
   add_executable(soak_test test/ros/soak_test.cpp)
   target_link_libraries(soak_test PRIVATE bki_mapping_ros bki_mapping_simulation GTest::gtest ${catkin_LIBRARIES})
   bki_mapping_test_options(soak_test)
+  bki_mapping_ros_test(soak_test)
   add_dependencies(soak_test bki_mapping_nodelets)
   add_rostest(test/ros/soak.test)
   # Likewise: a hostile publisher.
@@ -297,8 +309,8 @@ if(CATKIN_ENABLE_TESTING)
     test/ros/hostile/queries.cpp test/ros/hostile/transforms.cpp)
   target_include_directories(hostile_test PRIVATE test)
   target_link_libraries(hostile_test PRIVATE bki_mapping_ros GTest::gtest ${catkin_LIBRARIES})
-  target_compile_definitions(hostile_test PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   bki_mapping_test_options(hostile_test)
+  bki_mapping_ros_test(hostile_test)
   add_dependencies(hostile_test bki_mapping_nodelets)
   add_rostest(test/ros/hostile.test)
   # The longest start first; they mostly wait, and other tests compute meanwhile.
