@@ -22,12 +22,14 @@ BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
 READ = re.compile(r'read (\d+) of (\d+) tiles, in (\d+) of (\d+) files; [0-9.]+ ms\n')
 
 
-class CityReading(unittest.TestCase):
+class City(unittest.TestCase):
+    SETTINGS = ()
+
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp())
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        cls.index = small_city.make(BIN, cls.folder)
+        cls.index = small_city.make(BIN, cls.folder, settings=cls.SETTINGS)
         cls.city, cls.whole = str(cls.folder / 'city'), str(cls.folder / 'whole.bkm')
         assert len(cls.index['regions']) > 4
 
@@ -53,7 +55,8 @@ class CityReading(unittest.TestCase):
         body = path.read_bytes().split(b'end_header\n', 1)[1]
         return [(record[:3], record[3]) for record in struct.iter_unpack('<fff3xH25x', body)]
 
-    def test_points_are_those_of_the_whole_map(self):
+    def check_points(self):
+        """Points of the city are those of the whole map, and the nearest obstacles are those of all occupied voxels."""
         drawn = random.Random(1)
         points = [(drawn.uniform(-80, 110), drawn.uniform(-90, 80), drawn.uniform(-2.5, 4)) for _ in range(300)]
         voxels = self.voxels()
@@ -88,6 +91,20 @@ class CityReading(unittest.TestCase):
         named = self.succeeds('query_city', self.city, '--points', path, '--nearest', '25', '--classes', 'car,building')
         classes = {row['nearest_class'] for row in csv.DictReader(io.StringIO(named.stdout))}
         self.assertEqual(classes, {'', 'car', 'building'})
+        return rows
+
+
+class DecidedByNeighbours(City):
+    """With free_gain/neighbourhood, a voxel's state depends on voxels of other tiles."""
+    SETTINGS = ('--config', os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets', 'robot.yaml'))
+
+    def test_points_are_those_of_the_whole_map(self):
+        self.check_points()
+
+
+class CityReading(City):
+    def test_points_are_those_of_the_whole_map(self):
+        rows = self.check_points()
         one = self.succeeds('query_city', self.city, '--points', '-', text='0 0 0\n')
         self.assertEqual(one.stdout.splitlines()[1].split(',')[3], rows[-1]['state'])
 

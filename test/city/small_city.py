@@ -38,15 +38,16 @@ def write_city(programs, pieces, city, region_tiles):
     return index
 
 
-def make(programs, folder, shifts=((0, 0), (35.1, -20.1)), region_tiles=2):
-    """Writes the city `city` of some drives, moved by x, y [m], and their map `whole.bkm`. Returns the index."""
+def make(programs, folder, shifts=((0, 0), (35.1, -20.1)), region_tiles=2, settings=()):
+    """Writes the city `city` of some drives, moved by x, y [m], and their map `whole.bkm`. `settings` are arguments of map_sequence.
+    Returns the index."""
     folder = pathlib.Path(folder)
     maps = []
     for seed, (x, y) in enumerate(shifts, 1):
         drive, mapped, moved = folder / f'd{seed}', folder / f'mapped{seed}.bkm', folder / f'moved{seed}.bkm'
         program(programs, 'simulate_drive', '--output', drive, '--scans', SCANS, '--seed', seed, '--beams', 16,
                 '--columns', 400)
-        program(programs, 'map_sequence', '--sequence', drive, '--output', mapped)
+        program(programs, 'map_sequence', '--sequence', drive, '--output', mapped, *settings)
         program(programs, 'merge_maps', mapped, '--transform', f'{mapped}={x},{y},0,0', '--output', moved)
         maps.append(moved)
     program(programs, 'merge_maps', *maps, '--output', folder / 'whole.bkm')
