@@ -46,6 +46,8 @@ set(BKI_MAPPING_ROS_HEADERS
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
 bki_mapping_precompile(bki_mapping_ros ${BKI_MAPPING_ROS_HEADERS})
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
+# Messages first: Ninja 1.11 would generate them after all other libraries, and one processor would wait for their headers.
+add_dependencies(bki_mapping_core ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 
 bki_mapping_join(bki_mapping_ros)
 bki_mapping_shell_flags(bki_mapping_ros)

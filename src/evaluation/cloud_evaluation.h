@@ -2,7 +2,6 @@
 /// (Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps", ITSC 2023).
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,26 +10,9 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "evaluation/dynamics_evaluation.h"
+#include "io/truth_cloud.h"
 
 namespace bki_mapping {
-
-/// A cloud in the map frame of which it is known what moves.
-struct TruthCloud {
-  std::vector<Eigen::Vector3f> points;  ///< all finite [m]
-  std::vector<std::uint8_t> moving;     ///< whether each point is of a moving object
-  std::size_t not_finite = 0;           ///< number of points left out
-
-  /// Adds a scan with raw labels of SemanticKITTI, as the benchmark makes its clouds from them: 252 to 259
-  /// move, and so do points without a class (0, 1) within 3 m, which are of the car itself. Points 50 m away
-  /// and farther are left out, because their labels are not reliable.
-  void add(const Scan& scan);
-};
-
-/// Reads a cloud whose field `label` or, if it has none, `intensity` is 1 for points of moving objects and 0
-/// for others. @throws std::runtime_error in one sentence if the file or a value is wrong.
-TruthCloud readTruthCloud(const std::string& path);
-/// Writes such a cloud, with the field `intensity`. @throws std::runtime_error if that fails.
-void writeTruthCloud(const std::string& path, const TruthCloud& cloud);
 
 /// Finds the nearest of many points.
 class NearestPoints {

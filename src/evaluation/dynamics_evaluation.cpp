@@ -6,10 +6,6 @@
 
 namespace bki_mapping {
 
-std::set<std::uint32_t> DynamicsEvaluation::movingOfSemanticKitti() {
-  return {252, 253, 254, 255, 256, 257, 258, 259};
-}
-
 void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
   const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {

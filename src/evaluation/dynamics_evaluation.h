@@ -72,9 +72,6 @@ enum class VoxelFate {
 /// Collects the labelled points of a drive, voxel by voxel, and compares a map with them.
 class DynamicsEvaluation {
  public:
-  /// SemanticKITTI's raw labels of moving objects, 252 to 259.
-  static std::set<std::uint32_t> movingOfSemanticKitti();
-
   /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known. The map
   /// need not clear such a voxel.
   using Taken = std::function<bool(const VoxelIndex&)>;

@@ -240,7 +240,7 @@ int evaluate(const po::variables_map& given) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   const GridGeometry& geometry = mapper.map().geometry();
-  const auto moving = DynamicsEvaluation::movingOfSemanticKitti();
+  const auto moving = movingOfSemanticKitti();
   Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
                         SemanticEvaluation(geometry, moving), OccupancyEvaluation(geometry, moving),
                         std::nullopt, cloudEvaluation(given, sequence, mapper.config())};

@@ -11,9 +11,9 @@
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
-#include "evaluation/run_report.h"
 #include "io/cleaned_points.h"
 #include "tools/options.h"
+#include "tools/run_report.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "evaluation/cloud_evaluation.h"
+#include "io/truth_cloud.h"
 #include "simulation/drive_file.h"
 #include "tools/options.h"
 

@@ -17,8 +17,8 @@ def links():
     direct = {}
     for room, arguments in re.findall(r'bki_mapping_(?:core_)?room\((\w+)\s([^)]*)\)', text):
         direct[room] = set(re.findall(r'bki_mapping_(\w+)', arguments.partition('LINK')[2]))
-    # The programs of tools that speak ROS link its room, too.
-    direct['tools'].add('ros')
+    # Of the programs of tools, those that speak ROS link its room, and evaluate_map links evaluation.
+    direct['tools'] |= {'ros', 'evaluation'}
     # Nothing links the Python module, which is no room of the library.
     bound = re.search(r'target_link_libraries\(bki_mapping_python PRIVATE ([^)]*)\)', text)[1]
     direct['python'] = set(re.findall(r'bki_mapping_(\w+)', bound))

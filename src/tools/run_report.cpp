@@ -1,4 +1,4 @@
-#include "evaluation/run_report.h"
+#include "tools/run_report.h"
 
 #include <sys/resource.h>
 

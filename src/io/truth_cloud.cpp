@@ -1,0 +1,69 @@
+#include "io/truth_cloud.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "io/pcd_file.h"
+
+namespace bki_mapping {
+namespace {
+
+// Of the benchmark's converter for SemanticKITTI.
+constexpr float kMostRange = 50.0f, kOwnCar = 3.0f;
+constexpr std::uint32_t kUnlabelled = 0, kOutlier = 1;
+
+}  // namespace
+
+std::set<std::uint32_t> movingOfSemanticKitti() {
+  return {252, 253, 254, 255, 256, 257, 258, 259};
+}
+
+Eigen::Vector3f inMapFrame(const Scan& scan, std::size_t i) {
+  return (scan.origin + scan.points[i].cast<double>()).cast<float>();
+}
+
+void TruthCloud::add(const Scan& scan) {
+  static const std::set<std::uint32_t> moves = movingOfSemanticKitti();
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const float range = scan.points[i].norm();
+    if (!std::isfinite(range)) ++not_finite;
+    if (!(range < kMostRange)) continue;
+    const std::uint32_t label = scan.labels[i];
+    const bool own_car = range < kOwnCar && (label == kUnlabelled || label == kOutlier);
+    points.push_back(inMapFrame(scan, i));
+    moving.push_back(own_car || moves.count(label) > 0);
+  }
+}
+
+TruthCloud readTruthCloud(const std::string& path) {
+  const PcdPoints file = readPcdPoints(path);
+  const std::vector<double>& values = file.label.empty() ? file.intensity : file.label;
+  const std::string name = file.label.empty() ? "intensity" : "label";
+  if (values.size() != file.points.size()) {
+    throw std::runtime_error(path +
+                             " has neither a field label nor a field intensity; one of them must be 1 "
+                             "for points of moving objects, and 0 for others");
+  }
+  TruthCloud cloud;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] != 0.0 && values[i] != 1.0) {
+      throw std::runtime_error(path + ": point " + std::to_string(i) + " has " + name + " " +
+                               numberText(values[i]) + ", but must have 1 (moving) or 0");
+    }
+    if (!file.points[i].allFinite()) {
+      ++cloud.not_finite;
+      continue;
+    }
+    cloud.points.push_back(file.points[i]);
+    cloud.moving.push_back(values[i] == 1.0);
+  }
+  return cloud;
+}
+
+void writeTruthCloud(const std::string& path, const TruthCloud& cloud) {
+  writePcdPoints(path, cloud.points, {cloud.moving.begin(), cloud.moving.end()},
+                 Eigen::Isometry3d::Identity());
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,39 @@
+/// @file Clouds of which it is known what moves, as the DynamicMap benchmark has them
+/// (Zhang et al., "A Dynamic Points Removal Benchmark in Point Cloud Maps", ITSC 2023).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bki_mapping/core/scan.h"
+
+namespace bki_mapping {
+
+/// SemanticKITTI's raw labels of moving objects, 252 to 259.
+std::set<std::uint32_t> movingOfSemanticKitti();
+
+/// A point of a scan in the map frame [m].
+Eigen::Vector3f inMapFrame(const Scan& scan, std::size_t i);
+
+/// A cloud in the map frame of which it is known what moves.
+struct TruthCloud {
+  std::vector<Eigen::Vector3f> points;  ///< all finite [m]
+  std::vector<std::uint8_t> moving;     ///< whether each point is of a moving object
+  std::size_t not_finite = 0;           ///< number of points left out
+
+  /// Adds a scan with raw labels of SemanticKITTI, as the benchmark makes its clouds from them: 252 to 259
+  /// move, and so do points without a class (0, 1) within 3 m, which are of the car itself. Points 50 m away
+  /// and farther are left out, because their labels are not reliable.
+  void add(const Scan& scan);
+};
+
+/// Reads a cloud whose field `label` or, if it has none, `intensity` is 1 for points of moving objects and 0
+/// for others. @throws std::runtime_error in one sentence if the file or a value is wrong.
+TruthCloud readTruthCloud(const std::string& path);
+/// Writes such a cloud, with the field `intensity`. @throws std::runtime_error if that fails.
+void writeTruthCloud(const std::string& path, const TruthCloud& cloud);
+
+}  // namespace bki_mapping
