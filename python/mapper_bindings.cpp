@@ -226,7 +226,7 @@ void add(Mapper& self, const FixedMap& added) {
   });
 }
 
-void load(Mapper& self, py::handle path) {
+void addFile(Mapper& self, py::handle path) {
   const std::string file = pathOf(path, "path");
   alone(self, [&] { addStored(self, loadMapFor(self.mapper, file, self.frame)); });
 }
@@ -353,7 +353,7 @@ void addMapper(py::module& m) {
       .def("add", &add, py::arg("map"),
            "Add another map: the map is then the same to the bit as if the scans of both had been integrated "
            "here.\n\nRaises ValueError if grids, classes or frames differ, or a drive is in both.")
-      .def("load", &load, py::arg("path"),
+      .def("load", &addFile, py::arg("path"),
            "Add the map of a map file (.bkm), to go on with it.\n\nRaises MapFileError if the file cannot be "
            "read, or has another grid, class table or frame; ValueError if a drive is in both.")
       .def(

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <random>
 
+#include "evaluation/occupied_map.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -19,18 +20,6 @@ TruthCloud truthOf(const std::vector<std::pair<Eigen::Vector3f, bool>>& points) 
     truth.moving.push_back(moving);
   }
   return truth;
-}
-
-/// A map with voxels of 1 m, in which those of the given points are occupied.
-SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
-  SemanticMap map(GridGeometry(1.0), 0.001, 1);
-  for (const Eigen::Vector3d& point : occupied) {
-    EvidenceUnits plane[kBlockVoxels] = {};
-    const VoxelIndex voxel = map.geometry().voxelAt(point);
-    plane[GridGeometry::offsetInBlock(voxel)] = unitsOf(1.0);
-    map.getOrAllocate(GridGeometry::blockOf(voxel)).add(0, plane);
-  }
-  return map;
 }
 
 TEST(CompareClouds, CountsPointsOfTheTruth) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "evaluation/dynamics_evaluation.h"
+#include "evaluation/occupied_map.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
@@ -17,18 +18,6 @@ Scan scanOf(const std::vector<std::pair<Eigen::Vector3f, std::uint32_t>>& points
     scan.labels.push_back(label);
   }
   return scan;
-}
-
-/// A map with voxels of 1 m, in which those of the given points are occupied.
-SemanticMap mapOf(const std::vector<Eigen::Vector3d>& occupied) {
-  SemanticMap map(GridGeometry(1.0), 0.001, 4);
-  for (const Eigen::Vector3d& point : occupied) {
-    EvidenceUnits plane[kBlockVoxels] = {};
-    const VoxelIndex voxel = map.geometry().voxelAt(point);
-    plane[GridGeometry::offsetInBlock(voxel)] = unitsOf(1.0);
-    map.getOrAllocate(GridGeometry::blockOf(voxel)).add(1, plane);
-  }
-  return map;
 }
 
 TEST(DynamicsQuality, CountsPointByPoint) {

@@ -23,8 +23,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 SemanticMap mapWithGain(unsigned seed = 4) {
   SemanticMap map = randomMap(seed, 60, 12);
   map.setFreeGain(80, 0.1);

@@ -21,7 +21,7 @@ namespace {
 
 const VoxelStates kAll = {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded};
 
-class MapFile : public testing::Test {
+class MapExport : public testing::Test {
  protected:
   void SetUp() override {
     MapperConfig config;
@@ -41,7 +41,7 @@ class MapFile : public testing::Test {
   std::unique_ptr<SemanticMapper> mapper_;
 };
 
-TEST_F(MapFile, PlyHasOneVertexAVoxel) {
+TEST_F(MapExport, PlyHasOneVertexAVoxel) {
   write(folder_ / "map.ply", kAll);
   const std::string bytes = read(folder_ / "map.ply");
   const std::string end = "end_header\n";
@@ -67,7 +67,7 @@ TEST_F(MapFile, PlyHasOneVertexAVoxel) {
   }
 }
 
-TEST_F(MapFile, PclReadsBothFormats) {
+TEST_F(MapExport, PclReadsBothFormats) {
   write(folder_ / "map.ply", kAll);
   write(folder_ / "map.pcd", kAll);
   pcl::PointCloud<pcl::PointXYZRGB> ply, pcd;
@@ -84,7 +84,7 @@ TEST_F(MapFile, PclReadsBothFormats) {
   }
 }
 
-TEST_F(MapFile, HoldsTheStatesAskedFor) {
+TEST_F(MapExport, HoldsTheStatesAskedFor) {
   std::size_t sum = 0;
   for (const VoxelState state : {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}) {
     const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), {state});
@@ -97,13 +97,13 @@ TEST_F(MapFile, HoldsTheStatesAskedFor) {
   EXPECT_THROW(parseStates("occupied,fre"), std::invalid_argument);
 }
 
-TEST_F(MapFile, RefusesOtherEndingsAndFolders) {
+TEST_F(MapExport, RefusesOtherEndingsAndFolders) {
   EXPECT_THROW(write(folder_ / "map.obj", kAll), std::invalid_argument);
   EXPECT_THROW(write(folder_ / "none/map.ply", kAll), std::runtime_error);
   EXPECT_EQ(folder_.fileCount(), 0u);
 }
 
-TEST_F(MapFile, AFailureLeavesTheOldFile) {
+TEST_F(MapExport, AFailureLeavesTheOldFile) {
   const std::string path = folder_ / "map.ply";
   writeTextFile(path, "a good map");
   rlimit before{};

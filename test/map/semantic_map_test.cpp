@@ -138,5 +138,15 @@ TEST(SemanticMap, FindsAllBlocksNearAPointAndNoneTwice) {
   }
 }
 
+TEST(SemanticMap, ErasesAndKeepsTheRest) {
+  SemanticMap map(GridGeometry(1.0), 0.001, 3);
+  for (int x = 0; x < 5; ++x) map.getOrAllocate({{x, 0, 0}});
+  map.erase({{1, 0, 0}});
+  map.erase({{9, 9, 9}});
+  EXPECT_EQ(map.size(), 4u);
+  EXPECT_EQ(map.find({{1, 0, 0}}), nullptr);
+  for (const int x : {0, 2, 3, 4}) EXPECT_NE(map.find({{x, 0, 0}}), nullptr) << x;
+}
+
 }  // namespace
 }  // namespace bki_mapping

@@ -15,8 +15,6 @@
 namespace bki_mapping {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 bool isObstacle(const SemanticMap& map, const VoxelIndex& voxel, const ObstacleRules& rules) {
   const VoxelView view = viewWithoutEntropy(map, voxel);
   if (view.state == VoxelState::kOccupied) return rules.classes.contains(view.label);
@@ -245,16 +243,6 @@ TEST(DistanceField, InterpolatesBetweenCentres) {
   EXPECT_TRUE(field.interpolate({-3, 3, 3})) << "the region's corners are in it";
   EXPECT_FALSE(field.interpolate({-3.01, 0, 0}));
   EXPECT_FALSE(field.interpolate({0, std::numeric_limits<double>::quiet_NaN(), 0}));
-}
-
-template <typename Call>
-void expectRefused(const std::string& sentence, Call&& call) {
-  try {
-    call();
-    FAIL() << sentence;
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), sentence);
-  }
 }
 
 TEST(DistanceField, RefusesImpossibleRegions) {

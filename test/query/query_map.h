@@ -1,13 +1,31 @@
-/// @file Random maps for tests of queries.
+/// @file For tests of queries: random maps, and calls that are refused.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <limits>
 #include <map>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "bki_mapping/map/voxel_state.h"
 
 namespace bki_mapping {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Expects that a call is refused with this sentence.
+template <typename Call>
+void expectRefused(const std::string& sentence, Call&& call) {
+  try {
+    call();
+    FAIL() << sentence;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(error.what(), sentence);
+  }
+}
 
 /// How a random map is made.
 struct QueryMapKind {

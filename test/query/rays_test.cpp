@@ -16,8 +16,6 @@
 namespace bki_mapping {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Part of a ray, in units of its direction.
 struct Part {
   double begin, end;
@@ -292,7 +290,7 @@ TEST(CastRay, MayBeInfiniteAndStartFarAway) {
   EXPECT_EQ(castRay(StateMap(nothing), {{1, 1, 1}, {1, 2, 3}, 5.0}, {{}, true}).end, RayEnd::kUnknown);
 }
 
-void expectRefused(const Ray& ray, const std::string& sentence) {
+void expectRayRefused(const Ray& ray, const std::string& sentence) {
   const SemanticMap map = queryMap(21);
   const StateMap states(map);
   const std::vector<Ray> rays = {{{0, 0, 0}, {1, 0, 0}, 1.0}, ray};
@@ -308,12 +306,13 @@ void expectRefused(const Ray& ray, const std::string& sentence) {
 
 TEST(CastRay, RefusesWhatIsNoRay) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expectRefused({{nan, 0, 0}, {1, 0, 0}, 1}, "has a coordinate that is not finite; remove such rays");
-  expectRefused({{0, 0, 0}, {1, kInfinity, 0}, 1}, "has a coordinate that is not finite; remove such rays");
-  expectRefused({{0, 0, 0}, {0, 0, 0}, 1}, "has the direction 0; give one of any length > 0");
-  expectRefused({{0, 0, 0}, {1, 0, 0}, -1}, "has a negative length or none; give 0 m or more");
-  expectRefused({{0, 0, 0}, {1, 0, 0}, nan}, "has a negative length or none; give 0 m or more");
-  expectRefused({{1e12, 0, 0}, {1, 0, 0}, 1}, "starts beyond the map's grid; start it within the map");
+  expectRayRefused({{nan, 0, 0}, {1, 0, 0}, 1}, "has a coordinate that is not finite; remove such rays");
+  expectRayRefused({{0, 0, 0}, {1, kInfinity, 0}, 1},
+                   "has a coordinate that is not finite; remove such rays");
+  expectRayRefused({{0, 0, 0}, {0, 0, 0}, 1}, "has the direction 0; give one of any length > 0");
+  expectRayRefused({{0, 0, 0}, {1, 0, 0}, -1}, "has a negative length or none; give 0 m or more");
+  expectRayRefused({{0, 0, 0}, {1, 0, 0}, nan}, "has a negative length or none; give 0 m or more");
+  expectRayRefused({{1e12, 0, 0}, {1, 0, 0}, 1}, "starts beyond the map's grid; start it within the map");
   const SemanticMap map = queryMap(22);
   std::vector<RayHit> hits(3);
   EXPECT_THROW(castRays(StateMap(map), std::vector<Ray>(2), {}, hits), std::invalid_argument);

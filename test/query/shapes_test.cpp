@@ -17,8 +17,7 @@
 namespace bki_mapping {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity(),
-                 kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Calls visit(voxel) for all voxels of a map, and some around it.
 template <typename Visit>
@@ -187,16 +186,6 @@ TEST(SpaceContent, NamesTheWorstClass) {
   EXPECT_FALSE(content.worst(std::vector<ClassId>{1}));
   EXPECT_TRUE(content.classes.intersects({3}));
   EXPECT_FALSE(content.classes.intersects({4}));
-}
-
-template <typename Call>
-void expectRefused(const std::string& sentence, Call&& call) {
-  try {
-    call();
-    FAIL() << sentence;
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), sentence);
-  }
 }
 
 TEST_F(Shapes, RefusesWhatIsNoShape) {

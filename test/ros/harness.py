@@ -229,3 +229,13 @@ class MapperTest(unittest.TestCase):
             return voxels_of(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map').blocks)
         finally:
             listener.close()
+
+    def expect_same(self, client, stamp):
+        """Waits until a client of map_clients.py has the map of the server after a scan; returns that map."""
+        truth = self.map_of_server(stamp)
+
+        def arrived():
+            client.update()
+            return client.stamp == stamp and client.blocks == truth
+        wait_until(arrived, 'the client having the same map')
+        return truth
