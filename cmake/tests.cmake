@@ -158,6 +158,8 @@ bki_mapping_test_options(write_example_map)
 # Their own open, write and so on stand before those of the C library, for all libraries.
 foreach(name faulty_disk killed power_cut slow_disk)
   bki_mapping_unit_tests(store ${name})
+  bki_mapping_long_tests(${name}_test)
+  bki_mapping_long_programs(${name}_test)
   target_sources(${name}_test PRIVATE test/store/watched_disk.cpp)
   target_link_libraries(${name}_test PRIVATE ${CMAKE_DL_LIBS})
   set_target_properties(${name}_test PROPERTIES ENABLE_EXPORTS ON)
@@ -273,6 +275,8 @@ if(TARGET bki_mapping_python)
   if(TARGET benchmark_parts)  # that the comparison runs, not how fast
     add_test(NAME compare_python_test COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/benchmark/compare_python.py
       --programs $<TARGET_FILE_DIR:benchmark_parts> --repeats 1 --only PointStates,FrontierSizes)
+    bki_mapping_long_tests(compare_python_test)
+    bki_mapping_long_programs(benchmark_parts)
     set_tests_properties(compare_python_test PROPERTIES TIMEOUT 300 PROCESSORS 2 ENVIRONMENT "PYTHONPATH=${python_path}"
       PASS_REGULAR_EXPRESSION "PointStates +[0-9.]+ +[0-9.]+ +[0-9.]+\nFrontierSizes +[0-9.]+ +[0-9.]+ +[0-9.]+\n$")
   endif()
@@ -310,8 +314,8 @@ if(CATKIN_ENABLE_TESTING)
   bki_mapping_test_options(semantic_layer_test)
   add_dependencies(semantic_layer_test semantic_layer_for_test)
   add_rostest(test/costmap/semantic_layer.test)
-  bki_mapping_unit_tests(ros cloud_conversion kept_city query_services recent_map scan_account sensor_trajectory server_config)
-  bki_mapping_unit_tests(ros scan_reader)
+  bki_mapping_unit_tests(ros cloud_conversion kept_city query_services recent_map)
+  bki_mapping_unit_tests(ros scan_account scan_reader sensor_trajectory server_config)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
   foreach(name body_box filters)
