@@ -19,6 +19,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import small_city  # noqa: E402
 
 BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
+CAR = 1  # in the class table semantic_kitti
 READ = re.compile(r'read (\d+) of (\d+) tiles, in (\d+) of (\d+) files; [0-9.]+ ms\n')
 
 
@@ -96,10 +97,35 @@ class City(unittest.TestCase):
 
 class DecidedByNeighbours(City):
     """With free_gain/neighbourhood, a voxel's state depends on voxels of other tiles."""
+    EDGE = 0.3  # of a voxel [m]
     SETTINGS = ('--config', os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets', 'robot.yaml'))
 
     def test_points_are_those_of_the_whole_map(self):
         self.check_points()
+
+    def test_an_obstacle_at_the_end_of_the_search_is_decided_with_its_neighbours(self):
+        """The nearest obstacle is searched in a box about the points of a tile, so each call has one point of each tile."""
+        drawn = random.Random(2)
+        cars = [centre for centre, label in self.voxels() if label == CAR]
+        near = [tuple(x + self.EDGE * drawn.randint(-1, 1) for x in drawn.choice(cars)) for _ in range(2000)]
+        asked = self.ask(near)
+        occupied = [point for point, row in zip(near, asked) if row['state'] == 'occupied' and row['class'] == 'car']
+        others = [point for point, row in zip(near, asked) if row['state'] == 'free']
+        self.assertGreater(min(len(occupied), len(others)), 100)
+        calls = {}
+        for kind in (occupied, others):
+            number = {}
+            for point in kind[:300]:
+                tile = tuple(math.floor(x / (64 * self.EDGE)) for x in point)
+                number[tile] = number.get(tile, 0) + 1
+                calls.setdefault((number[tile], kind is occupied), []).append(point)
+        for (_, is_occupied), points in calls.items():
+            for point, row in zip(points, self.ask(points, '--nearest', '0.01')):
+                self.assertEqual(row['nearest_distance'] != '', is_occupied, (point, row))
+
+    def ask(self, points, *arguments):
+        text = ''.join(f'{x!r},{y!r},{z!r}\n' for x, y, z in points)
+        return list(csv.DictReader(io.StringIO(self.succeeds('query_city', self.city, '--points', '-', *arguments, text=text).stdout)))
 
 
 class CityReading(City):
