@@ -53,16 +53,21 @@ function(bki_mapping_test_options target)
   bki_mapping_warnings(${target})
 endfunction()
 
-unset(BKI_MAPPING_FIRST_ROS_TEST CACHE)
-# bki_mapping_test_uses_ros(TARGET): definitions and precompiled headers of a test that includes ROS.
+# bki_mapping_test_uses_ros(TARGET): definitions and precompiled headers of a test that includes ROS. The headers belong to a target
+# without code, since all of a target is built where its headers are used.
 function(bki_mapping_test_uses_ros target)
   target_compile_definitions(${target} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  if(NOT BKI_MAPPING_FIRST_ROS_TEST)
-    bki_mapping_precompile(${target} <gtest/gtest.h> ${BKI_MAPPING_ROS_HEADERS})
-    set(BKI_MAPPING_FIRST_ROS_TEST ${target} CACHE INTERNAL "Whose precompiled headers the other tests that include ROS use")
-  elseif(NOT target STREQUAL BKI_MAPPING_FIRST_ROS_TEST)
-    bki_mapping_precompile(${target} REUSE ${BKI_MAPPING_FIRST_ROS_TEST})
+  if(NOT TARGET bki_mapping_ros_test_headers)
+    set(no_code ${CMAKE_BINARY_DIR}/ros_test_headers.cpp)
+    if(NOT EXISTS ${no_code})
+      file(WRITE ${no_code} "")
+    endif()
+    add_library(bki_mapping_ros_test_headers OBJECT EXCLUDE_FROM_ALL ${no_code})
+    target_link_libraries(bki_mapping_ros_test_headers PRIVATE bki_mapping_ros GTest::gtest)
+    bki_mapping_test_options(bki_mapping_ros_test_headers)
+    bki_mapping_precompile(bki_mapping_ros_test_headers <gtest/gtest.h> ${BKI_MAPPING_ROS_HEADERS})
   endif()
+  bki_mapping_precompile(${target} REUSE bki_mapping_ros_test_headers)
 endfunction()
 
 unset(BKI_MAPPING_FIRST_TEST CACHE)
