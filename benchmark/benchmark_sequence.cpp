@@ -125,7 +125,8 @@ int measure(const po::variables_map& given) {
     }
     std::fflush(stdout);
   }
-  std::printf("peak memory of the whole run: %.0f MB\n", static_cast<double>(peakResidentBytes()) / 1e6);
+  std::printf("peak memory of the whole run: %.0f MB\n",
+              static_cast<double>(tools::peakResidentBytes()) / 1e6);
   if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);
   if (given.count("curves")) {
     benchmark::measureCurves(given["curves"].as<std::string>(), tools::count(given, "curve-scans"));

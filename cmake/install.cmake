@@ -34,16 +34,15 @@ install(EXPORT bki_mapping-targets NAMESPACE bki_mapping:: DESTINATION ${BKI_MAP
 
 set(bki_mapping_programs clear_map evaluate_map export_map inspect_map map_sequence merge_maps
   migrate_map query_city simulate_city simulate_drive)
+if(BKI_MAPPING_LONG_TESTS)
+  list(APPEND bki_mapping_programs benchmark_sequence benchmark_store)
+  if(TARGET benchmark_parts)
+    list(APPEND bki_mapping_programs benchmark_parts)
+  endif()
+endif()
 file(RELATIVE_PATH bki_mapping_from_bin /prefix/${BKI_MAPPING_BIN_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})
 set_target_properties(${bki_mapping_programs} PROPERTIES INSTALL_RPATH "$ORIGIN/${bki_mapping_from_bin}")
 install(TARGETS ${bki_mapping_programs} RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION})
-# Not built without the long tests.
-set(bki_mapping_benchmarks benchmark_sequence benchmark_store)
-if(TARGET benchmark_parts)
-  list(APPEND bki_mapping_benchmarks benchmark_parts)
-endif()
-set_target_properties(${bki_mapping_benchmarks} PROPERTIES INSTALL_RPATH "$ORIGIN/${bki_mapping_from_bin}")
-install(TARGETS ${bki_mapping_benchmarks} RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION} OPTIONAL)
 
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION include/${PROJECT_NAME})
 install(DIRECTORY config web DESTINATION ${BKI_MAPPING_SHARE_DESTINATION})

@@ -58,7 +58,7 @@ target_link_libraries(bki_mapping_python PRIVATE bki_mapping_io bki_mapping_quer
 target_compile_options(bki_mapping_python PRIVATE -O1)  # the work is done in the libraries
 bki_mapping_warnings(bki_mapping_python)
 bki_mapping_join(bki_mapping_python)
-# It has functions of the same names as others.
+# map_bindings.cpp has functions of the same names as others.
 set_source_files_properties(python/map_bindings.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 bki_mapping_precompile(bki_mapping_python
   <Eigen/Geometry> <map> <memory> <pybind11/numpy.h> <pybind11/pybind11.h> <pybind11/stl.h> <string> <vector>)

@@ -86,7 +86,9 @@ install(TARGETS bki_mapping_nodelets
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-install(TARGETS benchmark_publishing RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION} OPTIONAL)
+if(BKI_MAPPING_LONG_TESTS)
+  install(TARGETS benchmark_publishing RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endif()
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)

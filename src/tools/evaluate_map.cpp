@@ -14,6 +14,7 @@
 #include "evaluation/label_noise.h"
 #include "evaluation/pose_noise.h"
 #include "evaluation/quality_report.h"
+#include "io/truth_cloud.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
 #include "tools/options.h"

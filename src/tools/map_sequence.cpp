@@ -44,7 +44,7 @@ po::options_description options() {
   return options;
 }
 
-std::string progressText(const ScanReport& scan) {
+std::string progressText(const tools::ScanReport& scan) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(1) << scan.stats.totalMs() << " ms";
   return text.str();
@@ -108,7 +108,7 @@ int mapSequence(const po::variables_map& given) {
     if (given.count("output")) warnOfParts(path);
   }
 
-  std::vector<ScanReport> scans;
+  std::vector<tools::ScanReport> scans;
   std::vector<std::size_t> mapped;
   std::size_t refused = 0;
   for (std::size_t i = first; i < last; ++i) {
@@ -141,8 +141,9 @@ int mapSequence(const po::variables_map& given) {
         [&](std::size_t done) { tools::showProgress(done, mapped.size(), "scans cleaned"); });
     std::cout << path << ": " << count.kept << " of " << count.points << " points\n";
   }
-  if (given.count("report")) writeTextFile(given["report"].as<std::string>(), reportJson(mapper, scans));
-  std::cout << summaryText(mapper, scans);
+  if (given.count("report"))
+    writeTextFile(given["report"].as<std::string>(), tools::reportJson(mapper, scans));
+  std::cout << tools::summaryText(mapper, scans);
   if (refused > 0) {
     std::cerr << "map_sequence: " << refused << " of " << last - first << " scans were refused\n";
   }

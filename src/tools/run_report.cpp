@@ -11,7 +11,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "core/quantile.h"
 
-namespace bki_mapping {
+namespace bki_mapping::tools {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -150,4 +150,4 @@ std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanRepo
   return out.str();
 }
 
-}  // namespace bki_mapping
+}  // namespace bki_mapping::tools

@@ -6,7 +6,7 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 
-namespace bki_mapping {
+namespace bki_mapping::tools {
 
 /// One scan of a run.
 struct ScanReport {
@@ -23,4 +23,4 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
 /// A few lines for people: times, voxels by state and by class.
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans);
 
-}  // namespace bki_mapping
+}  // namespace bki_mapping::tools

@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <random>
 
 #include "evaluation/occupied_map.h"
-#include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
@@ -108,37 +106,6 @@ TEST(CloudEvaluation, LabelsScansByTheTruth) {
   const Scan known = evaluation.labelled(scan);
   EXPECT_EQ(known.points, (std::vector<Eigen::Vector3f>{{0.01f, 0, 0}, {2.0f, 0, 0}}));
   EXPECT_EQ(known.labels, (std::vector<std::uint32_t>{0, 252}));
-}
-
-TEST(TruthCloudFile, HoldsZerosAndOnes) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "gt_cloud.pcd";
-  writeTruthCloud(path, truthOf({{{1, 2, 3}, true}, {{4, 5, 6}, false}}));
-  const TruthCloud read = readTruthCloud(path);
-  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}));
-  EXPECT_EQ(read.moving, (std::vector<std::uint8_t>{1, 0}));
-  const auto write = [&](const std::string& field, const std::string& rows, int count) {
-    std::ofstream(path) << "VERSION 0.7\nFIELDS x y z " << field
-                        << "\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH " << count
-                        << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count << "\nDATA ascii\n"
-                        << rows;
-  };
-  const auto fault = [&]() -> std::string {
-    try {
-      readTruthCloud(path);
-      return "";
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-  };
-  write("label", "1 2 3 1\nnan 0 0 0\n", 2);
-  EXPECT_EQ(readTruthCloud(path).moving, std::vector<std::uint8_t>{1});
-  EXPECT_EQ(readTruthCloud(path).not_finite, 1u);
-  write("intensity", "1 2 3 1\n1 1 1 0.5\n", 2);
-  EXPECT_NE(fault().find("point 1 has intensity 0.5, but must have 1 (moving) or 0"), std::string::npos)
-      << fault();
-  write("curvature", "1 2 3 1\n", 1);
-  EXPECT_NE(fault().find("neither a field label nor a field intensity"), std::string::npos) << fault();
 }
 
 }  // namespace

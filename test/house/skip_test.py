@@ -45,7 +45,7 @@ class Skips(unittest.TestCase):
         self.assertEqual(self.outcome('grid_geometry_test'), 'passed')
 
     def test_no_test_skips_a_part_of_itself(self):
-        """ctest would hide a skipped case among others of the same program, so that each has a separate program, listed here."""
+        """ctest would hide a skipped case among others of the same program, so each is a separate test, listed here."""
         for folder, _, files in os.walk(os.path.join(ROOT, 'test')):
             for name in files:
                 if not name.endswith(('.cpp', '.h', '.py')):

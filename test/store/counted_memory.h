@@ -1,4 +1,4 @@
-/// @file Counts the memory that a program takes. To be included in one file of the program.
+/// @file Counts the memory that a program takes. To be included in one file of a program.
 #pragma once
 
 #include <malloc.h>

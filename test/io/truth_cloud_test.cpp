@@ -1,0 +1,46 @@
+// Files of clouds whose moving points are known, in the layout of the DynamicMap benchmark.
+#include "io/truth_cloud.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <stdexcept>
+
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+TEST(TruthCloud, HoldsZerosAndOnes) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "gt_cloud.pcd";
+  writeTruthCloud(path, {{{1, 2, 3}, {4, 5, 6}}, {1, 0}});
+  const TruthCloud read = readTruthCloud(path);
+  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(read.moving, (std::vector<std::uint8_t>{1, 0}));
+  const auto write = [&](const std::string& field, const std::string& rows, int count) {
+    std::ofstream(path) << "VERSION 0.7\nFIELDS x y z " << field
+                        << "\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH " << count
+                        << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count << "\nDATA ascii\n"
+                        << rows;
+  };
+  const auto fault = [&]() -> std::string {
+    try {
+      readTruthCloud(path);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  };
+  write("label", "1 2 3 1\nnan 0 0 0\n", 2);
+  EXPECT_EQ(readTruthCloud(path).moving, std::vector<std::uint8_t>{1});
+  EXPECT_EQ(readTruthCloud(path).not_finite, 1u);
+  write("intensity", "1 2 3 1\n1 1 1 0.5\n", 2);
+  EXPECT_NE(fault().find("point 1 has intensity 0.5, but must have 1 (moving) or 0"), std::string::npos)
+      << fault();
+  write("curvature", "1 2 3 1\n", 1);
+  EXPECT_NE(fault().find("neither a field label nor a field intensity"), std::string::npos) << fault();
+}
+
+}  // namespace
+}  // namespace bki_mapping
