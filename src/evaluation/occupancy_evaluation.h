@@ -11,7 +11,7 @@
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/semantic_map.h"
-#include "evaluation/semantic_evaluation.h"
+#include "evaluation/reliability.h"
 
 namespace bki_mapping {
 

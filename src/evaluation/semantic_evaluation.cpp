@@ -1,7 +1,6 @@
 #include "evaluation/semantic_evaluation.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <set>
 
@@ -80,22 +79,6 @@ double Confusion::accuracy() const {
     right += pair.first == pair.second ? count : 0;
   }
   return all == 0 ? kNan : static_cast<double>(right) / static_cast<double>(all);
-}
-
-void Reliability::add(double probability, std::size_t count, std::size_t right) {
-  Bin& bin = bins_[static_cast<std::size_t>(10.0 * std::min(probability, 0.999999))];
-  bin.count += count;
-  bin.right += right;
-  bin.probability += probability * static_cast<double>(count);
-}
-
-double Reliability::error() const {
-  double error = 0.0, count = 0.0;
-  for (const Bin& bin : bins_) {
-    error += std::abs(static_cast<double>(bin.right) - bin.probability);
-    count += static_cast<double>(bin.count);
-  }
-  return error / count;
 }
 
 void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>& predicted,

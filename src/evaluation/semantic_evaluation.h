@@ -1,7 +1,6 @@
 /// @file Measures the classes of a map, and how well its probabilities and variances predict errors.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -14,6 +13,7 @@
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/voxel_state.h"
+#include "evaluation/reliability.h"
 
 namespace bki_mapping {
 
@@ -35,26 +35,6 @@ class Confusion {
 
  private:
   std::map<std::pair<ClassId, ClassId>, std::size_t> counts_;
-};
-
-/// Reliability diagram: predicted probabilities in ten bins of equal width, and how often the prediction was
-/// correct.
-class Reliability {
- public:
-  struct Bin {
-    std::size_t count = 0, right = 0;
-    double probability = 0.0;  ///< sum of the predicted probabilities
-  };
-
-  /// Adds `count` predictions of equal probability. @param right how many of them are correct.
-  void add(double probability, std::size_t count, std::size_t right);
-  const std::array<Bin, 10>& bins() const { return bins_; }
-  /// Expected calibration error: the mean, over all predictions, of |accuracy - mean probability| in their
-  /// bin. NaN without predictions.
-  double error() const;
-
- private:
-  std::array<Bin, 10> bins_;
 };
 
 /// Accuracy of the map, and of the labels given to the mapper, at the labelled points (protocol of Gan et
