@@ -98,12 +98,17 @@ std::uint32_t Ground::labelAt(double x, double y) const {
   return distance < road_half_width ? road : (distance < sidewalk_half_width ? sidewalk : terrain);
 }
 
-std::optional<std::uint32_t> Scene::labelAt(const Eigen::Vector3d& point, double time) const {
+std::optional<std::uint32_t> Scene::shapeLabelAt(const Eigen::Vector3d& point, double time) const {
   for (const Shape& shape : shapes) {
     if (shape.contains(point, time)) return shape.label;
   }
-  if (point.z() <= 0.0) return ground.labelAt(point.x(), point.y());
   return std::nullopt;
+}
+
+std::optional<std::uint32_t> Scene::labelAt(const Eigen::Vector3d& point, double time) const {
+  const auto of_shape = shapeLabelAt(point, time);
+  if (of_shape || point.z() > 0.0) return of_shape;
+  return ground.labelAt(point.x(), point.y());
 }
 
 }  // namespace bki_mapping::simulation

@@ -55,6 +55,8 @@ struct Scene {
 
   /// Ground truth: the label at a point; nullopt for free space. Everything below z = 0 is ground.
   std::optional<std::uint32_t> labelAt(const Eigen::Vector3d& point, double time) const;
+  /// The label of the shape that contains a point; nullopt if none does.
+  std::optional<std::uint32_t> shapeLabelAt(const Eigen::Vector3d& point, double time) const;
 };
 
 /// What moves in a street.

@@ -1,5 +1,6 @@
 #include "simulation/voxel_truth.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -34,19 +35,21 @@ std::vector<Shape> VoxelTruth::shapesAt(const VoxelIndex& voxel, double time, do
 
 VoxelContent VoxelTruth::contentAt(const VoxelIndex& voxel, double time) const {
   const Scene near{scene_.ground, shapesAt(voxel, time, 0.0)};
+  const double height = geometry_.resolution() / kPoints;  // of the part of the voxel around a sample point
   std::map<std::uint32_t, int> votes;
-  int inside = 0;
+  double inside = 0.0;
   anyPoint(voxel, [&](const Eigen::Vector3d& point) {
     const auto label = near.labelAt(point, time);
     if (label) ++votes[*label];
-    inside += label.has_value();
+    const bool in_shape = near.shapeLabelAt(point, time).has_value();
+    inside += in_shape ? 1.0 : std::clamp(0.5 - point.z() / height, 0.0, 1.0);
     return false;
   });
   VoxelContent content;
   for (const auto& [label, count] : votes) {
     if (!content.label || count > votes[*content.label]) content.label = label;
   }
-  content.filled = static_cast<double>(inside) / (kPoints * kPoints * kPoints);
+  content.filled = inside / (kPoints * kPoints * kPoints);
   return content;
 }
 

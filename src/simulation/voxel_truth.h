@@ -14,7 +14,10 @@ struct VoxelContent {
   /// The most frequent raw label among the sample points inside of something (ties: the smaller label);
   /// nullopt if all are free.
   std::optional<std::uint32_t> label;
-  double filled = 0.0;  ///< fraction of the sample points inside of something
+  /// Fraction of the voxel that is inside of something. Each sample point stands for the part of the voxel
+  /// around it: the whole part if a shape contains the point, otherwise what of it is under the ground. So
+  /// it is exact where there is only ground, in a map that is not tilted.
+  double filled = 0.0;
 };
 
 /// The ground truth of a scene on the voxel grid of its map. Each voxel is sampled at 4 x 4 x 4 evenly spaced
