@@ -20,6 +20,7 @@ template <typename Config, typename Visit>
 void forEachSetting(Config& config, Visit&& visit) {
   visit("scans", config.scans);
   visit("speed", config.speed);
+  visit("height", config.height);
   visit("seed", config.seed);
   visit("beams", config.lidar.beams);
   visit("columns", config.lidar.columns);
@@ -52,6 +53,7 @@ std::optional<DriveConfig> readDriveFile(const std::string& folder) {
     DriveConfig config;
     config.scene = sceneKindNamed(file["scene"].as<std::string>());
     forEachSetting(config, [&](const char* name, auto& value) {
+      if (name == std::string("height") && !file[name]) return;  // a file of an earlier version
       value = file[name].template as<std::decay_t<decltype(value)>>();
     });
     return config;

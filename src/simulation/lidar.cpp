@@ -66,6 +66,7 @@ void checkDrive(const DriveConfig& config) {
   };
   for (const Limit& l : {Limit{"scans", static_cast<double>(config.scans), 1, 1e6},
                          {"speed", config.speed, 0, 100},
+                         {"height", config.height, 0.1, 100},
                          {"beams", static_cast<double>(lidar.beams), 1, 1024},
                          {"columns", static_cast<double>(lidar.columns), 1, 100000},
                          {"lowest", lidar.lowest, -kPi / 2, kPi / 2},
@@ -143,10 +144,10 @@ Drive::Drive(const DriveConfig& config)
                        config.speed, config.seed)) {}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
-  // In the right lane, weaving slightly, 1.73 m above the ground as in KITTI.
+  // In the right lane, weaving slightly.
   const double x = config_.speed * timeOf(i), wave = 0.06;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() = Eigen::Vector3d(x, -1.5 + 0.3 * std::sin(wave * x), 1.73);
+  T.translation() = Eigen::Vector3d(x, -1.5 + 0.3 * std::sin(wave * x), config_.height);
   T.linear() = Eigen::AngleAxisd(std::atan(0.3 * wave * std::cos(wave * x)), Eigen::Vector3d::UnitZ())
                    .toRotationMatrix();
   return T;

@@ -36,6 +36,7 @@ struct DriveConfig {
   std::uint64_t seed = 1;  ///< of the street
   LidarConfig lidar;
   SceneKind scene = SceneKind::kStreet;
+  double height = 1.73;  ///< of the sensor above the ground, as in KITTI [m]
 
   double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };

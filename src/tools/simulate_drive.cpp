@@ -35,6 +35,7 @@ po::options_description options() {
       "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
       "speed", po::value<double>()->value_name("M/S"),
       "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2")(
+      "height", value("M", simulation::DriveConfig().height), "height of the sensor above the ground [m]")(
       "layout", value<std::string>("NAME", "semantic_kitti"),
       "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
@@ -59,6 +60,7 @@ simulation::DriveConfig driveConfig(const po::variables_map& given) {
   drive.scans = given["scans"].as<int>();
   drive.scene = simulation::sceneKindNamed(given["scene"].as<std::string>());
   drive.speed = given.count("speed") ? given["speed"].as<double>() : usualSpeed(drive.scene);
+  drive.height = given["height"].as<double>();
   drive.seed = tools::count(given, "seed");
   drive.lidar = simulation::lidarNamed(given["lidar"].as<std::string>());
   if (given.count("beams")) drive.lidar.beams = given["beams"].as<int>();

@@ -143,10 +143,19 @@ TEST(DriveFile, GivesTheSameStreetAgain) {
   EXPECT_FALSE(readDriveFile(folder / "."));
   DriveConfig config{7, 3.25, 11, LidarConfig()};
   config.lidar.range_noise = 0.1 / 3.0;
+  config.height = 1.5;
   writeDriveFile(folder / ".", config);
   const auto read = readDriveFile(folder / ".");
   ASSERT_TRUE(read);
   EXPECT_EQ(Drive(*read).frame(6).points, Drive(config).frame(6).points);
+  const double kittis = DriveConfig().height;
+  EXPECT_NEAR(Drive(config).T_world_sensor(0).translation().z(), 1.5, 1e-12);
+  std::string others, line;
+  for (std::ifstream file(folder / "simulation.yaml"); std::getline(file, line);) {
+    if (line != "height: 1.5") others += line + "\n";
+  }
+  std::ofstream(folder / "simulation.yaml") << others;
+  EXPECT_EQ(readDriveFile(folder / ".")->height, kittis) << "of an earlier version";
   std::ofstream(folder / "simulation.yaml") << "scans: many\n";
   EXPECT_THROW(readDriveFile(folder / "."), std::runtime_error);
 }

@@ -350,7 +350,8 @@ class Tools(unittest.TestCase):
         output = self.path('never')
         for option, values in {'scans': '-1 0 1000001', 'beams': '-1 0 1025', 'columns': '-1 0 100001',
                                'rate': '-1 0 nan inf', 'max-range': '-1 0 nan inf', 'range-noise': '-1 nan inf',
-                               'label-noise': '-0.1 nan 2', 'speed': '-1 nan 101'}.items():
+                               'label-noise': '-0.1 nan 2', 'speed': '-1 nan 101',
+                               'height': '0 nan 101'}.items():
             for value in values.split():
                 self.fails(f'{option} is {value}, but must be', 'simulate_drive', '--output', output, '--' + option,
                            value)
