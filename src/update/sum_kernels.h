@@ -34,8 +34,8 @@ struct SumKernels {
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   bool (*withdraw)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. What is not a number remains.
-  /// @param[in,out] sums 512 of them. @param[in,out] reached adds the voxels that now have `most`, as
-  /// LayerBits.
+  /// @param[in,out] sums 512 of them. @param[in,out] reached adds the voxels whose sums were at least `most`
+  /// before, as LayerBits.
   void (*limit)(float threshold, float most, float* sums, std::uint64_t* reached);
   /// Finds sums of at least `least`. @param sums 512 of them. @param layers those that may hold sums other
   /// than 0. @param[in,out] found adds their voxels, as LayerBits.

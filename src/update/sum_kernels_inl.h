@@ -53,11 +53,10 @@ inline void limitSums(float threshold, float most, float* sums, std::uint64_t* r
   for (int layer = 0; layer < kBlockEdge; ++layer, sums += kLayer) {
     std::uint64_t bits = 0;
     for (int v = 0; v < kLayer; v += kLanes) {
-      const FloatVec excess = LoadU(sums + v) - threshold;
+      const FloatVec sum = LoadU(sums + v), excess = sum - threshold;
       const FloatVec positive = IfThenElse(excess < 0.0f, FloatVec{}, excess);
-      const FloatVec kept = IfThenElse(positive > most, Set(most), positive);
-      StoreU(kept, sums + v);
-      bits |= BitsFromMask(kept >= most) << v;
+      StoreU(IfThenElse(positive > most, Set(most), positive), sums + v);
+      bits |= BitsFromMask(sum >= most) << v;
     }
     reached[layer] |= bits;
   }

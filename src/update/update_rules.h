@@ -32,8 +32,8 @@ struct UpdateRules {
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected);
 
-/// Applies the rules to the free space of one block. @return the voxels whose evidence reaches most_free, if
-/// voids are sought.
+/// Applies the rules to the free space of one block. @return the voxels whose evidence reaches most_free,
+/// whether or not it exceeds the threshold, if voids are sought.
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
                       BlockSums& free);
 

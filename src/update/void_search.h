@@ -13,7 +13,7 @@ namespace bki_mapping {
 
 /// What a scan says of the voxels of one block.
 struct SeenVoxels {
-  VoxelMask crossed;  ///< evidence for `free` reaches the limit, and no hit adds evidence
+  VoxelMask crossed;  ///< evidence for `free` reaches its limit, and no hit adds evidence
   VoxelMask fixed;    ///< hits add evidence, all of them of classes that cannot move
   VoxelMask moving;   ///< other hits add evidence
 };

@@ -253,6 +253,9 @@ TEST_P(EveryScene, VoidsEqualBruteForce) {
     config.scan_limit.free = mode == "line" ? 1e-3 : 1e-4;
     config.scan_limit.void_space = 0.5;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, " + mode);
+    config.scan_limit.free_threshold = 5.0 * config.scan_limit.free;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, " + mode);
+    config.scan_limit.free_threshold = 0.0;
     config.free_space.evidence_before_misses = true;
     config.free_space.extent = FreeSpaceExtent::kMapped;
     if (scene_.name != "near the sensor") {
@@ -297,7 +300,11 @@ TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
   config.scan_limit.free = 1e-3;
   config.scan_limit.void_space = 0.5;
   expectEqualsBruteForce(scan, config, "voids among dense beams");
-  EXPECT_GT(countVoids(scan, config), 0u);
+  const std::size_t voids = countVoids(scan, config);
+  EXPECT_GT(voids, 0u);
+  config.scan_limit.free_threshold = 1e3;  // above all that beams add
+  expectEqualsBruteForce(scan, config, "voids among dense beams, threshold");
+  EXPECT_EQ(countVoids(scan, config), voids);
   config.scan_limit.free = 0.0;  // nothing says what counts as seen empty
   EXPECT_EQ(countVoids(scan, config), 0u);
 }

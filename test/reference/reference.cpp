@@ -249,8 +249,7 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
     (c.dynamic || c.unlabelled ? may_move : fixed) |= hits.sum > 0.0;
   }
   const Value free = unlimited(voxel, kFreeClass);
-  const double above = free.sum - config_.scan_limit.free_threshold - config_.scan_limit.free,
-               tolerance = free.tolerance(scale);
+  const double above = free.sum - config_.scan_limit.free, tolerance = free.tolerance(scale);
   Seen result = {Answer::kNo, Answer::kNo, Answer::kNo};
   const bool is_free = above > tolerance;
   if (close || (!fixed && !may_move && std::abs(above) <= tolerance)) {

@@ -123,7 +123,7 @@ TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
       if (kept > most) kept = most;
       limited.push_back(kept);
       const std::uint64_t bit = std::uint64_t{1} << v % kLayer;
-      if (kept >= most) reached[v / kLayer] |= bit;
+      if (sum >= most) reached[v / kLayer] |= bit;
       if (v / kLayer >= first && v / kLayer < last && sum >= least) found[v / kLayer] |= bit;
     }
     for (const std::string& set : instructionSets()) {
