@@ -123,7 +123,7 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     worker.seen.reserve(kGroupBlocks);
     worker.voids = {};
   }
-  if (rules.seeksVoids()) voids_.start(jobs_.size());
+  if (rules.seeksVoids()) voids_.start(jobs_.size(), groups_.size());
 }
 
 void MapUpdater::useCopies(SemanticMap& map) noexcept {
@@ -235,7 +235,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
     pool.forEach(groups_.size(), add);
   }
   if (seeks_voids_) {
-    voids_.find(touched_, pool);
+    voids_.find(touched_, group_jobs_, pool);
     pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
       addVoids(groups_[g], unitsOf(static_cast<double>(rules.void_evidence)), scan.withdraws, worker);
       finishGroup(groups_[g], scan.withdraws);

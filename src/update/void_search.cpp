@@ -30,21 +30,41 @@ LayerBits between(std::size_t axis, const LayerBits& previous, const LayerBits& 
   return found;
 }
 
-GridIndex neighbour(GridIndex block, std::size_t axis, int step) {
-  (axis == 0 ? block.x : axis == 1 ? block.y : block.z) += step;
-  return block;
+/// From slot to slot of a group along each axis.
+constexpr int kStride[3] = {1, kGroupEdge, kGroupEdge* kGroupEdge};
+
+GridIndex neighbour(GridIndex group, std::size_t axis, int step) {
+  (axis == 0 ? group.x : axis == 1 ? group.y : group.z) += step;
+  return group;
 }
 
 }  // namespace
 
-VoidSearch::Beside VoidSearch::besideOf(const IndexNumbering& blocks, std::size_t b) {
-  Beside beside;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const int step : {-1, 1}) {
-      beside[axis][step > 0] = blocks.find(neighbour(blocks.members()[b], axis, step));
+void VoidSearch::findBlocksBeside(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group,
+                                  ThreadPool& pool) {
+  const auto slotOf = [&](std::uint32_t b) { return slotInGroup({blocks.members()[b]}); };
+  pool.forEach(positions_.size(), [&](std::size_t g, std::size_t) {
+    positions_[g].fill(kNoPosition);
+    for (const std::uint32_t* b = by_group.begin(g); b != by_group.end(g); ++b) {
+      positions_[g][static_cast<std::size_t>(slotOf(*b))] = *b;
     }
-  }
-  return beside;
+  });
+  pool.forEach(positions_.size(), [&](std::size_t g, std::size_t) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const int step : {-1, 1}) {
+        const std::uint32_t next =
+            by_group.indices().find(neighbour(by_group.indices().members()[g], axis, step));
+        for (const std::uint32_t* b = by_group.begin(g); b != by_group.end(g); ++b) {
+          const int slot = slotOf(*b), at = slot / kStride[axis] % kGroupEdge + step;
+          const bool same = at >= 0 && at < kGroupEdge;
+          const int there = slot + (same ? step : -step * (kGroupEdge - 1)) * kStride[axis];
+          const std::size_t group = same ? g : next;
+          beside_[*b][axis][step > 0] =
+              group == kNoPosition ? kNoPosition : positions_[group][static_cast<std::size_t>(there)];
+        }
+      }
+    }
+  });
 }
 
 template <typename MaskOfBlock>
@@ -56,7 +76,9 @@ VoxelMask VoidSearch::betweenIn(std::size_t b, std::size_t axis, const MaskOfBlo
   return maskOf(between(axis, bits(previous), bitsOf(maskOfBlock(b)), bits(next)));
 }
 
-void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
+void VoidSearch::find(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group,
+                      ThreadPool& pool) {
+  findBlocksBeside(blocks, by_group, pool);
   const Chunks chunks(seen_.size());
   const auto forEachBlock = [&](const auto& job) {
     pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
@@ -66,8 +88,6 @@ void VoidSearch::find(const IndexNumbering& blocks, ThreadPool& pool) {
   forEachBlock([&](std::size_t b) {
     const SeenVoxels& seen = seen_[b];
     empty_[b] = seen.crossed;
-    if ((seen.crossed | seen.fixed).none()) return;
-    beside_[b] = besideOf(blocks, b);
     if (seen.crossed.none()) return;
     empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
                  ~(seen.fixed | seen.moving);

@@ -38,7 +38,11 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         const auto coordinate = [&] { return static_cast<std::int32_t>(random() % 4) - 2; };
         blocks.insert({coordinate(), coordinate(), coordinate()});
       }
-      search.start(blocks.size());
+      RunsByIndex<std::uint32_t> by_group;  // the blocks lie in up to eight groups
+      by_group.clear();
+      for (std::uint32_t b = 0; b < blocks.size(); ++b) by_group.add(groupOf({blocks.members()[b]}), b);
+      by_group.sort();
+      search.start(blocks.size(), by_group.indices().size());
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         if (b % 7 == 3) continue;  // neither crossed nor hit
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
@@ -48,7 +52,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         }
       }
       ThreadPool pool(static_cast<int>(threads));
-      search.find(blocks, pool);
+      search.find(blocks, by_group, pool);
       std::size_t count = 0, bridged = 0;
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         for (int v = 0; v < kBlockVoxels; ++v) {
