@@ -23,7 +23,7 @@ class Path(unittest.TestCase):
             for command in block.strip().splitlines():
                 command = re.sub(r'build(-examples|/devel/lib/bki_mapping)/', BIN + '/', command)
                 command = command.replace('examples/', f'{SOURCE}/examples/').replace('config/', f'{SOURCE}/config/')
-                command = re.sub(r'^python3 ', f'{sys.executable} ', command).replace('--scans 60', '--scans 60 --columns 600')
+                command = re.sub(r'^python3 ', f'{sys.executable} ', command).replace('--scans 60', '--scans 60 --columns 900')
                 done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, timeout=200, check=False)
                 self.assertEqual(done.returncode, 0, f'{command}: {done.stderr}')
             path = np.genfromtxt(os.path.join(folder, 'path.csv'), delimiter=',', names=True)
