@@ -22,7 +22,7 @@ STEPS = {
     '+ scan_limit/void 24': {'scan_limit/void': 24, 'kernel/scale': 20, 'free_gain/static': 0.0005},
     '+ free_gain/remaining 0.1': {'free_gain/remaining': 0.1},
     '+ scan_limit/free_threshold 0.6': {'scan_limit/free_threshold': 0.6},
-    '+ free_gain/neighbourhood 2.25': {'free_gain/neighbourhood': 2.25},
+    '+ free_gain/neighbourhood 1.75': {'free_gain/neighbourhood': 1.75},
 }
 
 
