@@ -63,7 +63,7 @@ void binning(benchmark::State& state) {
 
 void hits(benchmark::State& state, const std::string& instruction_set) {
   Fixture& f = fixture();
-  PointEvidence evidence(f.geometry, f.config.kernel, false, instruction_set);
+  PointEvidence evidence(f.geometry, f.config.kernel, false, {}, instruction_set);
   evidence.setPoints(f.scan.origin, f.preprocessor.hitGroups(), f.pool);
   SemanticMap map(f.geometry, f.config.prior, f.classes->size());
   MapUpdater updater;

@@ -23,6 +23,11 @@ inline std::vector<NamedParameter<KernelConfig>> kernelParameters() {
           "Value sigma0 of the sparse kernel at distance 0: the evidence that a hit adds at its own "
           "position. Only its ratio to prior and to scan_limit matters. Keep it far from both ends of the "
           "range of evidence, 1.5e-5 to 32768."),
+      truthParameter(
+          "static_spread", &C::static_spread, Changes::kWhileMapping,
+          "Let hits of classes that cannot move (those neither dynamic nor unlabelled) add evidence to all "
+          "voxels within kernel/length, as other hits do. Set false to let each add evidence only to the "
+          "voxel that contains it, so that floors and walls look no thicker than they are."),
   };
 }
 

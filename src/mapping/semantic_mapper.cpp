@@ -144,9 +144,10 @@ struct SemanticMapper::Pipeline {
   Occlusion occlusion;
   MapUpdater updater;
 
-  Pipeline(const MapperConfig& config, const GridGeometry& geometry)
+  Pipeline(const MapperConfig& config, const GridGeometry& geometry, const ClassTable& classes)
       : preprocessor(config),
-        hits(geometry, config.kernel, config.free_space.hits_before_misses),
+        hits(geometry, config.kernel, config.free_space.hits_before_misses,
+             config.kernel.static_spread ? ClassSet() : fixedClasses(classes)),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
@@ -158,7 +159,7 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
       classes_(std::move(classes)),
       map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
       pool_(std::make_unique<ThreadPool>(config_.threads)),
-      pipeline_(std::make_unique<Pipeline>(config_, map_.geometry())) {
+      pipeline_(std::make_unique<Pipeline>(config_, map_.geometry(), *classes_)) {
   setGains();
 }
 
@@ -183,7 +184,7 @@ void SemanticMapper::setGains() {
 void SemanticMapper::reconfigure(const MapperConfig& config) {
   const MapperConfig allowed = checked(config, *classes_);
   checkChanges(config_, allowed);
-  pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry());
+  pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry(), *classes_);
   config_ = allowed;
   setGains();
 }
@@ -247,7 +248,7 @@ std::vector<GridIndex> SemanticMapper::clearBox(const Eigen::AlignedBox3d& box) 
 }
 
 SemanticMapper::Pipeline& SemanticMapper::pipeline() {
-  if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry());
+  if (!pipeline_) pipeline_ = std::make_unique<Pipeline>(config_, map_.geometry(), *classes_);
   return *pipeline_;
 }
 

@@ -52,8 +52,9 @@ template <bool kWeighted, typename Scratch, typename Group>
 
 }  // namespace
 
-PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels)
-    : geometry_(geometry), kernel_(kernel), kernels_(kernels) {
+PointBins::PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels,
+                     const ClassSet& confined)
+    : geometry_(geometry), kernel_(kernel), kernels_(kernels), confined_(confined) {
   static_assert(kBlockEdge * (AxisBlocks::kMost - 2) >= 2.0 * VoxelKernel::kMaxReach);
 }
 
@@ -66,7 +67,9 @@ void PointBins::binToNeighbours(std::size_t count, Scratch& scratch, Group& grou
       scratch.containing = containing;
       scratch.neighbours.fill(kNoPosition);
     }
-    for (auto left = static_cast<std::uint32_t>(scratch.positions.reached[i]); left != 0; left &= left - 1) {
+    auto left = static_cast<std::uint32_t>(scratch.positions.reached[i]);
+    if (confined_[scratch.labels[i]]) left = 1u << kContaining;
+    for (; left != 0; left &= left - 1) {
       const auto bit = static_cast<std::size_t>(__builtin_ctz(left));
       const Neighbour& offset = kNeighbours[bit];
       std::uint32_t& block = scratch.neighbours[bit];
@@ -92,6 +95,11 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
   // A long kernel may reach hundreds of blocks.
   const std::size_t needed = scratch.size + AxisBlocks::kMost * AxisBlocks::kMost * AxisBlocks::kMost + 1;
   reserve(needed, scratch);
+  const auto appendToContaining = [&] {
+    append<kWeighted>(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels,
+                      scratch.positions.cell[i], scratch, group);
+  };
+  if (confined_[scratch.labels[i]]) return appendToContaining();
   bool reaches_containing = false;
   for (const AxisBlock& bz : zs) {
     for (const AxisBlock& by : ys) {
@@ -109,10 +117,7 @@ void PointBins::binToAll(std::size_t i, Scratch& scratch, Group& group) const {
     }
   }
   // A kernel shorter than half a voxel's diagonal may reach no centre.
-  if (keep_containing_ && !reaches_containing) {
-    append<kWeighted>(group.blocks.insert(containing), i, kNeighbours[kContaining].voxels,
-                      scratch.positions.cell[i], scratch, group);
-  }
+  if (keep_containing_ && !reaches_containing) appendToContaining();
 }
 
 void PointBins::reserve(std::size_t points, Scratch& scratch) const {

@@ -12,14 +12,17 @@
 #include "points/local_point.h"
 #include "points/merged_points.h"
 #include "points/point_kernels.h"
+#include "update/evidence.h"
 
 namespace bki_mapping {
 
 /// Points sorted by block. A point is stored in every block that has a voxel centre within the kernel's
-/// reach; with the counting kernel, in its containing block. Keeps its memory from scan to scan.
+/// reach; with the counting kernel, and points of confined classes, in its containing block. Keeps its memory
+/// from scan to scan.
 class PointBins {
  public:
-  PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels);
+  PointBins(const GridGeometry& geometry, const VoxelKernel& kernel, const PointKernels& kernels,
+            const ClassSet& confined = {});
 
   /// Replaces the points. @param points relative to the origin. @param origin in the map frame [m].
   /// @param keep_containing whether to store a point in its containing block even if it reaches no voxel
@@ -28,7 +31,8 @@ class PointBins {
   void setPoints(const Eigen::Vector3d& origin, const PointGroups& points, bool keep_containing,
                  ThreadPool& pool);
 
-  /// Exactly the blocks that points reach and, with `keep_containing`, those that contain points.
+  /// Exactly the blocks that points reach and, with `keep_containing`, those that contain points; of points
+  /// of confined classes, those that contain them.
   const IndexNumbering& blocks() const { return blocks_.indices(); }
 
   /// The points of a block, given its position in blocks(), as runs whose order does not depend on the number
@@ -81,6 +85,7 @@ class PointBins {
   GridGeometry geometry_;
   VoxelKernel kernel_;
   const PointKernels& kernels_;
+  ClassSet confined_;
   bool keep_containing_ = false, one_class_ = false, weighted_ = false;
   std::vector<Scratch> scratch_;  ///< one for each worker
   std::vector<Group> groups_;

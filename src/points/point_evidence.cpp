@@ -15,10 +15,11 @@ constexpr std::size_t kAhead = 2;
 }  // namespace
 
 PointEvidence::PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels,
-                             const std::string& instruction_set)
+                             const ClassSet& confined, const std::string& instruction_set)
     : kernel_(kernel, geometry.resolution()),
       kernels_(pointKernelsFor(instruction_set)),
-      bins_(geometry, kernel_, kernels_),
+      confined_(confined),
+      bins_(geometry, kernel_, kernels_, confined),
       reports_voxels_(reports_voxels) {}
 
 void PointEvidence::setPoints(const Eigen::Vector3d& origin, const PointGroups& points, ThreadPool& pool) {
@@ -67,7 +68,8 @@ void PointEvidence::reserve(std::size_t workers) {
 void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const {
   BlockSums::Plane& plane = sums.open(label);
   if (kernel_.type == KernelType::kSparse) {
-    plane.layers = kernels_.sum_points(runs, count, kernel_.reach, kernel_.scale, plane.values);
+    const auto sum = confined_[label] ? kernels_.sum_inside : kernels_.sum_points;
+    plane.layers = sum(runs, count, kernel_.reach, kernel_.scale, plane.values);
     return;
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);

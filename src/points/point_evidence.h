@@ -10,15 +10,17 @@
 namespace bki_mapping {
 
 /// Adds k(|x - c|), times the weight of the point, to the class of each point x at every voxel centre c
-/// within the support radius; with the counting kernel, the weight alone at the voxel that contains the
-/// point. Equations (3) and (4) of docs/method.md. Keeps its memory from scan to scan.
+/// within the support radius, or only at the voxel that contains the point, if the class is confined; with
+/// the counting kernel, the weight alone at that voxel. Equations (3) and (4) of docs/method.md. Keeps its
+/// memory from scan to scan.
 class PointEvidence : public Evidence {
  public:
   /// @param reports_voxels whether to report the voxels that contain a point (BlockSums::occupied).
+  /// @param confined classes whose points add evidence only to the voxels that contain them.
   /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
   /// @throws std::invalid_argument as VoxelKernel.
   PointEvidence(const GridGeometry& geometry, const KernelConfig& kernel, bool reports_voxels = false,
-                const std::string& instruction_set = "");
+                const ClassSet& confined = {}, const std::string& instruction_set = "");
 
   /// Replaces the points. @param points relative to the origin. @param origin in the map frame [m].
   /// @throws TooMuchWork as PointBins.
@@ -26,7 +28,7 @@ class PointEvidence : public Evidence {
   std::size_t size() const { return size_; }  ///< number of points
 
   /// Exactly the blocks that have a voxel centre within reach of a point and, if voxels are reported, those
-  /// that contain a point.
+  /// that contain a point; of points of confined classes, only those that contain them.
   const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
   void markClasses(std::size_t position, ClassSet& classes) const override;
@@ -53,6 +55,7 @@ class PointEvidence : public Evidence {
 
   VoxelKernel kernel_;
   const PointKernels& kernels_;
+  ClassSet confined_;
   PointBins bins_;
   bool reports_voxels_;
   std::size_t size_ = 0;

@@ -9,7 +9,8 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsGeneric() {
-  static const PointKernels kernels = {"generic", sumPoints, locatePoints, locateCells, reachBlocks};
+  static const PointKernels kernels = {"generic",    sumPoints,   sumPointsInside,
+                                       locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

@@ -269,11 +269,14 @@ void expectPointsEqualBruteForce(const reference::Scene& scene) {
   ThreadPool pool(2);
   const MergedPoints points = pointsOf(scene.scan);
   for (const std::string& set : instructionSets()) {
-    for (const double length : {0.2, 0.3, 0.5, 1.0}) {  // below, at and above a voxel
+    for (const auto& [length, spreads] :
+         {std::pair(0.2, true), {0.3, true}, {0.5, true}, {1.0, true}, {0.2, false}, {0.5, false}}) {
       MapperConfig config;
       config.downsample_resolution = 0.0;
-      config.kernel.length = length;
-      PointEvidence evidence(GridGeometry(config.resolution), config.kernel, false, set);
+      config.kernel.length = length;  // below, at and above a voxel
+      config.kernel.static_spread = spreads;
+      const ClassSet confined = spreads ? 0b0000 : 0b1110;
+      PointEvidence evidence(GridGeometry(config.resolution), config.kernel, false, confined, set);
       evidence.setPoints(scene.scan.origin, {&points}, pool);
       SemanticMap map(GridGeometry(config.resolution), config.prior, 4);
       MapUpdater().update(map, {&evidence}, pool);

@@ -197,6 +197,8 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.scan_limit.free = 0.1;
       config.scan_limit.void_space = 2.0;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
+      config.kernel.static_spread = false;
+      failEverywhere(config, fewPoints(0), fewPoints(2), on);
     }
   }
 }

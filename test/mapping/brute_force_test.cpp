@@ -234,6 +234,26 @@ TEST_P(EveryScene, TheThresholdOfFreeSpaceEqualsBruteForce) {
   }
 }
 
+TEST_P(EveryScene, HitsThatStayInTheirVoxelsEqualBruteForce) {
+  for (const double length : {0.3, 0.2, 0.7}) {
+    MapperConfig config = withMode("line");
+    config.kernel.static_spread = false;
+    config.kernel.length = length;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", static hits stay");
+    expectEqualsBruteForce(withSoftLabels(scene_.scan), config, scene_.name + ", soft, static hits stay");
+    config.free_space.hits_before_misses = true;
+    config.free_space.evidence_before_misses = true;
+    config.scan_limit.hits = 0.05;
+    config.scan_limit.free = 1e-3;
+    config.scan_limit.void_space = 0.5;
+    if (scene_.name == "near the sensor") continue;  // nothing is left to clear there
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", static hits stay, rules");
+    config.free_space.extent = FreeSpaceExtent::kMapped;
+    expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
+                           scene_.name + ", soft, static hits stay, rules, mapped");
+  }
+}
+
 /// The number of voxels that a scan alone sees empty with all their neighbours.
 std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
   SemanticMapper mapper(config, reference::smallTable());

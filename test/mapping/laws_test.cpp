@@ -110,6 +110,8 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     config.scan_limit.void_space = 0.2;
     config.free_gain.persistence = 3.0;
     configs.emplace_back(mode + ", with rules and limits", config);
+    config.kernel.static_spread = false;
+    configs.emplace_back(mode + ", with rules and hits that stay in their voxels", config);
   }
   return configs;
 }

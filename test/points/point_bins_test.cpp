@@ -70,9 +70,10 @@ KernelConfig kernelOf(double length) {
 class Bins {
  public:
   Bins(double length, bool keep_containing, const std::vector<Point>& points, std::size_t groups = 1,
-       bool weighted = false)
+       bool weighted = false, const ClassSet& confined = {})
       : groups_(dealt(points, groups, weighted)),
-        bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), pointKernelsFor("")) {
+        bins_(GridGeometry(kResolution), VoxelKernel(kernelOf(length), kResolution), pointKernelsFor(""),
+              confined) {
     PointGroups all;
     for (const MergedPoints& group : groups_) all.push_back(&group);
     for (int time = 0; time < 2; ++time) {  // the second time reuses the memory of the first
@@ -135,6 +136,31 @@ TEST(PointBins, KeepsPointsInTheirContainingBlocks) {
     }
   }
   EXPECT_EQ(found, points.size());
+}
+
+TEST(PointBins, KeepsPointsOfConfinedClassesInTheirContainingBlocksOnly) {
+  const std::vector<Point> points = randomPoints(300);
+  const ClassId confined = points[0].label;
+  for (const double length : {0.05, 0.3, 3.1}) {
+    std::multiset<GridIndex> expected;
+    for (const Point& p : points) {
+      if (p.label == confined) {
+        const VoxelIndex voxel = GridGeometry(kResolution).voxelAt(kOrigin + p.at.cast<double>());
+        expected.insert(GridGeometry::blockOf(voxel));
+        continue;
+      }
+      for (const GridIndex& block : blocksReached(kOrigin + p.at.cast<double>(), length))
+        expected.insert(block);
+    }
+    const Bins made(length, false, points, 7, false, ClassSet().set(confined));
+    std::multiset<GridIndex> found;
+    for (std::size_t b = 0; b < made.bins().blocks().size(); ++b) {
+      for (const PointRun* run = made.bins().begin(b); run != made.bins().end(b); ++run) {
+        for (std::size_t i = 0; i < run->count; ++i) found.insert(made.bins().blocks().members()[b]);
+      }
+    }
+    EXPECT_EQ(found, expected) << "length " << length;
+  }
 }
 
 TEST(PointBins, KeepsEachWeightWithItsPoint) {

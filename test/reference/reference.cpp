@@ -91,10 +91,7 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
     cut.push_back({direction.cast<double>().normalized() * max_range, 255});
   }
   hits_ = downsample(origin_, raw, config.downsample_resolution);
-  for (const Point& hit : hits_) {
-    beams_.push_back(hit.p);
-    any_hits_.push_back({hit.p, 0});
-  }
+  for (const Point& hit : hits_) beams_.push_back(hit.p);
   for (const Point& end : downsample(origin_, cut, config.downsample_resolution)) beams_.push_back(end.p);
   drawSamples(scan.stamp);
 }
@@ -143,8 +140,33 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
   return value;
 }
 
+bool ScanReference::spreads(const SemanticClass& c) const {
+  if (config_.kernel.type == KernelType::kCounting) return false;
+  return config_.kernel.static_spread || c.dynamic || c.unlabelled;
+}
+
+Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {
+  if (spreads(c) || config_.kernel.type == KernelType::kCounting) return pointEvidence(hits_, voxel, c.id);
+  std::vector<Point> inside, close;
+  for (const Point& hit : hits_) {
+    const Eigen::Vector3d offset = (hit.p - relativeCentre(voxel)) / config_.resolution;
+    const double outside = offset.cwiseAbs().maxCoeff() - 0.5;
+    if (outside < -kClose) inside.push_back(hit);
+    if (std::abs(outside) <= kClose) close.push_back(hit);
+  }
+  Value value = pointEvidence(inside, voxel, c.id);
+  value.slack += pointEvidence(close, voxel, c.id).sum;
+  return value;
+}
+
 Value ScanReference::anyHit(const VoxelIndex& voxel) const {
-  return pointEvidence(any_hits_, voxel, 0);
+  Value all;
+  for (const SemanticClass& c : classes_) {
+    const Value hits = hitEvidence(voxel, c);
+    all.sum += hits.sum;
+    all.slack += hits.slack;
+  }
+  return all;
 }
 
 bool ScanReference::reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho,
@@ -178,11 +200,13 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
     const Eigen::Vector3d centre = relativeCentre(GridGeometry::voxelOf(block, offset));
     for (const Point& point : hits_) {
       const Eigen::Vector3d d = point.p - centre;
-      hit = config_.kernel.type == KernelType::kSparse
-                ? d.norm() < config_.kernel.lengthFor(config_.resolution)
-                : d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      const bool inside = d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      for (const SemanticClass& c : classes_) {
+        if (point.shareOf(c.id) == 0.0) continue;
+        hit |= spreads(c) ? d.norm() < config_.kernel.lengthFor(config_.resolution) : inside;
+      }
       // With hits_before_misses a block holds a hit even if the hit's kernel reaches no voxel centre.
-      hit |= config_.free_space.hits_before_misses && d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      hit |= config_.free_space.hits_before_misses && inside;
       if (hit) break;
     }
   }
@@ -218,11 +242,14 @@ Value ScanReference::lineEvidence(const VoxelIndex& voxel) const {
 }
 
 Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
-  if (label != kFreeClass) return pointEvidence(hits_, voxel, label);
+  if (label != kFreeClass) {
+    const auto is_asked = [&](const SemanticClass& c) { return c.id == label; };
+    return hitEvidence(voxel, *std::find_if(classes_.begin(), classes_.end(), is_asked));
+  }
   Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
   if (config_.free_space.evidence_before_misses) {
     const Value hits = anyHit(voxel);
-    if (hits.slack > 0.0 || (hits.sum > 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
+    if (hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
       value.slack += value.sum;
     if (hits.sum >= 1e-6 * config_.kernel.scale) return Value();
   }
@@ -243,9 +270,9 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
   const double scale = config_.kernel.type == KernelType::kSparse ? config_.kernel.scale : 1.0;
   bool fixed = false, may_move = false, close = false;
   for (const SemanticClass& c : classes_) {
-    const Value hits = pointEvidence(hits_, voxel, c.id);
+    const Value hits = hitEvidence(voxel, c);
     // At the edge of the kernel, single precision may round to 0.
-    close |= hits.slack > 0.0 || (hits.sum > 0.0 && hits.sum < 1e-6 * scale);
+    close |= hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * scale);
     (c.dynamic || c.unlabelled ? may_move : fixed) |= hits.sum > 0.0;
   }
   const Value free = unlimited(voxel, kFreeClass);
@@ -307,8 +334,9 @@ Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
     return value;
   }
   if (limit.hits == 0.0) return value;
-  const double all = anyHit(voxel).sum;
-  if (all > limit.hits) value.sum *= limit.hits / all;
+  const Value all = anyHit(voxel);
+  if (all.slack > 0.0) value.slack += value.sum;
+  if (all.sum > limit.hits) value.sum *= limit.hits / all.sum;
   return value;
 }
 

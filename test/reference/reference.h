@@ -77,6 +77,10 @@ class ScanReference {
   Answer isVoid(const VoxelIndex& voxel) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
+  /// Whether hits of a class add evidence to voxels that do not contain them.
+  bool spreads(const SemanticClass& c) const;
+  /// Evidence of the hits of one class.
+  Value hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const;
   /// The evidence of all hits, whatever their class.
   Value anyHit(const VoxelIndex& voxel) const;
   Value lineEvidence(const VoxelIndex& voxel) const;
@@ -89,7 +93,6 @@ class ScanReference {
   GridGeometry geometry_;
   Eigen::Vector3d origin_;
   std::vector<Point> hits_, samples_;
-  std::vector<Point> any_hits_;  ///< the hits, all of class 0
   std::vector<Eigen::Vector3d> beams_;
   std::vector<SemanticClass> classes_;
   mutable std::map<std::tuple<int, int, int>, bool> hit_blocks_;

@@ -74,8 +74,8 @@ void setAllowed(Config& config, Dice& dice) {
   if (sometimes())
     set(config, "free_space_weight", dice.oneOf<std::string>(Words{"uniform", "linear", "bilinear"}));
   if (sometimes()) set(config, "free_space_extent", dice.oneOf<std::string>(Words{"mapped", "observed"}));
-  for (const char* name :
-       {"free_space_hits_before_misses", "free_space_evidence_before_misses", "clear_beyond_max_range"}) {
+  for (const char* name : {"kernel_static_spread", "free_space_hits_before_misses",
+                           "free_space_evidence_before_misses", "clear_beyond_max_range"}) {
     if (sometimes()) set(config, name, dice.oneIn(2));
   }
   for (const char* name : {"free_gain_dynamic", "free_gain_static"}) {

@@ -17,6 +17,7 @@ inline const std::vector<Settings>& allSettings() {
   static const std::vector<Settings> all = {
       {"robot",
        {{"kernel/scale", "100"},
+        {"kernel/static_spread", "false"},
         {"free_space/hits_before_misses", "true"},
         {"free_space/evidence_before_misses", "true"},
         {"scan_limit/hits", "0.2"},
