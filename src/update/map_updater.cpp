@@ -121,7 +121,12 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     worker.slots.reserve(kGroupBlocks);
     worker.targets.reserve(kGroupBlocks);
     worker.seen.reserve(kGroupBlocks);
-    worker.voids = {};
+    worker.seams.reserve(kGroupBlocks);
+    worker.later = {};
+  }
+  if (rules.asksBelow()) {
+    seams_.resize(jobs_.size());
+    for (BlockSeam& seam : seams_) seam.crossed_top = seam.held_back = 0;
   }
   if (rules.seeksVoids()) voids_.start(jobs_.size(), groups_.size());
 }
@@ -147,6 +152,7 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
   to.slots.clear();
   to.targets.clear();
   to.seen.clear();
+  to.seams.clear();
   for (const std::uint32_t* job = group_jobs_.begin(group.position); job != group_jobs_.end(group.position);
        ++job) {
     const std::uint32_t touched = task.positionOf(*job);
@@ -157,6 +163,7 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
     to.slots.push_back(slot);
     to.targets.push_back(jobs_[*job].block);
     if (seeks_voids_) to.seen.push_back(&voids_.at(*job));
+    if (asks_below_) to.seams.push_back(&seams_[*job]);
   }
   return selected;
 }
@@ -169,7 +176,7 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
     const BlockGroup selected = selectBlocks(task, group, own);
     if (own.blocks.empty()) continue;
     if (task.evidence) {
-      own.sink.startEvidence(task.kind, own.slots, own.targets, own.seen);
+      own.sink.startEvidence(task.kind, own.slots, own.targets, own.seen, own.seams);
       task.evidence->accumulate(selected, own.blocks, worker, own.sink);
     } else {
       for (std::size_t b = 0; b < own.blocks.size(); ++b)
@@ -178,8 +185,24 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   }
 }
 
+void MapUpdater::addAcrossSeams(const Group& group, bool withdraws, std::size_t worker) {
+  const auto add = withdraws ? withdrawFromSome : addToSome;
+  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
+       ++j) {
+    const BlockSeam& seam = seams_[*j];
+    if (seam.held_back == 0) continue;
+    const BlockIndex& index = jobs_[*j].index;
+    const std::uint32_t below = touched_.find({index.x, index.y, index.z - 1});
+    const std::uint64_t voxels = below == kNoPosition ? 0 : seam.held_back & seams_[below].crossed_top;
+    if (voxels == 0) continue;
+    jobs_[*j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
+      return add(voxels, seam.units, plane, workers_[worker].later);
+    });
+  }
+}
+
 void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker) {
-  SumCounts& counts = workers_[worker].voids;
+  SumCounts& counts = workers_[worker].later;
   const auto add = withdraws ? withdrawFromVoxels : addToVoxels;
   const std::uint32_t* const end = group_jobs_.end(group.position);
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
@@ -211,6 +234,8 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
   const std::ptrdiff_t index_before = indexBytes();
   seeks_voids_ = rules.seeksVoids();
+  asks_below_ = rules.asksBelow();
+  const bool adds_later = seeks_voids_ || asks_below_;
   try {
     setTasks(scan);
     collectJobs(map, limits, pool);
@@ -227,17 +252,19 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   useCopies(map);
   const auto add = [&](std::size_t g, std::size_t worker) {
     addGroup(groups_[g], worker);
-    if (!seeks_voids_) finishGroup(groups_[g], scan.withdraws);
+    if (!adds_later) finishGroup(groups_[g], scan.withdraws);
   };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add);
   } else {
     pool.forEach(groups_.size(), add);
   }
-  if (seeks_voids_) {
-    voids_.find(touched_, group_jobs_, pool);
+  if (seeks_voids_) voids_.find(touched_, group_jobs_, pool);
+  if (adds_later) {
+    const EvidenceUnits of_void = unitsOf(static_cast<double>(rules.void_evidence));
     pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
-      addVoids(groups_[g], unitsOf(static_cast<double>(rules.void_evidence)), scan.withdraws, worker);
+      if (asks_below_) addAcrossSeams(groups_[g], scan.withdraws, worker);
+      if (seeks_voids_) addVoids(groups_[g], of_void, scan.withdraws, worker);
       finishGroup(groups_[g], scan.withdraws);
     });
   }
@@ -245,7 +272,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
-  for (Worker& worker : workers_) stats.sums += worker.voids += worker.sink.counts();
+  for (Worker& worker : workers_) stats.sums += worker.later += worker.sink.counts();
   stats.update_ms = watch.lap();
   return stats;
 }

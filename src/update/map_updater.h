@@ -90,7 +90,8 @@ class MapUpdater {
     std::vector<int> slots;
     std::vector<Block*> targets;
     std::vector<SeenVoxels*> seen;
-    SumCounts voids;  ///< of addVoids
+    std::vector<BlockSeam*> seams;
+    SumCounts later;  ///< of addAcrossSeams and addVoids
   };
 
   void setTasks(const ScanEvidence& scan);
@@ -110,6 +111,8 @@ class MapUpdater {
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
+  /// Adds to the bottom layers of a group what the threshold has taken above crossed voxels, or withdraws it.
+  void addAcrossSeams(const Group& group, bool withdraws, std::size_t worker);
   /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
   void addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker);
   /// Counts the memory of a group. @param withdraws whether that of planes that are gone is returned.
@@ -124,8 +127,10 @@ class MapUpdater {
   std::vector<Task> tasks_;                ///< in the order of execution
   std::size_t task_count_ = 0;             ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
-  bool seeks_voids_ = false;  ///< in this scan
+  // Of this scan:
+  bool seeks_voids_ = false, asks_below_ = false;
   VoidSearch voids_;
+  std::vector<BlockSeam> seams_;  ///< of the jobs
 };
 
 }  // namespace bki_mapping

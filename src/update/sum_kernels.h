@@ -33,7 +33,9 @@ struct SumKernels {
   /// @param[in,out] counts increased. @return whether any evidence in those layers is not 0.
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   bool (*withdraw)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
-  /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. What is not a number remains.
+  /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. The threshold does not apply
+  /// to voxels above others of the block whose sums were at least `most` before. What is not a number
+  /// remains.
   /// @param[in,out] sums 512 of them. @param[in,out] reached adds the voxels whose sums were at least `most`
   /// before, as LayerBits.
   void (*limit)(float threshold, float most, float* sums, std::uint64_t* reached);

@@ -50,10 +50,14 @@ bool addSums(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumC
 
 inline void limitSums(float threshold, float most, float* sums, std::uint64_t* reached) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
-  for (int layer = 0; layer < kBlockEdge; ++layer, sums += kLayer) {
+  sums += kBlockVoxels;
+  for (int layer = kBlockEdge - 1; layer >= 0; --layer) {  // downwards, so that the layer below is unchanged
+    sums -= kLayer;
     std::uint64_t bits = 0;
     for (int v = 0; v < kLayer; v += kLanes) {
-      const FloatVec sum = LoadU(sums + v), excess = sum - threshold;
+      const FloatVec sum = LoadU(sums + v);
+      FloatVec excess = sum - threshold;
+      if (layer > 0) excess = IfThenElse(LoadU(sums + v - kLayer) >= most, sum, excess);
       const FloatVec positive = IfThenElse(excess < 0.0f, FloatVec{}, excess);
       StoreU(IfThenElse(positive > most, Set(most), positive), sums + v);
       bits |= BitsFromMask(sum >= most) << v;

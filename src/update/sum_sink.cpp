@@ -15,11 +15,12 @@ void SumSink::startGroup() {
 }
 
 void SumSink::startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
-                            const std::vector<SeenVoxels*>& seen) {
+                            const std::vector<SeenVoxels*>& seen, const std::vector<BlockSeam*>& seams) {
   kind_ = kind;
   slots_ = &slots;
   targets_ = &targets;
   seen_ = &seen;
+  seams_ = &seams;
 }
 
 void SumSink::close() {
@@ -28,7 +29,8 @@ void SumSink::close() {
     applyToHits(rules_, *kernels_, sums_, protected_[slot]);
     if (rules_.seeksVoids()) noteHits(rules_, *kernels_, sums_, *(*seen_)[current_], hit_[slot]);
   } else {
-    const VoxelMask reached = applyToFree(rules_, *kernels_, protected_[slot], sums_);
+    BlockSeam* const seam = rules_.asksBelow() ? (*seams_)[current_] : nullptr;
+    const VoxelMask reached = applyToFree(rules_, *kernels_, protected_[slot], sums_, seam);
     if (rules_.seeksVoids()) (*seen_)[current_]->crossed = reached & ~hit_[slot];
   }
   const auto add = withdraws_ ? kernels_->withdraw : kernels_->add;

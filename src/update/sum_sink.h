@@ -22,10 +22,10 @@ class alignas(kThreadsApart) SumSink {
   void startGroup();
   enum class Kind { kHits, kFree };
   /// Call before each piece of evidence. @param slots of its blocks in the group. @param targets those blocks
-  /// in the same order. @param seen what the scan says of those blocks, to be noted if rules ask for it. All
-  /// must stay valid until the evidence is done.
+  /// in the same order. @param seen, seams what the scan says of those blocks, to be noted if rules ask for
+  /// it. All must stay valid until the evidence is done.
   void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
-                     const std::vector<SeenVoxels*>& seen);
+                     const std::vector<SeenVoxels*>& seen, const std::vector<BlockSeam*>& seams);
 
   /// For the evidence: returns the empty sums of its i-th block, to be filled.
   BlockSums& open(std::size_t i) {
@@ -49,6 +49,7 @@ class alignas(kThreadsApart) SumSink {
   const std::vector<int>* slots_ = nullptr;
   const std::vector<Block*>* targets_ = nullptr;
   const std::vector<SeenVoxels*>* seen_ = nullptr;
+  const std::vector<BlockSeam*>* seams_ = nullptr;
   std::size_t current_ = 0;
   BlockSums sums_;
   std::array<VoxelMask, kGroupBlocks> protected_;  ///< voxels that take no evidence for `free`, by slot

@@ -38,6 +38,22 @@ void clear(std::uint64_t voxels, float* values) {
   for (; voxels != 0; voxels &= voxels - 1) values[__builtin_ctzll(voxels)] = 0.0f;
 }
 
+/// Rounded as kernels round them.
+EvidenceUnits roundedUnits(float sum) {
+  constexpr float kMostSum = 0x1.fffffep14f;  // the last float whose units are EvidenceUnits
+  return unitsOf(static_cast<double>(std::min(sum, kMostSum)));
+}
+
+/// Notes what the threshold takes from the bottom layer of a block. @param before, after limits were applied.
+void holdBack(float most, const float* before, const float* after, BlockSeam& seam) {
+  for (int v = 0; v < kBlockEdge * kBlockEdge; ++v) {
+    const float all = std::min(before[v], most);
+    if (!(all > after[v])) continue;
+    seam.units[v] = roundedUnits(all) - roundedUnits(after[v]);
+    seam.held_back |= std::uint64_t{seam.units[v] > 0} << v;
+  }
+}
+
 }  // namespace
 
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
@@ -52,7 +68,7 @@ void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums&
 }
 
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
-                      BlockSums& free) {
+                      BlockSums& free, BlockSeam* seam) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
   const bool limits = rules.free_threshold > 0.0f || std::isfinite(rules.most_free) || rules.seeksVoids();
   const LayerBits cleared = bitsOf(is_protected);
@@ -61,8 +77,13 @@ VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const
     for (int layer = 0; layer < kBlockEdge; ++layer) {
       clear(cleared[static_cast<std::size_t>(layer)], plane.values + layer * kLayer);
     }
-    if (limits) kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
+    if (!limits) continue;
+    float bottom[kLayer];
+    if (rules.asksBelow()) std::copy_n(plane.values, kLayer, bottom);
+    kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
+    if (rules.asksBelow()) holdBack(rules.most_free, bottom, plane.values, *seam);
   }
+  if (rules.asksBelow()) seam->crossed_top = reached[kBlockEdge - 1];
   return maskOf(reached);
 }
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <bitset>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "update/block_sums.h"
@@ -17,14 +19,23 @@ struct UpdateRules {
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
   float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
   float most_free = std::numeric_limits<float>::infinity();
-  /// Of evidence for `free`, only what exceeds this counts, before most_free limits it. As a difference, it
-  /// leaves no jump that would turn an error of rounding into one of a whole sum.
+  /// Of evidence for `free`, only what exceeds this counts, before most_free limits it, unless that of the
+  /// voxel below reaches most_free.
   float free_threshold = 0.0f;
   float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
   std::bitset<256> fixed;      ///< the classes that cannot move, for VoidSearch
 
   bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
+  /// Whether the threshold depends on the voxel below.
+  bool asksBelow() const { return free_threshold > 0.0f && std::isfinite(most_free); }
   bool seeksVoids() const { return void_evidence > 0.0f; }
+};
+
+/// Evidence for `free` that a scan adds at the faces of a block, where the threshold asks the block below.
+struct BlockSeam {
+  std::uint64_t crossed_top = 0;  ///< voxels of the top layer whose evidence reaches most_free
+  std::uint64_t held_back = 0;    ///< voxels of the bottom layer from which the threshold has taken evidence
+  EvidenceUnits units[kBlockEdge * kBlockEdge];  ///< that evidence; set where held_back
 };
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
@@ -33,9 +44,10 @@ void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums&
                  VoxelMask& is_protected);
 
 /// Applies the rules to the free space of one block. @return the voxels whose evidence reaches most_free,
-/// whether or not it exceeds the threshold, if voids are sought.
+/// whether or not it exceeds the threshold, if voids are sought. @param[out] seam what the threshold needs
+/// from this block, and leaves open in it, if it asks the block below.
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
-                      BlockSums& free);
+                      BlockSums& free, BlockSeam* seam);
 
 /// Notes what the hits of one block say of its voxels. @param[out] hit voxels to which hits add evidence.
 void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,

@@ -40,6 +40,17 @@ bool changeVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* p
   return any != 0;
 }
 
+template <void (*kChange)(EvidenceUnits units, EvidenceUnits& sum, SumCounts& counts)>
+bool changeSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
+  EvidenceUnits any = 0;
+  for (; voxels != 0; voxels &= voxels - 1) {
+    const int v = __builtin_ctzll(voxels);
+    kChange(units[v], plane[v], counts);
+    any |= plane[v];
+  }
+  return any != 0;
+}
+
 }  // namespace
 
 bool addToVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane, SumCounts& counts) {
@@ -48,6 +59,13 @@ bool addToVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* pl
 bool withdrawFromVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane,
                         SumCounts& counts) {
   return changeVoxels<withdrawFrom>(voxels, units, plane, counts);
+}
+bool addToSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
+  return changeSome<addTo>(voxels, units, plane, counts);
+}
+bool withdrawFromSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
+                      SumCounts& counts) {
+  return changeSome<withdrawFrom>(voxels, units, plane, counts);
 }
 
 }  // namespace bki_mapping

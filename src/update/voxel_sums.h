@@ -1,4 +1,4 @@
-/// @file Changes the same evidence in many voxels of a plane.
+/// @file Changes evidence in chosen voxels of a plane.
 #pragma once
 
 #include "update/sum_kernels.h"
@@ -13,5 +13,10 @@ bool addToVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* pl
 /// The opposite, which saturates at -kMostUnits. Voxels that become negative count.
 bool withdrawFromVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* plane,
                         SumCounts& counts);
+
+/// The same for some of 64 voxels. @param units that of each of the 64.
+bool addToSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts);
+bool withdrawFromSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
+                      SumCounts& counts);
 
 }  // namespace bki_mapping

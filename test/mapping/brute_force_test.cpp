@@ -228,8 +228,10 @@ TEST_P(EveryScene, TheThresholdOfFreeSpaceEqualsBruteForce) {
       config.kernel.type = kernel;
       config.scan_limit.free_threshold = kernel == KernelType::kSparse ? 0.004 : 0.3;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold, " + mode);
-      config.scan_limit.free = 0.02;
-      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold and limit, " + mode);
+      for (const double most : {0.02, 0.0005}) {  // above and below the threshold of the sparse kernel
+        config.scan_limit.free = most;
+        expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold and limit, " + mode);
+      }
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "parallel/counter_random.h"
 
@@ -325,8 +326,15 @@ Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   Value value = unlimited(voxel, label);
   const ScanLimitConfig& limit = config_.scan_limit;
   if (label == kFreeClass) {
-    value.sum = std::max(value.sum - limit.free_threshold, 0.0);
-    if (limit.free > 0.0) value.sum = std::min(value.sum, limit.free);
+    const double most = limit.free > 0.0 ? limit.free : std::numeric_limits<double>::infinity();
+    const double all = std::min(value.sum, most);
+    value.sum = std::min(std::max(value.sum - limit.free_threshold, 0.0), most);
+    if (limit.free_threshold > 0.0 && limit.free > 0.0) {  // it does not apply above a crossed voxel
+      const Value below = unlimited({{voxel.x, voxel.y, voxel.z - 1}}, kFreeClass);
+      const double tolerance = below.tolerance(config_.kernel.scale);
+      if (std::abs(below.sum - limit.free) <= tolerance) value.slack += all - value.sum;
+      if (below.sum - limit.free > tolerance) value.sum = all;
+    }
     if (limit.void_space == 0.0 || limit.free == 0.0) return value;
     const Answer is_void = isVoid(voxel);
     if (is_void == Answer::kYes) value.sum += limit.void_space;

@@ -120,6 +120,7 @@ TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
     for (int v = 0; v < kBlockVoxels; ++v) {
       const float sum = sums[static_cast<std::size_t>(v)];
       float kept = sum - threshold < 0.0f ? 0.0f : sum - threshold;
+      if (v >= kLayer && sums[static_cast<std::size_t>(v - kLayer)] >= most) kept = sum;
       if (kept > most) kept = most;
       limited.push_back(kept);
       const std::uint64_t bit = std::uint64_t{1} << v % kLayer;

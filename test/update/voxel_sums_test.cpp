@@ -41,6 +41,19 @@ TEST(VoxelSums, EqualAPlainLoop) {
       }
       const auto change = withdraws ? withdrawFromVoxels : addToVoxels;
       EXPECT_EQ(change(voxels, units, plane.data(), counts), any);
+      // The same, layer by layer, with units for each voxel.
+      std::vector<EvidenceUnits> same = before;
+      const std::vector<EvidenceUnits> of_voxel(64, units);
+      const auto changeSome = withdraws ? withdrawFromSome : addToSome;
+      SumCounts of_layers;
+      bool any_of_layers = false;
+      for (std::size_t z = 0; z < kBlockEdge; ++z) {
+        any_of_layers |= changeSome(voxels[z], of_voxel.data(), same.data() + 64 * z, of_layers);
+      }
+      EXPECT_EQ(same, expected);
+      EXPECT_EQ(any_of_layers, any);
+      EXPECT_EQ(of_layers.saturated, of_loop.saturated);
+      EXPECT_EQ(of_layers.negative, of_loop.negative);
       ASSERT_EQ(plane, expected);
       ASSERT_EQ(counts.saturated, of_loop.saturated);
       ASSERT_EQ(counts.negative, of_loop.negative);
