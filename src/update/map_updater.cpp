@@ -185,7 +185,8 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   }
 }
 
-void MapUpdater::addAcrossSeams(const Group& group, bool withdraws, std::size_t worker) {
+void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws,
+                                std::size_t worker) {
   const auto add = withdraws ? withdrawFromSome : addToSome;
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
        ++j) {
@@ -195,9 +196,13 @@ void MapUpdater::addAcrossSeams(const Group& group, bool withdraws, std::size_t 
     const std::uint32_t below = touched_.find({index.x, index.y, index.z - 1});
     const std::uint64_t voxels = below == kNoPosition ? 0 : seam.held_back & seams_[below].crossed_top;
     if (voxels == 0) continue;
-    jobs_[*j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
-      return add(voxels, seam.units, plane, workers_[worker].later);
-    });
+    EvidenceUnits units[kBlockEdge * kBlockEdge];
+    for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
+      const int v = __builtin_ctzll(left);
+      units[v] = heldBack(rules, seam.sums[v]);
+    }
+    jobs_[*j].block->change(
+        kFreeClass, [&](EvidenceUnits* plane) { return add(voxels, units, plane, workers_[worker].later); });
   }
 }
 
@@ -263,7 +268,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   if (adds_later) {
     const EvidenceUnits of_void = unitsOf(static_cast<double>(rules.void_evidence));
     pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
-      if (asks_below_) addAcrossSeams(groups_[g], scan.withdraws, worker);
+      if (asks_below_) addAcrossSeams(groups_[g], rules, scan.withdraws, worker);
       if (seeks_voids_) addVoids(groups_[g], of_void, scan.withdraws, worker);
       finishGroup(groups_[g], scan.withdraws);
     });

@@ -112,7 +112,7 @@ class MapUpdater {
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
   /// Adds to the bottom layers of a group what the threshold has taken above crossed voxels, or withdraws it.
-  void addAcrossSeams(const Group& group, bool withdraws, std::size_t worker);
+  void addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws, std::size_t worker);
   /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
   void addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker);
   /// Counts the memory of a group. @param withdraws whether that of planes that are gone is returned.

@@ -38,20 +38,10 @@ void clear(std::uint64_t voxels, float* values) {
   for (; voxels != 0; voxels &= voxels - 1) values[__builtin_ctzll(voxels)] = 0.0f;
 }
 
-/// Rounded as kernels round them.
+/// Rounded as kernels round sums.
 EvidenceUnits roundedUnits(float sum) {
   constexpr float kMostSum = 0x1.fffffep14f;  // the last float whose units are EvidenceUnits
-  return unitsOf(static_cast<double>(std::min(sum, kMostSum)));
-}
-
-/// Notes what the threshold takes from the bottom layer of a block. @param before, after limits were applied.
-void holdBack(float most, const float* before, const float* after, BlockSeam& seam) {
-  for (int v = 0; v < kBlockEdge * kBlockEdge; ++v) {
-    const float all = std::min(before[v], most);
-    if (!(all > after[v])) continue;
-    seam.units[v] = roundedUnits(all) - roundedUnits(after[v]);
-    seam.held_back |= std::uint64_t{seam.units[v] > 0} << v;
-  }
+  return static_cast<EvidenceUnits>(static_cast<double>(std::min(sum, kMostSum) / kEvidenceUnit) + 0.5);
 }
 
 }  // namespace
@@ -78,13 +68,22 @@ VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const
       clear(cleared[static_cast<std::size_t>(layer)], plane.values + layer * kLayer);
     }
     if (!limits) continue;
-    float bottom[kLayer];
-    if (rules.asksBelow()) std::copy_n(plane.values, kLayer, bottom);
+    if (rules.asksBelow()) {
+      std::copy_n(plane.values, kLayer, seam->sums);
+      LayerBits some = {}, all = {};
+      kernels.find(plane.values, {0, 1}, std::numeric_limits<float>::min(), some.data());
+      kernels.find(plane.values, {0, 1}, rules.free_threshold + rules.most_free, all.data());
+      seam->held_back = some[0] & ~all[0];
+    }
     kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
-    if (rules.asksBelow()) holdBack(rules.most_free, bottom, plane.values, *seam);
   }
   if (rules.asksBelow()) seam->crossed_top = reached[kBlockEdge - 1];
   return maskOf(reached);
+}
+
+EvidenceUnits heldBack(const UpdateRules& rules, float sum) {
+  const float kept = std::min(std::max(sum - rules.free_threshold, 0.0f), rules.most_free);
+  return roundedUnits(std::min(sum, rules.most_free)) - roundedUnits(kept);
 }
 
 void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
