@@ -67,15 +67,15 @@ void PointEvidence::reserve(std::size_t workers) {
 
 void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t count, BlockSums& sums) const {
   BlockSums::Plane& plane = sums.open(label);
-  if (kernel_.type == KernelType::kSparse) {
-    const auto sum = confined_[label] ? kernels_.sum_inside : kernels_.sum_points;
-    plane.layers = sum(runs, count, kernel_.reach, kernel_.scale, plane.values);
+  if (kernel_.type == KernelType::kSparse && !confined_[label]) {
+    plane.layers = kernels_.sum_points(runs, count, kernel_.reach, kernel_.scale, plane.values);
     return;
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);
   for (const PointRun* run = runs; run != runs + count; ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
-      plane.values[run->points[i].voxel] += run->weights == nullptr ? 1.0f : run->weights[i];
+      plane.values[run->points[i].voxel] +=
+          run->weights == nullptr ? kernel_.scale : kernel_.scale * run->weights[i];
     }
   }
 }

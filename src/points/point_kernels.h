@@ -18,9 +18,6 @@ struct PointKernels {
   /// @param reach length of the kernel [voxels]. @param scale of the kernel. @return layers that hold all
   /// sums above 0.
   Block::Layers (*sum_points)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
-  /// Sets the sums of the 512 voxels of a block to k(|x - c|) over the points x that each of them contains.
-  /// @param runs points inside the block. All else as for sum_points.
-  Block::Layers (*sum_inside)(const PointRun* runs, std::size_t count, float reach, float scale, float* sums);
   /// Finds the cells and tiles in which the first `count` points of a batch lie: the cell of
   /// GridGeometry::voxelAt, to the bit.
   void (*locate_points)(const TileGrid& grid, const PointSpan& points, std::size_t count,

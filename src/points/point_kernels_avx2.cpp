@@ -11,8 +11,7 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsAvx2() {
-  static const PointKernels kernels = {"avx2",       sumPoints,   sumPointsInside,
-                                       locatePoints, locateCells, reachBlocks};
+  static const PointKernels kernels = {"avx2", sumPoints, locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

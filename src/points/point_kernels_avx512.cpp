@@ -11,8 +11,7 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsAvx512() {
-  static const PointKernels kernels = {"avx512",     sumPoints,   sumPointsInside,
-                                       locatePoints, locateCells, reachBlocks};
+  static const PointKernels kernels = {"avx512", sumPoints, locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

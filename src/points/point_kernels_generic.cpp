@@ -9,8 +9,7 @@
 namespace bki_mapping {
 
 const PointKernels& pointKernelsGeneric() {
-  static const PointKernels kernels = {"generic",    sumPoints,   sumPointsInside,
-                                       locatePoints, locateCells, reachBlocks};
+  static const PointKernels kernels = {"generic", sumPoints, locatePoints, locateCells, reachBlocks};
   return kernels;
 }
 

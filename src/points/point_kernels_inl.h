@@ -195,47 +195,6 @@ void addPointsToRows(const PointRun& run, float reach, float inverse_reach2, flo
   }
 }
 
-/// Adds points to the voxels that contain them. @return the layers of those voxels.
-template <bool kWeighted>
-Block::Layers addPointsInside(const PointRun& run, float inverse_reach2, float* sums) {
-  constexpr int kLayer = kBlockEdge * kBlockEdge;
-  const VecKernel kernel;
-  const float scale = VecKernel::kScale * inverse_reach2;
-  Block::Layers layers = {kBlockEdge, 0};
-  for (std::size_t p = 0; p < run.count; p += kLanes) {
-    const int count = static_cast<int>(std::min<std::size_t>(run.count - p, kLanes));
-    FloatVec d2 = {};
-    for (int lane = 0; lane < count; ++lane) {
-      const LocalPoint& point = run.points[p + static_cast<std::size_t>(lane)];
-      const float dx = point.x - static_cast<float>(point.voxel % kBlockEdge),
-                  dy = point.y - static_cast<float>(point.voxel / kBlockEdge % kBlockEdge),
-                  dz = point.z - static_cast<float>(point.voxel / kLayer);
-      d2[lane] = dx * dx + dy * dy + dz * dz;
-    }
-    const FloatVec values = kernel(VecKernel::squared(d2, scale));
-    for (int lane = 0; lane < count; ++lane) {
-      const std::size_t n = p + static_cast<std::size_t>(lane);
-      const int voxel = run.points[n].voxel, layer = voxel / kLayer;
-      sums[voxel] += kWeighted ? values[lane] * run.weights[n] : values[lane];
-      layers = {std::min(layers.begin, layer), std::max(layers.end, layer + 1)};
-    }
-  }
-  return layers;
-}
-
-Block::Layers sumPointsInside(const PointRun* runs, std::size_t count, float reach, float scale,
-                              float* sums) {
-  for (int v = 0; v < kBlockVoxels; ++v) sums[v] = 0.0f;
-  Block::Layers layers = {kBlockEdge, 0};
-  for (const PointRun* run = runs; run != runs + count; ++run) {
-    const auto add = run->weights == nullptr ? addPointsInside<false> : addPointsInside<true>;
-    const Block::Layers of_run = add(*run, 1.0f / (reach * reach), sums);
-    layers = {std::min(layers.begin, of_run.begin), std::max(layers.end, of_run.end)};
-  }
-  for (int v = 0; v < kBlockVoxels; ++v) sums[v] = notNegative(scale * sums[v]);
-  return layers;
-}
-
 Block::Layers sumPoints(const PointRun* runs, std::size_t count, float reach, float scale, float* sums) {
   const float inverse_reach2 = 1.0f / (reach * reach);
   if (reach <= 1.0f) return sumOfNearestEight(runs, count, inverse_reach2, scale, sums);

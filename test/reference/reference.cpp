@@ -148,15 +148,14 @@ bool ScanReference::spreads(const SemanticClass& c) const {
 
 Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {
   if (spreads(c) || config_.kernel.type == KernelType::kCounting) return pointEvidence(hits_, voxel, c.id);
-  std::vector<Point> inside, close;
+  Value value;
   for (const Point& hit : hits_) {
     const Eigen::Vector3d offset = (hit.p - relativeCentre(voxel)) / config_.resolution;
-    const double outside = offset.cwiseAbs().maxCoeff() - 0.5;
-    if (outside < -kClose) inside.push_back(hit);
-    if (std::abs(outside) <= kClose) close.push_back(hit);
+    const double outside = offset.cwiseAbs().maxCoeff() - 0.5,
+                 evidence = hit.shareOf(c.id) * config_.kernel.scale;
+    if (outside < -kClose) value.sum += evidence;
+    if (std::abs(outside) <= kClose) value.slack += evidence;
   }
-  Value value = pointEvidence(inside, voxel, c.id);
-  value.slack += pointEvidence(close, voxel, c.id).sum;
   return value;
 }
 
