@@ -125,8 +125,9 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     worker.later = {};
   }
   if (rules.asksBelow()) {
-    seams_.resize(jobs_.size());
-    for (BlockSeam& seam : seams_) seam.crossed_top = seam.held_back = 0;
+    seam_sums_.resize(jobs_.size());
+    seams_.clear();
+    for (auto& sums : seam_sums_) seams_.push_back({0, 0, sums.data()});
   }
   if (rules.seeksVoids()) voids_.start(jobs_.size(), groups_.size());
 }
@@ -188,20 +189,27 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
 void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws,
                                 std::size_t worker) {
   const auto add = withdraws ? withdrawFromSome : addToSome;
-  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
-       ++j) {
-    const BlockSeam& seam = seams_[*j];
-    if (seam.held_back == 0) continue;
-    const BlockIndex& index = jobs_[*j].index;
-    const std::uint32_t below = touched_.find({index.x, index.y, index.z - 1});
-    const std::uint64_t voxels = below == kNoPosition ? 0 : seam.held_back & seams_[below].crossed_top;
+  const std::uint32_t* const end = group_jobs_.end(group.position);
+  std::array<std::uint32_t, kGroupBlocks> by_slot;
+  by_slot.fill(kNoPosition);
+  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
+    by_slot[static_cast<std::size_t>(slotInGroup(jobs_[*j].index))] = *j;
+  }
+  for (std::size_t slot = 0; slot < kGroupBlocks; ++slot) {
+    const std::uint32_t job = by_slot[slot];
+    if (job == kNoPosition || seams_[job].held_back == 0) continue;
+    constexpr std::size_t kLayer = kGroupEdge * kGroupEdge;
+    const BlockIndex& index = jobs_[job].index;
+    const std::uint32_t below =
+        slot >= kLayer ? by_slot[slot - kLayer] : touched_.find({index.x, index.y, index.z - 1});
+    const std::uint64_t voxels = below == kNoPosition ? 0 : seams_[job].held_back & seams_[below].crossed_top;
     if (voxels == 0) continue;
     EvidenceUnits units[kBlockEdge * kBlockEdge];
     for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
       const int v = __builtin_ctzll(left);
-      units[v] = heldBack(rules, seam.sums[v]);
+      units[v] = heldBack(rules, seams_[job].sums[v]);
     }
-    jobs_[*j].block->change(
+    jobs_[job].block->change(
         kFreeClass, [&](EvidenceUnits* plane) { return add(voxels, units, plane, workers_[worker].later); });
   }
 }

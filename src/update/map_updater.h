@@ -1,6 +1,7 @@
 /// @file Adds the evidence of a scan to a map.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -130,7 +131,8 @@ class MapUpdater {
   // Of this scan:
   bool seeks_voids_ = false, asks_below_ = false;
   VoidSearch voids_;
-  std::vector<BlockSeam> seams_;  ///< of the jobs
+  std::vector<BlockSeam> seams_;                                       ///< of the jobs
+  std::vector<std::array<float, kBlockEdge * kBlockEdge>> seam_sums_;  ///< theirs
 };
 
 }  // namespace bki_mapping

@@ -35,7 +35,7 @@ struct UpdateRules {
 struct BlockSeam {
   std::uint64_t crossed_top = 0;  ///< voxels of the top layer whose evidence reaches most_free
   std::uint64_t held_back = 0;    ///< voxels of the bottom layer from which the threshold may have taken some
-  float sums[kBlockEdge * kBlockEdge];  ///< of the bottom layer, before; set if any is held back
+  float* sums = nullptr;          ///< 64 of the bottom layer, before; set if any evidence is held back
 };
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
