@@ -26,9 +26,9 @@ inline std::vector<NamedParameter<KernelConfig>> kernelParameters() {
       truthParameter(
           "static_spread", &C::static_spread, Changes::kWhileMapping,
           "Let hits of classes that cannot move (those neither dynamic nor unlabelled) add evidence to all "
-          "voxels within kernel/length, as other hits do. Set false to let each add kernel/scale to the "
-          "voxel that contains it, and nothing to others, so that floors and walls look no thicker than they "
-          "are. downsample_resolution should then divide resolution without a remainder."),
+          "voxels within kernel/length, as other hits do. Set false to let each add all of its evidence to "
+          "the voxel that contains it, so that floors and walls look no thicker than they are; "
+          "downsample_resolution should then divide resolution without a remainder."),
   };
 }
 

@@ -37,6 +37,7 @@ struct VoxelKernel {
   float reach = 1.0f;           ///< l / resolution
   float inverse_reach2 = 1.0f;  ///< 1 / reach^2
   float scale = 1.0f;           ///< sigma0; 1 for the counting model
+  float total = 1.0f;           ///< what a point adds to all voxels together, on average over its position
 
   /// @throws std::invalid_argument if a sparse kernel is longer than kMaxReach voxels.
   VoxelKernel(const KernelConfig& config, double resolution)
@@ -49,6 +50,11 @@ struct VoxelKernel {
     }
     reach = static_cast<float>(length / resolution);
     inverse_reach2 = static_cast<float>(resolution * resolution / (length * length));
+    if (type == KernelType::kSparse) {
+      constexpr double kPi = 3.14159265358979323846;
+      constexpr double kIntegral = 2.0 * kPi / 9.0 - 4.0 / (3.0 * kPi);  // of k(r) over the unit ball
+      total = static_cast<float>(config.scale * kIntegral * std::pow(length / resolution, 3.0));
+    }
   }
 };
 

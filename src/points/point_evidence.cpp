@@ -75,7 +75,7 @@ void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t co
   for (const PointRun* run = runs; run != runs + count; ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
       plane.values[run->points[i].voxel] +=
-          run->weights == nullptr ? kernel_.scale : kernel_.scale * run->weights[i];
+          run->weights == nullptr ? kernel_.total : kernel_.total * run->weights[i];
     }
   }
 }

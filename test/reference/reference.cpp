@@ -21,6 +21,17 @@ double sparseKernel(double d, double length, double scale) {
   return scale * ((2.0 + std::cos(2.0 * kPi * r)) / 3.0 * (1.0 - r) + std::sin(2.0 * kPi * r) / (2.0 * kPi));
 }
 
+/// The integral of k(d) of unit length and scale over space, by the midpoint rule.
+double kernelIntegral() {
+  constexpr int kSteps = 10000;
+  double sum = 0.0;
+  for (int n = 0; n < kSteps; ++n) {
+    const double r = (n + 0.5) / kSteps;
+    sum += 4.0 * kPi * r * r * sparseKernel(r, 1.0, 1.0) / kSteps;
+  }
+  return sum;
+}
+
 std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<Point>& points, double cell) {
   if (cell == 0.0) return points;
   using Key = std::tuple<int, int, int>;
@@ -148,13 +159,14 @@ bool ScanReference::spreads(const SemanticClass& c) const {
 
 Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {
   if (spreads(c) || config_.kernel.type == KernelType::kCounting) return pointEvidence(hits_, voxel, c.id);
+  const double in_voxels = config_.kernel.lengthFor(config_.resolution) / config_.resolution;
+  const double total = config_.kernel.scale * kernelIntegral() * in_voxels * in_voxels * in_voxels;
   Value value;
   for (const Point& hit : hits_) {
     const Eigen::Vector3d offset = (hit.p - relativeCentre(voxel)) / config_.resolution;
-    const double outside = offset.cwiseAbs().maxCoeff() - 0.5,
-                 evidence = hit.shareOf(c.id) * config_.kernel.scale;
-    if (outside < -kClose) value.sum += evidence;
-    if (std::abs(outside) <= kClose) value.slack += evidence;
+    const double outside = offset.cwiseAbs().maxCoeff() - 0.5;
+    if (outside < -kClose) value.sum += hit.shareOf(c.id) * total;
+    if (std::abs(outside) <= kClose) value.slack += hit.shareOf(c.id) * total;
   }
   return value;
 }
