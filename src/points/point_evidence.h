@@ -10,8 +10,8 @@
 namespace bki_mapping {
 
 /// Adds k(|x - c|), times the weight of the point, to the class of each point x at every voxel centre c
-/// within the support radius. With the counting kernel, adds the weight to the voxel that contains the point;
-/// for confined classes, so does any kernel, times VoxelKernel::total. Equations (3), (3a) and (4) of
+/// within the support radius. With the counting kernel, adds the weight to the voxel that contains the point,
+/// and for confined classes VoxelKernel::total times the weight. Equations (3), (3a) and (4) of
 /// docs/method.md. Keeps its memory from scan to scan.
 class PointEvidence : public Evidence {
  public:

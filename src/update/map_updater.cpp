@@ -188,21 +188,21 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
 
 void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws,
                                 std::size_t worker) {
-  const auto add = withdraws ? withdrawFromSome : addToSome;
+  const auto add = withdraws ? withdrawFromLayer : addToLayer;
   const std::uint32_t* const end = group_jobs_.end(group.position);
   std::array<std::uint32_t, kGroupBlocks> by_slot;
   by_slot.fill(kNoPosition);
+  constexpr std::size_t kSlotsOfLayer = kGroupEdge * kGroupEdge;
   for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
     by_slot[static_cast<std::size_t>(slotInGroup(jobs_[*j].index))] = *j;
   }
   for (std::size_t slot = 0; slot < kGroupBlocks; ++slot) {
     const std::uint32_t job = by_slot[slot];
     if (job == kNoPosition || seams_[job].held_back == 0) continue;
-    constexpr std::size_t kLayer = kGroupEdge * kGroupEdge;
     const BlockIndex& index = jobs_[job].index;
-    const std::uint32_t below =
-        slot >= kLayer ? by_slot[slot - kLayer] : touched_.find({index.x, index.y, index.z - 1});
-    const std::uint64_t voxels = below == kNoPosition ? 0 : seams_[job].held_back & seams_[below].crossed_top;
+    const std::uint32_t below = slot >= kSlotsOfLayer ? by_slot[slot - kSlotsOfLayer]
+                                                      : touched_.find({index.x, index.y, index.z - 1});
+    const std::uint64_t voxels = below == kNoPosition ? 0 : seams_[job].held_back & seams_[below].reached_top;
     if (voxels == 0) continue;
     EvidenceUnits units[kBlockEdge * kBlockEdge];
     for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
@@ -274,7 +274,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   }
   if (seeks_voids_) voids_.find(touched_, group_jobs_, pool);
   if (adds_later) {
-    const EvidenceUnits of_void = unitsOf(static_cast<double>(rules.void_evidence));
+    const EvidenceUnits of_void = roundedUnits(rules.void_evidence);
     pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
       if (asks_below_) addAcrossSeams(groups_[g], rules, scan.withdraws, worker);
       if (seeks_voids_) addVoids(groups_[g], of_void, scan.withdraws, worker);

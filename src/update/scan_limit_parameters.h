@@ -23,9 +23,10 @@ inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
           "however many beams cross the voxel; 0 sets no limit."),
       realParameter(
           "free_threshold", &C::free_threshold, evidence, "", Changes::kWhileMapping,
-          "Evidence for free that one scan must exceed in a voxel, unless it reaches scan_limit/free in the "
-          "voxel below; only the excess counts. Set it so that beams call no voxel free that is mostly in "
-          "the ground: 0.17 kernel/scale kernel/length / height of the sensor above it, with bilinear "
+          "Evidence for free that one scan must exceed in a voxel; only the excess counts. It does not apply "
+          "above a voxel whose evidence for free from the same scan reaches scan_limit/free; with "
+          "scan_limit/free 0 it applies everywhere. Set it so that beams call no voxel free that is mostly "
+          "in the ground: 0.17 kernel/scale kernel/length / height of the sensor above it, with bilinear "
           "weights. 0 lets all evidence count."),
       realParameter(
           "void", &C::void_space, evidence, "", Changes::kWhileMapping,

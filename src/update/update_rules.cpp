@@ -38,12 +38,6 @@ void clear(std::uint64_t voxels, float* values) {
   for (; voxels != 0; voxels &= voxels - 1) values[__builtin_ctzll(voxels)] = 0.0f;
 }
 
-/// Rounded as kernels round sums.
-EvidenceUnits roundedUnits(float sum) {
-  constexpr float kMostSum = 0x1.fffffep14f;  // the last float whose units are EvidenceUnits
-  return static_cast<EvidenceUnits>(static_cast<double>(std::min(sum, kMostSum) / kEvidenceUnit) + 0.5);
-}
-
 }  // namespace
 
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
@@ -77,8 +71,13 @@ VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const
     }
     kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
   }
-  if (rules.asksBelow()) seam->crossed_top = reached[kBlockEdge - 1];
+  if (rules.asksBelow()) seam->reached_top = reached[kBlockEdge - 1];
   return maskOf(reached);
+}
+
+EvidenceUnits roundedUnits(float sum) {
+  constexpr float kMostSum = 0x1.fffffep14f;  // the last float whose units are EvidenceUnits
+  return static_cast<EvidenceUnits>(static_cast<double>(std::min(sum, kMostSum) / kEvidenceUnit) + 0.5);
 }
 
 EvidenceUnits heldBack(const UpdateRules& rules, float sum) {

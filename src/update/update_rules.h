@@ -31,11 +31,11 @@ struct UpdateRules {
   bool seeksVoids() const { return void_evidence > 0.0f; }
 };
 
-/// Evidence for `free` at the faces of a block, where the threshold depends on the block below.
+/// Evidence for `free` at the top and bottom of a block, where the threshold depends on the block below.
 struct BlockSeam {
-  std::uint64_t crossed_top = 0;  ///< voxels of the top layer whose evidence reaches most_free
+  std::uint64_t reached_top = 0;  ///< voxels of the top layer whose evidence reaches most_free
   std::uint64_t held_back = 0;    ///< voxels of the bottom layer from which the threshold may have taken some
-  float* sums = nullptr;          ///< 64 of the bottom layer, before; set if any evidence is held back
+  float* sums = nullptr;  ///< of the 64 voxels of the bottom layer, before limits; valid where held back
 };
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
@@ -48,6 +48,9 @@ void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums&
 /// from this block, and leaves open in it, if it asks the block below.
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
                       BlockSums& free, BlockSeam* seam);
+
+/// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
+EvidenceUnits roundedUnits(float sum);
 
 /// The units that the threshold has taken from a sum >= 0 of a voxel, but would not above a crossed one.
 EvidenceUnits heldBack(const UpdateRules& rules, float sum);

@@ -41,7 +41,7 @@ bool changeVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUnits* p
 }
 
 template <void (*kChange)(EvidenceUnits units, EvidenceUnits& sum, SumCounts& counts)>
-bool changeSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
+bool changeLayer(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
   EvidenceUnits any = 0;
   for (; voxels != 0; voxels &= voxels - 1) {
     const int v = __builtin_ctzll(voxels);
@@ -60,12 +60,12 @@ bool withdrawFromVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUn
                         SumCounts& counts) {
   return changeVoxels<withdrawFrom>(voxels, units, plane, counts);
 }
-bool addToSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
-  return changeSome<addTo>(voxels, units, plane, counts);
+bool addToLayer(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts) {
+  return changeLayer<addTo>(voxels, units, plane, counts);
 }
-bool withdrawFromSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
-                      SumCounts& counts) {
-  return changeSome<withdrawFrom>(voxels, units, plane, counts);
+bool withdrawFromLayer(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
+                       SumCounts& counts) {
+  return changeLayer<withdrawFrom>(voxels, units, plane, counts);
 }
 
 }  // namespace bki_mapping

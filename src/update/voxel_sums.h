@@ -15,8 +15,8 @@ bool withdrawFromVoxels(const LayerBits& voxels, EvidenceUnits units, EvidenceUn
                         SumCounts& counts);
 
 /// The same for some of 64 voxels. @param units that of each of the 64.
-bool addToSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts);
-bool withdrawFromSome(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
-                      SumCounts& counts);
+bool addToLayer(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane, SumCounts& counts);
+bool withdrawFromLayer(std::uint64_t voxels, const EvidenceUnits* units, EvidenceUnits* plane,
+                       SumCounts& counts);
 
 }  // namespace bki_mapping

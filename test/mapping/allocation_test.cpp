@@ -194,7 +194,8 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.free_space.hits_before_misses = true;
       config.free_space.evidence_before_misses = true;
       config.scan_limit.hits = 0.2;
-      config.scan_limit.free = 0.1;
+      config.scan_limit.free = 1e-3;
+      config.scan_limit.free_threshold = 0.02;
       config.scan_limit.void_space = 2.0;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
       config.kernel.static_spread = false;

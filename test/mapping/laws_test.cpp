@@ -11,6 +11,7 @@
 #include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
+#include "reference/content.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
@@ -114,6 +115,16 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     configs.emplace_back(mode + ", with rules and hits that stay in their voxels", config);
   }
   return configs;
+}
+
+TEST(Laws, ThreadCountChangesNoBitWithRules) {
+  for (const auto& [name, config] : additiveConfigs()) {
+    MapperConfig one = config, many = config;
+    one.threads = 1;
+    many.threads = 7;
+    EXPECT_EQ(reference::contentOf(mapOf(someScans(), one)), reference::contentOf(mapOf(someScans(), many)))
+        << name;
+  }
 }
 
 /// The same scans, each point with two classes.

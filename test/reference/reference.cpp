@@ -160,7 +160,8 @@ bool ScanReference::spreads(const SemanticClass& c) const {
 Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {
   if (spreads(c) || config_.kernel.type == KernelType::kCounting) return pointEvidence(hits_, voxel, c.id);
   const double in_voxels = config_.kernel.lengthFor(config_.resolution) / config_.resolution;
-  const double total = config_.kernel.scale * kernelIntegral() * in_voxels * in_voxels * in_voxels;
+  static const double kIntegral = kernelIntegral();
+  const double total = config_.kernel.scale * kIntegral * in_voxels * in_voxels * in_voxels;
   Value value;
   for (const Point& hit : hits_) {
     const Eigen::Vector3d offset = (hit.p - relativeCentre(voxel)) / config_.resolution;

@@ -23,6 +23,13 @@ inline std::shared_ptr<const ClassTable> smallTable() {
   return std::make_shared<ClassTable>("small", classes);
 }
 
+/// The same, but the last class can move.
+inline std::shared_ptr<const ClassTable> tableWithDynamicClass() {
+  std::vector<SemanticClass> classes = smallTable()->classes();
+  classes.back().dynamic = true;
+  return std::make_shared<ClassTable>("dynamic", classes);
+}
+
 struct Scene {
   std::string name;
   Scan scan;

@@ -44,11 +44,11 @@ TEST(VoxelSums, EqualAPlainLoop) {
       // The same, layer by layer, with units for each voxel.
       std::vector<EvidenceUnits> same = before;
       const std::vector<EvidenceUnits> of_voxel(64, units);
-      const auto changeSome = withdraws ? withdrawFromSome : addToSome;
+      const auto changeLayer = withdraws ? withdrawFromLayer : addToLayer;
       SumCounts of_layers;
       bool any_of_layers = false;
       for (std::size_t z = 0; z < kBlockEdge; ++z) {
-        any_of_layers |= changeSome(voxels[z], of_voxel.data(), same.data() + 64 * z, of_layers);
+        any_of_layers |= changeLayer(voxels[z], of_voxel.data(), same.data() + 64 * z, of_layers);
       }
       EXPECT_EQ(same, expected);
       EXPECT_EQ(any_of_layers, any);
@@ -63,6 +63,18 @@ TEST(VoxelSums, EqualAPlainLoop) {
   }
   EXPECT_GT(saturated, 0u);
   EXPECT_GT(negative, 0u);
+}
+
+TEST(VoxelSums, GiveEachVoxelOfALayerItsOwn) {
+  std::vector<EvidenceUnits> units(64), plane(64, 1000), expected = plane;
+  for (int v = 0; v < 64; ++v) units[static_cast<std::size_t>(v)] = 3 * v;
+  const std::uint64_t voxels = 0x8000000100f00205;
+  for (std::size_t v = 0; v < 64; ++v) expected[v] += (voxels >> v & 1) != 0 ? units[v] : 0;
+  SumCounts counts;
+  EXPECT_TRUE(addToLayer(voxels, units.data(), plane.data(), counts));
+  EXPECT_EQ(plane, expected);
+  EXPECT_TRUE(withdrawFromLayer(voxels, units.data(), plane.data(), counts));
+  EXPECT_EQ(plane, std::vector<EvidenceUnits>(64, 1000));
 }
 
 }  // namespace
