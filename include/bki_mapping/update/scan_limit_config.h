@@ -9,8 +9,8 @@ namespace bki_mapping {
 struct ScanLimitConfig {
   double hits = 0.0;  ///< for all classes together; larger sums are scaled down
   double free = 0.0;  ///< for `free`; larger sums are cut off
-  /// Evidence for `free` that one scan must exceed in a voxel: only the excess counts, and is limited. It does
-  /// not apply where the evidence of the voxel below reaches `free`.
+  /// Evidence for `free` that one scan must exceed in a voxel: only the excess counts, and is limited. It
+  /// does not apply where the evidence of the voxel below reaches `free`.
   double free_threshold = 0.0;
   /// Further evidence for `free` where a voxel and its 18 neighbours are all seen, and all empty but for
   /// classes that cannot move; needs `free`. 0: none.
