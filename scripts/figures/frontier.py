@@ -23,6 +23,7 @@ STEPS = {
     '+ free_gain/remaining 0.1': {'free_gain/remaining': 0.1},
     '+ scan_limit/free_threshold 0.6': {'scan_limit/free_threshold': 0.6},
     '+ free_gain/neighbourhood 1.75': {'free_gain/neighbourhood': 1.75},
+    '+ kernel/static_spread false': {'kernel/static_spread': 'false'},
 }
 
 
