@@ -72,10 +72,13 @@ void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t co
     return;
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  plane.layers = {kBlockEdge, 0};
   for (const PointRun* run = runs; run != runs + count; ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
-      plane.values[run->points[i].voxel] +=
-          run->weights == nullptr ? kernel_.total : kernel_.total * run->weights[i];
+      const int voxel = run->points[i].voxel, layer = voxel / kLayer;
+      plane.values[voxel] += run->weights == nullptr ? kernel_.total : kernel_.total * run->weights[i];
+      plane.layers = {std::min(plane.layers.begin, layer), std::max(plane.layers.end, layer + 1)};
     }
   }
 }

@@ -9,13 +9,21 @@ namespace bki_mapping {
 namespace {
 
 void limitHits(float most, BlockSums& hits) {
+  if (hits.begin() == hits.end()) return;
   constexpr int kLayer = kBlockEdge * kBlockEdge;
-  alignas(64) float kept[kBlockVoxels] = {};  // the sum over all classes, then the fraction to keep
+  alignas(64) float kept[kBlockVoxels];  // the sum over all classes, then the fraction to keep
+  Block::Layers layers = {kBlockEdge, 0};
+  for (const BlockSums::Plane& plane : hits) {
+    layers = {std::min(layers.begin, plane.layers.begin), std::max(layers.end, plane.layers.end)};
+  }
+  std::fill(kept + layers.begin * kLayer, kept + layers.end * kLayer, 0.0f);
   for (const BlockSums::Plane& plane : hits) {
     const int end = plane.layers.end * kLayer;
     for (int v = plane.layers.begin * kLayer; v < end; ++v) kept[v] += plane.values[v];
   }
-  for (float& each : kept) each = each > most ? most / each : 1.0f;
+  for (int v = layers.begin * kLayer; v < layers.end * kLayer; ++v) {
+    kept[v] = kept[v] > most ? most / kept[v] : 1.0f;
+  }
   for (BlockSums::Plane& plane : hits) {
     const int end = plane.layers.end * kLayer;
     for (int v = plane.layers.begin * kLayer; v < end; ++v) plane.values[v] *= kept[v];
