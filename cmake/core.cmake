@@ -46,7 +46,7 @@ bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_
 bki_mapping_core_room(update SOURCES
     map_updater.cpp
     sum_kernels.cpp sum_kernels_avx2.cpp sum_kernels_avx512.cpp sum_kernels_generic.cpp
-    sum_sink.cpp update_rules.cpp void_search.cpp voxel_sums.cpp
+    sum_sink.cpp update_rules.cpp void_search.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(query SOURCES
     distance_field.cpp

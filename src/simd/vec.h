@@ -17,7 +17,8 @@
 /// - Min(a, b), Max(a, b): lane by lane. Floats must not be NaN.
 /// - Abs(v), Sqrt(v): lane by lane. MinAbs(a, b): Min(Abs(a), Abs(b)).
 /// - IfThenElse(m, a, b): a where the mask is set, else b.
-/// - AnyTrue(m): whether any lane of the mask is set. BitsFromMask(m): bit n is lane n.
+/// - AnyTrue(m): whether any lane of the mask is set. BitsFromMask(m): bit n is lane n. MaskFromBits(b): the
+///   opposite; further bits are ignored.
 /// - TableLookupLanes(v, i): lane n is v[i[n]].
 /// - TableLookup(t, i): lane n is element i[n] of a table: Table8, eight numbers in memory, or Table32, 32
 ///   floats in two registers, of i[n] modulo 32. The latter only where kHasTable32.
@@ -100,6 +101,9 @@ template <typename To, typename From>
 template <typename Vec>
 [[gnu::always_inline]] inline Vec IfThenElse(Mask mask, Vec a, Vec b) {
   return mask ? a : b;
+}
+[[gnu::always_inline]] inline Mask MaskFromBits(std::uint64_t bits) {
+  return (Set(static_cast<std::int32_t>(bits)) & (1 << Iota())) != 0;
 }
 [[gnu::always_inline]] inline IntVec Min(IntVec a, IntVec b) {
   return a < b ? a : b;

@@ -11,6 +11,7 @@ namespace bki_mapping {
 constexpr int kGroupEdge = 4;                          ///< [blocks]
 constexpr int kGroupVoxels = kGroupEdge * kBlockEdge;  ///< edge [voxels]
 constexpr int kGroupBlocks = kGroupEdge * kGroupEdge * kGroupEdge;
+constexpr int kSlotsOfLayer = kGroupEdge * kGroupEdge;  ///< from a slot to that above it
 
 /// A subset of the blocks of a group: bit n stands for the block in slot n.
 struct BlockGroup {

@@ -4,9 +4,14 @@
 #include <atomic>
 
 #include "core/stopwatch.h"
-#include "update/voxel_sums.h"
 
 namespace bki_mapping {
+namespace {
+
+/// How far ahead blocks are prefetched [jobs]; long enough to hide the latency of memory.
+constexpr std::size_t kAhead = 4;
+
+}  // namespace
 
 void MapUpdater::setTasks(const ScanEvidence& scan) {
   tasks_.resize(3);
@@ -29,7 +34,7 @@ std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
   const SemanticMap::Claim claimed = map.claim(index);
   try {
     touched_.insert(index);
-    jobs_.push_back({index, claimed.block, nullptr, claimed.is_new, claimed.shared, 0, false, 0});
+    jobs_.push_back({index, claimed.block, nullptr, 0, claimed.is_new, claimed.shared, 0, false, 0});
   } catch (...) {
     if (claimed.is_new) map.erase(index);
     throw;
@@ -51,17 +56,21 @@ void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, Threa
 }
 
 void MapUpdater::groupJobs() {
-  group_jobs_.clear();
+  by_group_.clear();
   for (std::size_t n = 0; n < jobs_.size(); ++n) {
-    group_jobs_.add(groupOf(jobs_[n].index), static_cast<std::uint32_t>(n));
+    by_group_.add(jobs_[n].index, static_cast<std::uint32_t>(n));
   }
-  group_jobs_.sort();
+  by_group_.sort();
+  sorted_.clear();
+  sorted_.reserve(jobs_.size());
+  for (const std::uint32_t number : by_group_.numbers()) {
+    sorted_.push_back(jobs_[number]);
+    sorted_.back().number = number;
+  }
+  jobs_.swap(sorted_);
   groups_.clear();
-  for (std::size_t n = 0; n < group_jobs_.indices().size(); ++n) {
-    Group group = {{group_jobs_.indices().members()[n]}, n, 0.0};
-    for (const std::uint32_t* job = group_jobs_.begin(n); job != group_jobs_.end(n); ++job) {
-      group.blocks.blocks |= std::uint64_t{1} << slotInGroup(jobs_[*job].index);
-    }
+  for (std::size_t n = 0; n < by_group_.groups().size(); ++n) {
+    Group group = {{by_group_.groups().members()[n], by_group_.slots(n)}, n, 0.0};
     for (std::size_t t = 0; t < task_count_; ++t) group.cost += tasks_[t].work->cost(group.blocks);
     groups_.push_back(group);
   }
@@ -70,10 +79,10 @@ void MapUpdater::groupJobs() {
   });
 }
 
-std::size_t MapUpdater::reservePlanes(BlockJob& job, std::size_t position) {
+std::size_t MapUpdater::reservePlanes(BlockJob& job) {
   ClassSet classes;
   for (std::size_t t = 0; t < task_count_; ++t) {
-    const std::uint32_t touched = tasks_[t].positionOf(position);
+    const std::uint32_t touched = tasks_[t].positionOf(job.number);
     if (touched != kNoPosition && tasks_[t].evidence) tasks_[t].evidence->markClasses(touched, classes);
   }
   const std::size_t count = classes.count();
@@ -99,14 +108,13 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     std::ptrdiff_t of_group = 0;
     std::size_t classes = 0;
     const std::size_t position = groups_[g].position;
-    constexpr std::ptrdiff_t kAhead = 4;  // jobs; long enough to hide the latency of memory
-    for (const std::uint32_t* job = group_jobs_.begin(position); job != group_jobs_.end(position); ++job) {
-      const std::ptrdiff_t left = group_jobs_.end(position) - job;
-      if (left > kAhead) __builtin_prefetch(jobs_[job[kAhead]].block);
-      if (left > kAhead / 2) __builtin_prefetch(jobs_[job[kAhead / 2]].block->classes().data());
-      BlockJob& each = jobs_[*job];
-      classes = std::max(classes, reservePlanes(each, *job));
-      of_group += static_cast<std::ptrdiff_t>(each.block->bytes() - each.bytes_before);
+    for (std::size_t j = by_group_.begin(position); j != by_group_.end(position); ++j) {
+      const std::size_t left = by_group_.end(position) - j;
+      if (left > kAhead) __builtin_prefetch(jobs_[j + kAhead].block);
+      if (left > kAhead / 2) __builtin_prefetch(jobs_[j + kAhead / 2].block->classes().data());
+      BlockJob& job = jobs_[j];
+      classes = std::max(classes, reservePlanes(job));
+      of_group += static_cast<std::ptrdiff_t>(job.block->bytes() - job.bytes_before);
     }
     for (std::size_t known = most_classes; known < classes;) {
       if (most_classes.compare_exchange_weak(known, classes)) break;
@@ -129,7 +137,7 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     seams_.clear();
     for (auto& sums : seam_sums_) seams_.push_back({0, 0, sums.data()});
   }
-  if (rules.seeksVoids()) voids_.start(jobs_.size(), groups_.size());
+  if (rules.seeksVoids()) voids_.start(jobs_.size());
 }
 
 void MapUpdater::useCopies(SemanticMap& map) noexcept {
@@ -154,17 +162,16 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
   to.targets.clear();
   to.seen.clear();
   to.seams.clear();
-  for (const std::uint32_t* job = group_jobs_.begin(group.position); job != group_jobs_.end(group.position);
-       ++job) {
-    const std::uint32_t touched = task.positionOf(*job);
+  for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
+    const std::uint32_t touched = task.positionOf(jobs_[j].number);
     if (touched == kNoPosition) continue;
-    const int slot = slotInGroup(jobs_[*job].index);
+    const int slot = slotInGroup(jobs_[j].index);
     selected.blocks |= std::uint64_t{1} << slot;
-    to.blocks.push_back({jobs_[*job].index, touched});
+    to.blocks.push_back({jobs_[j].index, touched});
     to.slots.push_back(slot);
-    to.targets.push_back(jobs_[*job].block);
-    if (seeks_voids_) to.seen.push_back(&voids_.at(*job));
-    if (asks_below_) to.seams.push_back(&seams_[*job]);
+    to.targets.push_back(jobs_[j].block);
+    if (seeks_voids_) to.seen.push_back(&voids_.at(j));
+    if (asks_below_) to.seams.push_back(&seams_[j]);
   }
   return selected;
 }
@@ -188,49 +195,48 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
 
 void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws,
                                 std::size_t worker) {
-  const auto add = withdraws ? withdrawFromLayer : addToLayer;
-  const std::uint32_t* const end = group_jobs_.end(group.position);
-  std::array<std::uint32_t, kGroupBlocks> by_slot;
-  by_slot.fill(kNoPosition);
-  constexpr std::size_t kSlotsOfLayer = kGroupEdge * kGroupEdge;
-  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
-    by_slot[static_cast<std::size_t>(slotInGroup(jobs_[*j].index))] = *j;
-  }
-  for (std::size_t slot = 0; slot < kGroupBlocks; ++slot) {
-    const std::uint32_t job = by_slot[slot];
+  const auto add = withdraws ? kernels_.withdraw_units : kernels_.add_units;
+  const GridIndex& index = group.blocks.index;
+  const std::uint32_t group_below = by_group_.groups().find({index.x, index.y, index.z - 1});
+  if (group_below == kNoPosition) return;
+  for (int slot = 0; slot < kSlotsOfLayer; ++slot) {
+    const std::uint32_t job = by_group_.at(group.position, slot);
     if (job == kNoPosition || seams_[job].held_back == 0) continue;
-    const BlockIndex& index = jobs_[job].index;
-    const std::uint32_t below = slot >= kSlotsOfLayer ? by_slot[slot - kSlotsOfLayer]
-                                                      : touched_.find({index.x, index.y, index.z - 1});
+    const std::uint32_t below = by_group_.at(group_below, slot + kGroupBlocks - kSlotsOfLayer);
     const std::uint64_t voxels = below == kNoPosition ? 0 : seams_[job].held_back & seams_[below].reached_top;
     if (voxels == 0) continue;
-    EvidenceUnits units[kBlockEdge * kBlockEdge];
+    EvidenceUnits units[kBlockEdge * kBlockEdge] = {};
     for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
       const int v = __builtin_ctzll(left);
       units[v] = heldBack(rules, seams_[job].sums[v]);
     }
-    jobs_[job].block->change(
-        kFreeClass, [&](EvidenceUnits* plane) { return add(voxels, units, plane, workers_[worker].later); });
+    jobs_[job].block->change(kFreeClass, [&](EvidenceUnits* plane) {
+      return add(&voxels, 1, units, plane, workers_[worker].later);
+    });
   }
 }
 
 void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker) {
   SumCounts& counts = workers_[worker].later;
-  const auto add = withdraws ? withdrawFromVoxels : addToVoxels;
-  const std::uint32_t* const end = group_jobs_.end(group.position);
-  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != end; ++j) {
-    if (j + 1 != end && voids_.voidsOf(j[1]).any()) jobs_[j[1]].block->prefetch();
-    const VoxelMask& voids = voids_.voidsOf(*j);
+  const auto add = withdraws ? kernels_.withdraw_units : kernels_.add_units;
+  EvidenceUnits of_layer[kBlockEdge * kBlockEdge];
+  std::fill(std::begin(of_layer), std::end(of_layer), units);
+  const std::size_t end = by_group_.end(group.position);
+  for (std::size_t j = by_group_.begin(group.position); j != end; ++j) {
+    if (end - j > kAhead) __builtin_prefetch(jobs_[j + kAhead].block);
+    if (end - j > kAhead / 2 && voids_.voidsOf(j + kAhead / 2).any()) jobs_[j + kAhead / 2].block->prefetch();
+    const VoxelMask& voids = voids_.voidsOf(j);
     if (voids.none()) continue;
-    jobs_[*j].block->change(kFreeClass,
-                            [&](EvidenceUnits* plane) { return add(bitsOf(voids), units, plane, counts); });
+    const LayerBits layers = bitsOf(voids);
+    jobs_[j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
+      return add(layers.data(), kBlockEdge, of_layer, plane, counts);
+    });
   }
 }
 
 void MapUpdater::finishGroup(const Group& group, bool withdraws) {
-  for (const std::uint32_t* j = group_jobs_.begin(group.position); j != group_jobs_.end(group.position);
-       ++j) {
-    BlockJob& job = jobs_[*j];
+  for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
+    BlockJob& job = jobs_[j];
     if (withdraws) job.block->shrink();
     job.empty = job.block->empty();
     const std::size_t after = job.empty ? 0 : job.block->bytes();
@@ -272,7 +278,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   } else {
     pool.forEach(groups_.size(), add);
   }
-  if (seeks_voids_) voids_.find(touched_, group_jobs_, pool);
+  if (seeks_voids_) voids_.find(by_group_, pool);
   if (adds_later) {
     const EvidenceUnits of_void = roundedUnits(rules.void_evidence);
     pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {

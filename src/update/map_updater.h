@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "parallel/index_numbering.h"
-#include "parallel/runs_by_index.h"
+#include "update/blocks_by_group.h"
 #include "update/evidence.h"
 #include "update/sum_kernels.h"
 #include "update/void_search.h"
@@ -57,6 +57,7 @@ class MapUpdater {
     BlockIndex index;
     Block* block;
     std::shared_ptr<Block> copy;  ///< to be written to instead of a block that a snapshot shares
+    std::uint32_t number;         ///< of the job when it was collected
     bool is_new, is_shared;
     std::size_t bytes_before;  ///< memory of the block; 0 if it is new
     // Set after adding:
@@ -66,7 +67,7 @@ class MapUpdater {
 
   struct Group {
     BlockGroup blocks;
-    std::size_t position;  ///< in group_jobs_.indices()
+    std::size_t position;  ///< in by_group_.groups()
     double cost;
   };
 
@@ -76,7 +77,8 @@ class MapUpdater {
     Evidence* evidence;  ///< nullptr for a pass
     BlockPass* pass;     ///< valid if `evidence` is nullptr
     SumSink::Kind kind;  ///< of the evidence
-    /// For each job, the block's position in touchedBlocks() or kNoPosition. Later jobs have kNoPosition.
+    /// By the number of a job: the block's position in touchedBlocks() or kNoPosition. Later jobs have
+    /// kNoPosition.
     std::vector<std::uint32_t> positions;
 
     std::uint32_t positionOf(std::size_t job) const {
@@ -104,9 +106,9 @@ class MapUpdater {
   /// @param index_bytes growth of the map's index in this update.
   void reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
                bool withdraws, ThreadPool& pool);
-  /// Reserves the planes of a job's block. @param position of the job in jobs_.
+  /// Reserves the planes of a job's block.
   /// @return the number of classes to which this scan may add in the block.
-  std::size_t reservePlanes(BlockJob& job, std::size_t position);
+  std::size_t reservePlanes(BlockJob& job);
   /// Puts the copies of shared blocks into the map.
   void useCopies(SemanticMap& map) noexcept;
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
@@ -121,12 +123,14 @@ class MapUpdater {
   /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to);
 
-  IndexNumbering touched_;  ///< blocks, in the order of jobs_
-  std::vector<BlockJob> jobs_;
-  RunsByIndex<std::uint32_t> group_jobs_;  ///< jobs by group
-  std::vector<Group> groups_;              ///< by falling cost
-  std::vector<Task> tasks_;                ///< in the order of execution
-  std::size_t task_count_ = 0;             ///< tasks of this scan; tasks_ may be longer to keep memory
+  const SumKernels& kernels_ = sumKernelsFor("");
+  IndexNumbering touched_;      ///< blocks, in the order in which jobs were collected
+  std::vector<BlockJob> jobs_;  ///< as collected, then in the order of by_group_
+  std::vector<BlockJob> sorted_;
+  BlocksByGroup by_group_;
+  std::vector<Group> groups_;   ///< by falling cost
+  std::vector<Task> tasks_;     ///< in the order of execution
+  std::size_t task_count_ = 0;  ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
   // Of this scan:
   bool seeks_voids_ = false, asks_below_ = false;

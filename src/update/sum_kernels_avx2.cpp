@@ -9,7 +9,8 @@
 namespace bki_mapping {
 
 const SumKernels& sumKernelsAvx2() {
-  static const SumKernels kernels = {"avx2", addSums<false>, addSums<true>, limitSums, findSums};
+  static const SumKernels kernels = {"avx2",         addSums<false>, addSums<true>, addUnits<false>,
+                                     addUnits<true>, limitSums,      findSums};
   return kernels;
 }
 

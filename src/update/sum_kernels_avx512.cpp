@@ -9,7 +9,8 @@
 namespace bki_mapping {
 
 const SumKernels& sumKernelsAvx512() {
-  static const SumKernels kernels = {"avx512", addSums<false>, addSums<true>, limitSums, findSums};
+  static const SumKernels kernels = {"avx512",       addSums<false>, addSums<true>, addUnits<false>,
+                                     addUnits<true>, limitSums,      findSums};
   return kernels;
 }
 

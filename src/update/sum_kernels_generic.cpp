@@ -7,7 +7,8 @@
 namespace bki_mapping {
 
 const SumKernels& sumKernelsGeneric() {
-  static const SumKernels kernels = {"generic", addSums<false>, addSums<true>, limitSums, findSums};
+  static const SumKernels kernels = {"generic",      addSums<false>, addSums<true>, addUnits<false>,
+                                     addUnits<true>, limitSums,      findSums};
   return kernels;
 }
 

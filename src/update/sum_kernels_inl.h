@@ -1,4 +1,4 @@
-/// @file Limiting sums, rounding them to units and adding them, over the vocabulary of simd/vec.h.
+/// @file Limiting sums, rounding them to units and adding these, over the vocabulary of simd/vec.h.
 #pragma once
 
 #include "bki_mapping/map/block.h"
@@ -48,21 +48,48 @@ bool addSums(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumC
   return AnyTrue(any != 0);
 }
 
-inline void limitSums(float threshold, float most, float* sums, std::uint64_t* reached) {
+template <bool kWithdraws>
+bool addUnits(const std::uint64_t* voxels, int layers, const EvidenceUnits* units, EvidenceUnits* plane,
+              SumCounts& counts) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
-  sums += kBlockVoxels;
-  for (int layer = kBlockEdge - 1; layer >= 0; --layer) {  // downwards, so that the layer below is unchanged
-    sums -= kLayer;
+  IntVec any = {}, saturated = {}, negative = {};
+  for (int layer = 0; layer < layers; ++layer, plane += kLayer) {
+    if (voxels[layer] == 0) continue;
+    for (int v = 0; v < kLayer; v += kLanes) {
+      const Mask chosen = MaskFromBits(voxels[layer] >> v);
+      const IntVec change = LoadU(units + v) & chosen;  // the others change by 0
+      const IntVec before = LoadU(plane + v);
+      IntVec after;
+      if constexpr (kWithdraws) {
+        negative += (before >= 0) & (before < change);
+        after = Max(before, change - kMostUnits) - change;
+      } else {
+        const IntVec most = kMostUnits - change;
+        saturated += (before > most) & (before < kMostUnits);
+        after = Min(before, most) + change;
+      }
+      StoreU(after, plane + v);
+      any |= after & chosen;
+    }
+  }
+  counts += {0, countOf(saturated), countOf(negative)};
+  return AnyTrue(any != 0);
+}
+
+inline void limitSums(float threshold, float most, std::uint64_t below, float* sums, std::uint64_t* reached) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  for (int layer = 0; layer < kBlockEdge; ++layer) {
     std::uint64_t bits = 0;
     for (int v = 0; v < kLayer; v += kLanes) {
       const FloatVec sum = LoadU(sums + v);
-      FloatVec excess = sum - threshold;
-      if (layer > 0) excess = IfThenElse(LoadU(sums + v - kLayer) >= most, sum, excess);
+      const FloatVec excess = IfThenElse(MaskFromBits(below >> v), sum, sum - threshold);
       const FloatVec positive = IfThenElse(excess < 0.0f, FloatVec{}, excess);
       StoreU(IfThenElse(positive > most, Set(most), positive), sums + v);
       bits |= BitsFromMask(sum >= most) << v;
     }
     reached[layer] |= bits;
+    below = bits;
+    sums += kLayer;
   }
 }
 

@@ -22,8 +22,8 @@ class alignas(kThreadsApart) SumSink {
   void startGroup();
   enum class Kind { kHits, kFree };
   /// Call before each piece of evidence. @param slots of its blocks in the group. @param targets those blocks
-  /// in the same order. @param seen, seams what the scan says of those blocks, to be noted if rules ask for
-  /// it. All must stay valid until the evidence is done.
+  /// in the same order, by rising slots. @param seen, seams what the scan says of those blocks, to be noted
+  /// if rules ask for it. All must stay valid until the evidence is done.
   void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
                      const std::vector<SeenVoxels*>& seen, const std::vector<BlockSeam*>& seams);
 
@@ -31,6 +31,7 @@ class alignas(kThreadsApart) SumSink {
   BlockSums& open(std::size_t i) {
     // Prefetch planes while the sums of the blocks before are computed.
     constexpr std::size_t kAhead = 2;
+    if (i + 2 * kAhead < targets_->size()) __builtin_prefetch((*targets_)[i + 2 * kAhead]);
     if (i + kAhead < targets_->size()) (*targets_)[i + kAhead]->prefetch();
     current_ = i;
     sums_.clear();
@@ -42,6 +43,9 @@ class alignas(kThreadsApart) SumSink {
   const SumCounts& counts() const { return counts_; }  ///< since reserve()
 
  private:
+  /// @return the voxels whose evidence for `free` reaches its limit.
+  VoxelMask applyRulesToFree(std::size_t slot);
+
   const SumKernels* kernels_ = &sumKernelsFor("");
   UpdateRules rules_;
   bool withdraws_ = false;
@@ -52,8 +56,9 @@ class alignas(kThreadsApart) SumSink {
   const std::vector<BlockSeam*>* seams_ = nullptr;
   std::size_t current_ = 0;
   BlockSums sums_;
-  std::array<VoxelMask, kGroupBlocks> protected_;  ///< voxels that take no evidence for `free`, by slot
-  std::array<VoxelMask, kGroupBlocks> hit_;        ///< voxels to which hits add evidence, by slot
+  std::array<VoxelMask, kGroupBlocks> protected_;        ///< voxels that take no evidence for `free`, by slot
+  std::array<VoxelMask, kGroupBlocks> hit_;              ///< voxels to which hits add evidence, by slot
+  std::array<std::uint64_t, kGroupBlocks> reached_top_;  ///< as in BlockSeam, by slot
   SumCounts counts_;
 };
 

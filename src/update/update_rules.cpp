@@ -46,6 +46,15 @@ void clear(std::uint64_t voxels, float* values) {
   for (; voxels != 0; voxels &= voxels - 1) values[__builtin_ctzll(voxels)] = 0.0f;
 }
 
+/// Notes what the threshold takes from the bottom layer of a block, unless the voxels below are crossed.
+void holdBack(const UpdateRules& rules, const SumKernels& kernels, const float* sums, BlockSeam& seam) {
+  std::uint64_t some = 0, all = 0;
+  kernels.find(sums, {0, 1}, std::numeric_limits<float>::min(), &some);
+  kernels.find(sums, {0, 1}, rules.free_threshold + rules.most_free, &all);
+  seam.held_back = some & ~all;
+  if (seam.held_back != 0) std::copy_n(sums, kBlockEdge * kBlockEdge, seam.sums);
+}
+
 }  // namespace
 
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
@@ -60,7 +69,7 @@ void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums&
 }
 
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
-                      BlockSums& free, BlockSeam* seam) {
+                      std::uint64_t below, BlockSums& free, BlockSeam* seam) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
   const bool limits = rules.free_threshold > 0.0f || std::isfinite(rules.most_free) || rules.seeksVoids();
   const LayerBits cleared = bitsOf(is_protected);
@@ -70,16 +79,9 @@ VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const
       clear(cleared[static_cast<std::size_t>(layer)], plane.values + layer * kLayer);
     }
     if (!limits) continue;
-    if (rules.asksBelow()) {
-      std::copy_n(plane.values, kLayer, seam->sums);
-      LayerBits some = {}, all = {};
-      kernels.find(plane.values, {0, 1}, std::numeric_limits<float>::min(), some.data());
-      kernels.find(plane.values, {0, 1}, rules.free_threshold + rules.most_free, all.data());
-      seam->held_back = some[0] & ~all[0];
-    }
-    kernels.limit(rules.free_threshold, rules.most_free, plane.values, reached.data());
+    if (seam) holdBack(rules, kernels, plane.values, *seam);
+    kernels.limit(rules.free_threshold, rules.most_free, below, plane.values, reached.data());
   }
-  if (rules.asksBelow()) seam->reached_top = reached[kBlockEdge - 1];
   return maskOf(reached);
 }
 

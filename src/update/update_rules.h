@@ -31,7 +31,8 @@ struct UpdateRules {
   bool seeksVoids() const { return void_evidence > 0.0f; }
 };
 
-/// Evidence for `free` at the top and bottom of a block, where the threshold depends on the block below.
+/// Evidence for `free` at the top and bottom of a block, where the threshold depends on a block of another
+/// group.
 struct BlockSeam {
   std::uint64_t reached_top = 0;  ///< voxels of the top layer whose evidence reaches most_free
   std::uint64_t held_back = 0;    ///< voxels of the bottom layer from which the threshold may have taken some
@@ -43,11 +44,12 @@ struct BlockSeam {
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected);
 
-/// Applies the rules to the free space of one block. @return the voxels whose evidence reaches most_free,
-/// whether or not it exceeds the threshold, if voids are sought. @param[out] seam what the threshold needs
-/// from this block, and leaves open in it, if it asks the block below.
+/// Applies the rules to the free space of one block. @param below the 64 voxels below the block whose
+/// evidence reaches most_free. @param[out] seam for a block above another group, whose voxels are not known
+/// yet: what the threshold has taken; nullptr for others. @return the block's voxels whose evidence reaches
+/// most_free, whether or not it exceeds the threshold, if voids are sought or the threshold needs them.
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
-                      BlockSums& free, BlockSeam* seam);
+                      std::uint64_t below, BlockSums& free, BlockSeam* seam);
 
 /// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
 EvidenceUnits roundedUnits(float sum);

@@ -40,27 +40,18 @@ GridIndex neighbour(GridIndex group, std::size_t axis, int step) {
 
 }  // namespace
 
-void VoidSearch::findBlocksBeside(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group,
-                                  ThreadPool& pool) {
-  const auto slotOf = [&](std::uint32_t b) { return slotInGroup({blocks.members()[b]}); };
-  pool.forEach(positions_.size(), [&](std::size_t g, std::size_t) {
-    positions_[g].fill(kNoPosition);
-    for (const std::uint32_t* b = by_group.begin(g); b != by_group.end(g); ++b) {
-      positions_[g][static_cast<std::size_t>(slotOf(*b))] = *b;
-    }
-  });
-  pool.forEach(positions_.size(), [&](std::size_t g, std::size_t) {
+void VoidSearch::findBlocksBeside(const BlocksByGroup& blocks, ThreadPool& pool) {
+  pool.forEach(blocks.groups().size(), [&](std::size_t g, std::size_t) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (const int step : {-1, 1}) {
-        const std::uint32_t next =
-            by_group.indices().find(neighbour(by_group.indices().members()[g], axis, step));
-        for (const std::uint32_t* b = by_group.begin(g); b != by_group.end(g); ++b) {
-          const int slot = slotOf(*b), at = slot / kStride[axis] % kGroupEdge + step;
+        const std::uint32_t next = blocks.groups().find(neighbour(blocks.groups().members()[g], axis, step));
+        for (std::uint64_t left = blocks.slots(g); left != 0; left &= left - 1) {
+          const int slot = __builtin_ctzll(left), at = slot / kStride[axis] % kGroupEdge + step;
           const bool same = at >= 0 && at < kGroupEdge;
           const int there = slot + (same ? step : -step * (kGroupEdge - 1)) * kStride[axis];
           const std::size_t group = same ? g : next;
-          beside_[*b][axis][step > 0] =
-              group == kNoPosition ? kNoPosition : positions_[group][static_cast<std::size_t>(there)];
+          beside_[blocks.at(g, slot)][axis][step > 0] =
+              group == kNoPosition ? kNoPosition : blocks.at(group, there);
         }
       }
     }
@@ -76,9 +67,8 @@ VoxelMask VoidSearch::betweenIn(std::size_t b, std::size_t axis, const MaskOfBlo
   return maskOf(between(axis, bits(previous), bitsOf(maskOfBlock(b)), bits(next)));
 }
 
-void VoidSearch::find(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group,
-                      ThreadPool& pool) {
-  findBlocksBeside(blocks, by_group, pool);
+void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
+  findBlocksBeside(blocks, pool);
   const Chunks chunks(seen_.size());
   const auto forEachBlock = [&](const auto& job) {
     pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
@@ -88,7 +78,7 @@ void VoidSearch::find(const IndexNumbering& blocks, const RunsByIndex<std::uint3
   forEachBlock([&](std::size_t b) {
     const SeenVoxels& seen = seen_[b];
     empty_[b] = seen.crossed;
-    if (seen.crossed.none()) return;
+    if (seen.crossed.none() || seen.crossed.all()) return;
     empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
                  ~(seen.fixed | seen.moving);
   });

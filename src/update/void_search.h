@@ -5,10 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "parallel/runs_by_index.h"
 #include "parallel/thread_pool.h"
-#include "update/block_group.h"
 #include "update/block_sums.h"
+#include "update/blocks_by_group.h"
 
 namespace bki_mapping {
 
@@ -24,36 +23,29 @@ struct SeenVoxels {
 /// evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:
-  /// Forgets the last scan, and takes all memory for this one. @param blocks, groups numbers of those that it
-  /// touches.
-  void start(std::size_t blocks, std::size_t groups) {
+  /// Forgets the last scan, and takes all memory for this one. @param blocks number of those that it touches.
+  void start(std::size_t blocks) {
     seen_.assign(blocks, {});
     beside_.resize(blocks);
-    positions_.resize(groups);
     for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &along_y_, &voids_}) masks->resize(blocks);
   }
   /// What the scan says of a block; different threads may write to different blocks.
   SeenVoxels& at(std::size_t block) { return seen_[block]; }
-  /// Computes the void voxels. @param blocks with positions as in at(). @param by_group those positions.
-  void find(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group, ThreadPool& pool);
+  /// Computes the void voxels. @param blocks all of them, sorted; their order is that of at().
+  void find(const BlocksByGroup& blocks, ThreadPool& pool);
   /// The void voxels of a block, after find().
   const VoxelMask& voidsOf(std::size_t block) const { return voids_[block]; }
 
  private:
   /// Positions of the blocks across the faces of a block: before and after it along each axis.
   using Beside = std::array<std::array<std::uint32_t, 2>, 3>;
-  /// Positions of the blocks of a group, by slot.
-  using Positions = std::array<std::uint32_t, kGroupBlocks>;
-
   /// Sets beside_. It looks up groups, not blocks, in hash tables.
-  void findBlocksBeside(const IndexNumbering& blocks, const RunsByIndex<std::uint32_t>& by_group,
-                        ThreadPool& pool);
+  void findBlocksBeside(const BlocksByGroup& blocks, ThreadPool& pool);
   /// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
   template <typename MaskOfBlock>
   VoxelMask betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const;
 
   std::vector<SeenVoxels> seen_;
-  std::vector<Positions> positions_;  ///< by group
   std::vector<Beside> beside_;
   std::vector<VoxelMask> empty_;              ///< crossed or bridged
   std::vector<VoxelMask> along_x_, along_y_;  ///< seen, with both neighbours along an axis

@@ -105,6 +105,57 @@ TEST(SumKernels, TakeBackWhatTheyAdded) {
   }
 }
 
+TEST(SumKernels, ChangeChosenVoxelsAsAPlainLoopDoes) {
+  std::mt19937 random(3);
+  const EvidenceUnits edges[] = {0, 1, -1, 70, kMostUnits, -kMostUnits, kMostUnits - 1, 1 - kMostUnits};
+  std::size_t saturated = 0, negative = 0;
+  for (int n = 0; n < 300; ++n) {
+    std::uint64_t voxels[kBlockEdge];
+    for (std::uint64_t& layer : voxels) {
+      layer = random() % 3 == 0   ? 0
+              : random() % 2 == 0 ? ~std::uint64_t{0}
+                                  : random() * std::uint64_t{random()};
+    }
+    std::vector<EvidenceUnits> before(kBlockVoxels), units(kLayer);
+    for (EvidenceUnits& each : before) {
+      each = n % 2 == 0 ? edges[random() % std::size(edges)] : static_cast<EvidenceUnits>(random() % 9);
+    }
+    for (EvidenceUnits& each : units)
+      each = n % 50 == 0 ? kMostUnits : static_cast<EvidenceUnits>(random() % 70);
+    const int layers = 1 + n % kBlockEdge;
+    for (const bool withdraws : {false, true}) {
+      std::vector<EvidenceUnits> expected = before;
+      SumCounts counts;
+      bool any = false;
+      for (int v = 0; v < layers * kLayer; ++v) {
+        if ((voxels[v / kLayer] >> v % kLayer & 1) == 0) continue;
+        const auto at = static_cast<std::size_t>(v);
+        const EvidenceUnits change = units[at % kLayer];
+        const std::int64_t sum = std::int64_t{before[at]} + (withdraws ? -change : change), most = kMostUnits;
+        counts.saturated += sum > most && before[at] < most;
+        counts.negative += withdraws && before[at] >= 0 && sum < 0;
+        expected[at] = static_cast<EvidenceUnits>(std::clamp(sum, -most, most));
+        any |= expected[at] != 0;
+      }
+      for (const std::string& set : instructionSets()) {
+        const SumKernels& kernels = sumKernelsFor(set);
+        const auto change = withdraws ? kernels.withdraw_units : kernels.add_units;
+        std::vector<EvidenceUnits> plane = before;
+        SumCounts got;
+        EXPECT_EQ(change(voxels, layers, units.data(), plane.data(), got), any) << set;
+        ASSERT_EQ(plane, expected) << set << ", case " << n << (withdraws ? ", taken back" : "");
+        EXPECT_EQ(got.saturated, counts.saturated) << set;
+        EXPECT_EQ(got.negative, counts.negative) << set;
+        EXPECT_EQ(got.not_finite, 0u) << set;
+      }
+      saturated += counts.saturated;
+      negative += counts.negative;
+    }
+  }
+  EXPECT_GT(saturated, 0u);
+  EXPECT_GT(negative, 0u);
+}
+
 TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
   std::mt19937 random(11);
   const float nan = std::numeric_limits<float>::quiet_NaN(), tiny = std::numeric_limits<float>::denorm_min();
@@ -112,6 +163,7 @@ TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
   for (int n = 0; n < 200; ++n) {
     std::vector<float> sums;
     for (int v = 0; v < kBlockVoxels; ++v) sums.push_back(some[random() % std::size(some)]);
+    const std::uint64_t below = std::uint64_t{random()} << 32 | random();
     const float threshold = n % 3 == 0 ? 0.0f : 0.0005f, most = n % 5 == 0 ? kInfinity : 0.0015f;
     std::vector<float> limited;
     std::uint64_t reached[kBlockEdge] = {}, found[kBlockEdge] = {};
@@ -120,7 +172,9 @@ TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
     for (int v = 0; v < kBlockVoxels; ++v) {
       const float sum = sums[static_cast<std::size_t>(v)];
       float kept = sum - threshold < 0.0f ? 0.0f : sum - threshold;
-      if (v >= kLayer && sums[static_cast<std::size_t>(v - kLayer)] >= most) kept = sum;
+      const bool above_reached =
+          v >= kLayer ? sums[static_cast<std::size_t>(v - kLayer)] >= most : (below >> v & 1) != 0;
+      if (above_reached) kept = sum;
       if (kept > most) kept = most;
       limited.push_back(kept);
       const std::uint64_t bit = std::uint64_t{1} << v % kLayer;
@@ -132,7 +186,7 @@ TEST(SumKernels, LimitAndFindAsAPlainLoopDoes) {
       std::uint64_t got_found[kBlockEdge] = {}, got_reached[kBlockEdge] = {};
       kernels.find(sums.data(), {first, last}, least, got_found);
       std::vector<float> got = sums;
-      kernels.limit(threshold, most, got.data(), got_reached);
+      kernels.limit(threshold, most, below, got.data(), got_reached);
       for (std::size_t v = 0; v < kBlockVoxels; ++v) {
         ASSERT_TRUE(got[v] == limited[v] || (std::isnan(got[v]) && std::isnan(limited[v])))
             << set << ' ' << v;

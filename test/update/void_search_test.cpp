@@ -33,16 +33,18 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
   VoidSearch search;  // keeps its memory, but nothing of the scan before
   for (const unsigned unseen_of_thousand : {0u, 5u, 30u, 200u}) {
     for (const std::size_t threads : {1, 3}) {
-      IndexNumbering blocks;
+      IndexNumbering added;
       for (int i = 0; i < 40; ++i) {
         const auto coordinate = [&] { return static_cast<std::int32_t>(random() % 4) - 2; };
-        blocks.insert({coordinate(), coordinate(), coordinate()});
+        added.insert({coordinate(), coordinate(), coordinate()});
       }
-      RunsByIndex<std::uint32_t> by_group;  // the blocks lie in up to eight groups
-      by_group.clear();
-      for (std::uint32_t b = 0; b < blocks.size(); ++b) by_group.add(groupOf({blocks.members()[b]}), b);
+      BlocksByGroup by_group;  // up to eight groups
+      for (std::uint32_t b = 0; b < added.size(); ++b) by_group.add({added.members()[b]}, b);
       by_group.sort();
-      search.start(blocks.size(), by_group.indices().size());
+      IndexNumbering blocks;  // in the order of their groups
+      for (const std::uint32_t b : by_group.numbers()) blocks.insert(added.members()[b]);
+      ASSERT_EQ(blocks.size(), added.size());
+      search.start(blocks.size());
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         if (b % 7 == 3) continue;  // neither crossed nor hit
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
@@ -52,7 +54,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         }
       }
       ThreadPool pool(static_cast<int>(threads));
-      search.find(blocks, by_group, pool);
+      search.find(by_group, pool);
       std::size_t count = 0, bridged = 0;
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         for (int v = 0; v < kBlockVoxels; ++v) {
