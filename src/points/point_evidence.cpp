@@ -73,7 +73,7 @@ void PointEvidence::sumClass(ClassId label, const PointRun* runs, std::size_t co
   }
   std::fill_n(plane.values, kBlockVoxels, 0.0f);
   constexpr int kLayer = kBlockEdge * kBlockEdge;
-  plane.layers = {kBlockEdge, 0};
+  plane.layers = {kBlockEdge, 0};  // runs are not empty
   for (const PointRun* run = runs; run != runs + count; ++run) {
     for (std::size_t i = 0; i < run->count; ++i) {
       const int voxel = run->points[i].voxel, layer = voxel / kLayer;

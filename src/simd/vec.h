@@ -18,7 +18,7 @@
 /// - Abs(v), Sqrt(v): lane by lane. MinAbs(a, b): Min(Abs(a), Abs(b)).
 /// - IfThenElse(m, a, b): a where the mask is set, else b.
 /// - AnyTrue(m): whether any lane of the mask is set. BitsFromMask(m): bit n is lane n. MaskFromBits(b): the
-///   opposite; further bits are ignored.
+///   inverse; higher bits are ignored.
 /// - TableLookupLanes(v, i): lane n is v[i[n]].
 /// - TableLookup(t, i): lane n is element i[n] of a table: Table8, eight numbers in memory, or Table32, 32
 ///   floats in two registers, of i[n] modulo 32. The latter only where kHasTable32.

@@ -18,7 +18,7 @@ class BlocksByGroup {
     members_.clear();
     numbers_.clear();
   }
-  /// Adds a block. @param number of the block, e.g. its position in a list; each block has another.
+  /// Adds a block. @param number of the block, e.g. its position in a list; unique.
   void add(const BlockIndex& block, std::uint32_t number) {
     const std::uint32_t group = groups_.insert(groupOf(block));
     if (group == members_.size()) members_.emplace_back();
@@ -27,7 +27,7 @@ class BlocksByGroup {
     members_[group].at[static_cast<std::size_t>(slot)] = number;
   }
   /// Call after the last add(). Numbers the blocks 0, 1, 2, ... in the order of their groups, and within a
-  /// group by rising slots, so that each comes after the block below it.
+  /// group by rising slots, so that each comes after the block below it in the group.
   void sort() {
     for (Members& members : members_) {
       members.begin = numbers_.size();

@@ -49,8 +49,9 @@ class Evidence : public BlockTask {
   /// touchedBlocks().
   virtual void markClasses(std::size_t position, ClassSet& classes) const = 0;
 
-  /// Hands the sums of each block to the sink, in the order of `blocks`. Called once for each group that has
-  /// touched blocks, and from several threads at once for different groups.
+  /// Hands the sums of each block to the sink, in the order of `blocks`, in which each block comes after the
+  /// one below it: rules depend on that. Called once for each group that has touched blocks, and from several
+  /// threads at once for different groups.
   /// @param group the same blocks as bits. @param worker below the number given to reserve().
   virtual void accumulate(const BlockGroup& group, const std::vector<GroupBlock>& blocks, std::size_t worker,
                           SumSink& sink) = 0;

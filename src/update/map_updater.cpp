@@ -8,7 +8,8 @@
 namespace bki_mapping {
 namespace {
 
-/// How far ahead blocks are prefetched [jobs]; long enough to hide the latency of memory.
+/// How far ahead blocks are prefetched [jobs], and half as far their planes; long enough to hide the latency
+/// of memory.
 constexpr std::size_t kAhead = 4;
 
 }  // namespace
@@ -133,9 +134,13 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     worker.later = {};
   }
   if (rules.asksBelow()) {
-    seam_sums_.resize(jobs_.size());
-    seams_.clear();
-    for (auto& sums : seam_sums_) seams_.push_back({0, 0, sums.data()});
+    const auto isBottom = [](const BlockJob& job) { return slotInGroup(job.index) < kSlotsOfLayer; };
+    seams_.assign(jobs_.size(), {});
+    seam_sums_.resize(static_cast<std::size_t>(std::count_if(jobs_.begin(), jobs_.end(), isBottom)));
+    auto sums = seam_sums_.begin();
+    for (std::size_t j = 0; j < jobs_.size(); ++j) {
+      if (isBottom(jobs_[j])) seams_[j].sums = (sums++)->data();
+    }
   }
   if (rules.seeksVoids()) voids_.start(jobs_.size());
 }

@@ -57,7 +57,7 @@ class MapUpdater {
     BlockIndex index;
     Block* block;
     std::shared_ptr<Block> copy;  ///< to be written to instead of a block that a snapshot shares
-    std::uint32_t number;         ///< of the job when it was collected
+    std::uint32_t number;         ///< position in touched()
     bool is_new, is_shared;
     std::size_t bytes_before;  ///< memory of the block; 0 if it is new
     // Set after adding:
@@ -114,7 +114,7 @@ class MapUpdater {
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
   void addGroup(const Group& group, std::size_t worker);
-  /// Adds to the bottom layers of a group what the threshold has taken above crossed voxels, or withdraws it.
+  /// Adds to the bottom layer of a group what the threshold has taken above crossed voxels, or withdraws it.
   void addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws, std::size_t worker);
   /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
   void addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker);
@@ -124,9 +124,9 @@ class MapUpdater {
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to);
 
   const SumKernels& kernels_ = sumKernelsFor("");
-  IndexNumbering touched_;      ///< blocks, in the order in which jobs were collected
-  std::vector<BlockJob> jobs_;  ///< as collected, then in the order of by_group_
-  std::vector<BlockJob> sorted_;
+  IndexNumbering touched_;        ///< blocks, in the order in which jobs were collected
+  std::vector<BlockJob> jobs_;    ///< as collected, then in the order of by_group_
+  std::vector<BlockJob> sorted_;  ///< memory for sorting them
   BlocksByGroup by_group_;
   std::vector<Group> groups_;   ///< by falling cost
   std::vector<Task> tasks_;     ///< in the order of execution
@@ -136,7 +136,7 @@ class MapUpdater {
   bool seeks_voids_ = false, asks_below_ = false;
   VoidSearch voids_;
   std::vector<BlockSeam> seams_;                                       ///< of the jobs
-  std::vector<std::array<float, kBlockEdge * kBlockEdge>> seam_sums_;  ///< theirs
+  std::vector<std::array<float, kBlockEdge * kBlockEdge>> seam_sums_;  ///< of those at the bottom of a group
 };
 
 }  // namespace bki_mapping

@@ -28,22 +28,22 @@ struct SumCounts {
 struct SumKernels {
   const char* instruction_set;
   /// Rounds sums to the nearest unit, halves up, and adds them to a plane, or subtracts them. Evidence
-  /// saturates at kMostUnits and -kMostUnits.
+  /// saturates at kMostUnits and -kMostUnits, and counts each time it does.
   /// @param sums 512 of them, >= 0. @param layers those that may hold sums other than 0.
   /// @param[in,out] counts increased. @return whether any evidence in those layers is not 0.
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   bool (*withdraw)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   /// Adds units to some voxels of the layers of a plane, or subtracts them; saturates likewise.
   /// @param voxels, layers a word for each of so many layers, as LayerBits. @param units 64 of them, >= 0,
-  /// which are those of each layer. @param[in,out] counts increased; what was saturated or negative before
-  /// does not count again. @return whether any evidence in those voxels is not 0.
+  /// the same for each layer. @param[in,out] counts increased; what was saturated or negative before does not
+  /// count again, nor does saturation at -kMostUnits. @return whether any evidence in those voxels is not 0.
   bool (*add_units)(const std::uint64_t* voxels, int layers, const EvidenceUnits* units, EvidenceUnits* plane,
                     SumCounts& counts);
   bool (*withdraw_units)(const std::uint64_t* voxels, int layers, const EvidenceUnits* units,
                          EvidenceUnits* plane, SumCounts& counts);
   /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. The threshold does not apply
   /// to voxels above others whose sums were at least `most` before. What is not a number remains.
-  /// @param below those others of the 64 voxels below the block. @param[in,out] sums 512 of them.
+  /// @param below which of the 64 voxels below the block reached `most`. @param[in,out] sums 512 of them.
   /// @param[in,out] reached adds the voxels whose sums were at least `most` before, as LayerBits.
   void (*limit)(float threshold, float most, std::uint64_t below, float* sums, std::uint64_t* reached);
   /// Finds sums of at least `least`. @param sums 512 of them. @param layers those that may hold sums other

@@ -21,9 +21,9 @@ class alignas(kThreadsApart) SumSink {
   /// Call before each group.
   void startGroup();
   enum class Kind { kHits, kFree };
-  /// Call before each piece of evidence. @param slots of its blocks in the group. @param targets those blocks
-  /// in the same order, by rising slots. @param seen, seams what the scan says of those blocks, to be noted
-  /// if rules ask for it. All must stay valid until the evidence is done.
+  /// Call before each piece of evidence. @param slots of its blocks in the group, rising. @param targets
+  /// those blocks in the same order. @param seen, seams what the scan says of those blocks, to be noted if
+  /// rules ask for it. All must stay valid until the evidence is done.
   void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
                      const std::vector<SeenVoxels*>& seen, const std::vector<BlockSeam*>& seams);
 
@@ -43,7 +43,8 @@ class alignas(kThreadsApart) SumSink {
   const SumCounts& counts() const { return counts_; }  ///< since reserve()
 
  private:
-  /// @return the voxels whose evidence for `free` reaches its limit.
+  /// Also fills the seam of the block, and reached_top_. @return the voxels whose evidence for `free` reaches
+  /// its limit.
   VoxelMask applyRulesToFree(std::size_t slot);
 
   const SumKernels* kernels_ = &sumKernelsFor("");

@@ -8,6 +8,8 @@
 namespace bki_mapping {
 namespace {
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
 void limitHits(float most, BlockSums& hits) {
   if (hits.begin() == hits.end()) return;
   constexpr int kLayer = kBlockEdge * kBlockEdge;
@@ -50,7 +52,9 @@ void clear(std::uint64_t voxels, float* values) {
 void holdBack(const UpdateRules& rules, const SumKernels& kernels, const float* sums, BlockSeam& seam) {
   std::uint64_t some = 0, all = 0;
   kernels.find(sums, {0, 1}, std::numeric_limits<float>::min(), &some);
-  kernels.find(sums, {0, 1}, rules.free_threshold + rules.most_free, &all);
+  // The next float, in case that the sum was rounded down: then nothing is missing from what is in `all`.
+  const float enough = std::nextafter(rules.free_threshold + rules.most_free, kInfinity);
+  kernels.find(sums, {0, 1}, enough, &all);
   seam.held_back = some & ~all;
   if (seam.held_back != 0) std::copy_n(sums, kBlockEdge * kBlockEdge, seam.sums);
 }

@@ -44,10 +44,10 @@ struct BlockSeam {
 void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected);
 
-/// Applies the rules to the free space of one block. @param below the 64 voxels below the block whose
-/// evidence reaches most_free. @param[out] seam for a block above another group, whose voxels are not known
-/// yet: what the threshold has taken; nullptr for others. @return the block's voxels whose evidence reaches
-/// most_free, whether or not it exceeds the threshold, if voids are sought or the threshold needs them.
+/// Applies the rules to the free space of one block. @param below which of the 64 voxels below the block
+/// reached most_free. @param[out] seam for a block above another group, whose voxels are not known yet: what
+/// the threshold has taken; nullptr for others. @return the block's voxels whose evidence reaches most_free,
+/// whether or not it exceeds the threshold, if voids are sought or the threshold needs them.
 VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
                       std::uint64_t below, BlockSums& free, BlockSeam* seam);
 

@@ -31,7 +31,7 @@ LayerBits between(std::size_t axis, const LayerBits& previous, const LayerBits& 
 }
 
 /// From slot to slot of a group along each axis.
-constexpr int kStride[3] = {1, kGroupEdge, kGroupEdge* kGroupEdge};
+constexpr int kStride[3] = {1, kGroupEdge, kSlotsOfLayer};
 
 GridIndex neighbour(GridIndex group, std::size_t axis, int step) {
   (axis == 0 ? group.x : axis == 1 ? group.y : group.z) += step;

@@ -1,4 +1,5 @@
-// Sums are limited, searched, rounded, added and taken back as a plain loop would, on every instruction set.
+// Sums are limited, searched, rounded, added and taken back, and units of chosen voxels changed, as a plain
+// loop would, on every instruction set.
 #include <gtest/gtest.h>
 
 #include <algorithm>

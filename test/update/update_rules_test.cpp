@@ -1,0 +1,109 @@
+// What the threshold takes from the bottom layer of a block and what is given back there later make, to the
+// bit, what a block gets at once that knows the voxels below it. And blocks come in the order that this
+// needs.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "update/blocks_by_group.h"
+#include "update/update_rules.h"
+
+namespace bki_mapping {
+namespace {
+
+constexpr int kVoxelsOfLayer = kBlockEdge * kBlockEdge;
+
+/// The units that a block gets from sums.
+std::vector<EvidenceUnits> unitsAfter(const UpdateRules& rules, const std::vector<float>& sums,
+                                      const VoxelMask& is_protected, std::uint64_t below, BlockSeam* seam) {
+  BlockSums free;
+  free.reserve(1);
+  BlockSums::Plane& plane = free.open(kFreeClass);
+  std::copy(sums.begin(), sums.end(), plane.values);
+  const SumKernels& kernels = sumKernelsFor("");
+  applyToFree(rules, kernels, is_protected, below, free, seam);
+  std::vector<EvidenceUnits> units(kBlockVoxels, 0);
+  SumCounts counts;
+  kernels.add(plane.values, {}, units.data(), counts);
+  return units;
+}
+
+TEST(UpdateRules, GiveBackWhatTheThresholdHasTakenAboveCrossedVoxels) {
+  std::mt19937 random(7);
+  std::size_t held_back = 0, given_back = 0;
+  for (int n = 0; n < 400; ++n) {
+    UpdateRules rules;
+    const float scale = std::exp2(static_cast<float>(n % 17 - 8));
+    rules.free_threshold = scale * std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
+    rules.most_free = scale * std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
+    const float both = rules.free_threshold + rules.most_free;
+    const float special[] = {0.0f,       rules.free_threshold,       rules.most_free,
+                             both,       std::nextafter(both, 0.0f), std::nextafter(both, 2.0f * both),
+                             2.0f * both};
+    std::vector<float> sums;
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      sums.push_back(v % 2 == 0 ? special[random() % std::size(special)]
+                                : scale * std::uniform_real_distribution<float>(0.0f, 2.5f)(random));
+    }
+    VoxelMask is_protected;
+    for (int i = 0; i < 20; ++i) is_protected.set(random() % kBlockVoxels);
+    const std::uint64_t below = std::uint64_t{random()} << 32 | random();
+    const std::vector<EvidenceUnits> expected = unitsAfter(rules, sums, is_protected, below, nullptr);
+
+    std::vector<float> kept(kVoxelsOfLayer);
+    BlockSeam seam;
+    seam.sums = kept.data();
+    std::vector<EvidenceUnits> units = unitsAfter(rules, sums, is_protected, 0, &seam);
+    for (int v = 0; v < kVoxelsOfLayer; ++v) {
+      if ((seam.held_back & below) >> v & 1) {
+        units[static_cast<std::size_t>(v)] += heldBack(rules, kept[static_cast<std::size_t>(v)]);
+        ++given_back;
+      }
+    }
+    ASSERT_EQ(units, expected) << "case " << n;
+    held_back += static_cast<std::size_t>(__builtin_popcountll(seam.held_back));
+  }
+  EXPECT_GT(given_back, 1000u);
+  EXPECT_GT(held_back, given_back);
+}
+
+TEST(BlocksByGroup, ComesToEachBlockAfterTheOneBelow) {
+  std::mt19937 random(8);
+  BlocksByGroup by_group;
+  for (int round = 0; round < 2; ++round) {  // it keeps its memory, but no blocks
+    IndexNumbering blocks;
+    by_group.clear();
+    for (int i = 0; i < 300; ++i) {
+      const auto coordinate = [&] { return static_cast<std::int32_t>(random() % 9) - 5; };
+      blocks.insert({coordinate(), coordinate(), coordinate()});
+    }
+    for (std::uint32_t b = 0; b < blocks.size(); ++b) by_group.add({blocks.members()[b]}, b);
+    by_group.sort();
+    ASSERT_EQ(by_group.numbers().size(), blocks.size());
+    std::vector<bool> seen(blocks.size(), false);
+    std::size_t next = 0;
+    for (std::size_t g = 0; g < by_group.groups().size(); ++g) {
+      EXPECT_EQ(by_group.begin(g), next) << "the groups follow one another";
+      int before = -1;
+      for (; next < by_group.end(g); ++next) {
+        const std::uint32_t number = by_group.numbers()[next];
+        const BlockIndex block = {blocks.members()[number]};
+        EXPECT_FALSE(seen[number]);
+        seen[number] = true;
+        EXPECT_EQ(groupOf(block), by_group.groups().members()[g]);
+        const int slot = slotInGroup(block);
+        EXPECT_GT(slot, before);
+        EXPECT_EQ(by_group.at(g, slot), next);
+        before = slot;
+      }
+      EXPECT_EQ(__builtin_popcountll(by_group.slots(g)), by_group.end(g) - by_group.begin(g));
+      for (int slot = 0; slot < kGroupBlocks; ++slot) {
+        EXPECT_EQ(by_group.at(g, slot) == kNoPosition, (by_group.slots(g) >> slot & 1) == 0);
+      }
+    }
+    EXPECT_EQ(next, blocks.size());
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping
