@@ -22,8 +22,12 @@ endfunction()
 # Compiles several files as one, which reads their headers once. Not for rooms with vector files, in which the same names stand
 # for other instruction sets, and not for those in which scans are computed: their code is inlined as measured.
 option(BKI_MAPPING_JOIN "Compile several files as one: faster from scratch, slower after a change" OFF)
+option(BKI_MAPPING_JOIN_TESTS "The same for the unit tests of a room, which are then one program" ${BKI_MAPPING_JOIN})
+function(bki_mapping_join_always)
+  set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+endfunction()
 function(bki_mapping_join)
   if(BKI_MAPPING_JOIN)
-    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+    bki_mapping_join_always(${ARGN})
   endif()
 endfunction()
