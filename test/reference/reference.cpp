@@ -214,9 +214,10 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
     for (const Point& point : hits_) {
       const Eigen::Vector3d d = point.p - centre;
       const bool inside = d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
+      const bool near = d.norm() < config_.kernel.lengthFor(config_.resolution);
+      if (!inside && !near) continue;
       for (const SemanticClass& c : classes_) {
-        if (point.shareOf(c.id) == 0.0) continue;
-        hit |= spreads(c) ? d.norm() < config_.kernel.lengthFor(config_.resolution) : inside;
+        if (point.shareOf(c.id) != 0.0) hit |= spreads(c) ? near : inside;
       }
       // With hits_before_misses a block holds a hit even if the hit's kernel reaches no voxel centre.
       hit |= config_.free_space.hits_before_misses && inside;
