@@ -50,7 +50,7 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
     if (grounded && is_above && std::isinf(view.clearance)) {
       view.clearance = static_cast<float>(cell->z * resolution) - view.ground;
     }
-    if (!isGround(*cell) && (within || (from_ground && !grounded))) {
+    if (is_above && !isGround(*cell) && (within || (from_ground && !grounded))) {
       view.occupancy = ColumnView::Occupancy::kOccupied;
     }
   }

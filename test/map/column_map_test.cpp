@@ -88,6 +88,20 @@ TEST_F(Columns, DistinguishFreeUnknownAndObstacles) {
   EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
 }
 
+TEST_F(Columns, WhatLiesBelowTheGroundIsNoObstacle) {
+  add({{0, 0, -5}}, kCar);  // hits on tyres reach below the road
+  EXPECT_EQ(column().occupancy, Occupancy::kOccupied) << "without ground, nothing is below it";
+  add({{0, 0, -4}}, kRoad);
+  for (const HeightReference reference : {HeightReference::kMap, HeightReference::kGround}) {
+    ColumnRules rules;
+    rules.reference = reference;
+    EXPECT_EQ(column(rules).occupancy, Occupancy::kFree);
+    EXPECT_EQ(column(rules).cost, 0);
+  }
+  add({{0, 0, -3}}, kCar);
+  EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
+}
+
 TEST_F(Columns, HeightsCountFromTheMapOrFromTheGround) {
   add({{0, 0, -10}}, kRoad);  // top at -4.5 m
   add({{0, 0, -5}}, kCar);    // centre at -2.25 m, 2.25 m above the ground
