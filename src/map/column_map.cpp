@@ -25,8 +25,9 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
   ColumnView view;
   auto above = std::find_if(cells.begin(), cells.end(), isGround);
   const bool grounded = above != cells.end();
+  const std::int32_t bottom = grounded ? above->z : 0;  // of the ground
   if (grounded) {
-    std::int32_t top = above->z;
+    std::int32_t top = bottom;
     for (; above != cells.end() && isGround(*above) && above->z <= top + 1; ++above) {
       top = above->z;
       view.ground_class = above->label;
@@ -50,7 +51,8 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
     if (grounded && is_above && std::isinf(view.clearance)) {
       view.clearance = static_cast<float>(cell->z * resolution) - view.ground;
     }
-    if (is_above && !isGround(*cell) && (within || (from_ground && !grounded))) {
+    if (grounded && cell->z == bottom - 1) continue;  // hits on what stood there reach as far as this
+    if (!isGround(*cell) && (within || (from_ground && !grounded))) {
       view.occupancy = ColumnView::Occupancy::kOccupied;
     }
   }

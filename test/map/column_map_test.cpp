@@ -88,7 +88,7 @@ TEST_F(Columns, DistinguishFreeUnknownAndObstacles) {
   EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
 }
 
-TEST_F(Columns, WhatLiesBelowTheGroundIsNoObstacle) {
+TEST_F(Columns, TheVoxelRightBelowTheGroundIsNoObstacle) {
   add({{0, 0, -5}}, kCar);  // hits on tyres reach below the road
   EXPECT_EQ(column().occupancy, Occupancy::kOccupied) << "without ground, nothing is below it";
   add({{0, 0, -4}}, kRoad);
@@ -99,6 +99,12 @@ TEST_F(Columns, WhatLiesBelowTheGroundIsNoObstacle) {
     EXPECT_EQ(column(rules).cost, 0);
   }
   add({{0, 0, -3}}, kCar);
+  EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
+}
+
+TEST_F(Columns, WhatStandsUnderADeckIsAnObstacle) {
+  for (int z = 0; z < 6; ++z) add({{0, 0, z}}, kCar);  // a pillar, whose foot no beam reaches
+  add({{0, 0, 6}}, kRoad);
   EXPECT_EQ(column().occupancy, Occupancy::kOccupied);
 }
 

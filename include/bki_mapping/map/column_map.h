@@ -41,10 +41,10 @@ struct ColumnView {
   float clearance = std::numeric_limits<float>::quiet_NaN();
   /// Total height of the occluded voxels above the ground, or, without ground, in the whole column [m].
   float occluded = 0.0f;
-  /// Occupied if there is an obstacle: an occupied voxel within the rules' heights, not below the ground,
-  /// whose class is neither ground nor ignored. Otherwise free if there is ground or a free voxel within the
-  /// heights; otherwise unknown. If heights are measured from the ground, obstacles in columns without ground
-  /// count at any height.
+  /// Occupied if there is an obstacle: an occupied voxel within the rules' heights, but not the one right
+  /// below the ground, whose class is neither ground nor ignored. Otherwise free if there is ground or a free
+  /// voxel within the heights; otherwise unknown. If heights are measured from the ground, obstacles in
+  /// columns without ground count at any height.
   Occupancy occupancy = Occupancy::kUnknown;
   /// The cost of driving here, as nav_msgs/OccupancyGrid counts: if free, SemanticClass::cost of the ground's
   /// class, and 0 without ground; otherwise the value of `occupancy`.
