@@ -1,0 +1,76 @@
+#include "store/map_file_state.h"
+
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "store/tile_rows.h"
+
+namespace bki_mapping {
+
+void MapFile::State::readAll() {
+  std::string table_name;
+  totals = readTotals(database);
+  checkTotals();
+  Totals found;
+  const std::uint32_t map_row = readMapRow(database, info, table_name);
+  found.checksums += map_row;
+  std::vector<SemanticClass> classes = readClasses(database, totals.classes, found.checksums);
+  found.classes = static_cast<std::int64_t>(classes.size());
+  found.drives = static_cast<std::int64_t>(readDrives(database, totals.drives, found.checksums).size());
+  try {
+    info.classes = std::make_shared<const ClassTable>(table_name, std::move(classes));
+    checkInfo(info);
+  } catch (const std::invalid_argument& error) {
+    throw damaged(database.name(), error.what());
+  }
+  readTileList(database, totals.tiles, found);
+  if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
+}
+
+/// Refuses counts that are impossible in a file of this size, because memory is allocated by them.
+void MapFile::State::checkTotals() const {
+  const std::int64_t size = database.fileSize();
+  bool too_many = totals.classes > static_cast<std::int64_t>(kMaxClasses);
+  for (const std::int64_t count :
+       {totals.classes, totals.drives, totals.tiles, totals.blocks, totals.planes}) {
+    too_many |= count < 0 || count > size;
+  }
+  // The lists of blocks and planes are never compressed.
+  if (too_many || 4 * totals.blocks + totals.planes > size) {
+    throw damaged(database.name(), "it claims more content than it has room for");
+  }
+}
+
+TileCodec& MapFile::State::tileCodec() {
+  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes);
+  return *codec_;
+}
+
+void MapFile::State::commit(const Totals& next) {
+  try {
+    database.run("COMMIT");
+    totals = next;
+  } catch (...) {
+    database.rollBack();
+    if (database.mode() == Database::Mode::kNew) throw;
+    attempted_ = next;
+    bool made = false;
+    try {
+      made = settle();
+    } catch (const MapFileError&) {
+    }
+    if (!made) throw;
+  }
+}
+
+bool MapFile::State::settle() {
+  if (!attempted_) return false;
+  const Totals found = readTotals(database);
+  const bool made = found == *attempted_ && !(found == totals);
+  totals = found;
+  attempted_.reset();
+  return made;
+}
+
+}  // namespace bki_mapping
