@@ -10,7 +10,7 @@ def line(extent='mapped', weight='bilinear'):
     return {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
 
 
-# Steps from plain lines towards the preset `robot`.
+# Steps from plain lines to the preset `robot`, in tenfold units of evidence.
 STEPS = {
     '+ hits before misses': {'free_space/hits_before_misses': 'true'},
     '+ free_gain/static 0.1': {'free_gain/static': 0.1},
@@ -22,8 +22,11 @@ STEPS = {
     '+ scan_limit/void 24': {'scan_limit/void': 24, 'kernel/scale': 20, 'free_gain/static': 0.0005},
     '+ free_gain/remaining 0.1': {'free_gain/remaining': 0.1},
     '+ scan_limit/free_threshold 0.6': {'scan_limit/free_threshold': 0.6},
-    '+ free_gain/neighbourhood 1.75': {'free_gain/neighbourhood': 1.75},
+    '+ free_gain/neighbourhood 1.25': {'free_gain/neighbourhood': 1.25},
     '+ kernel/static_spread false': {'kernel/static_spread': 'false'},
+    '+ limits and gains of robot': {
+        'kernel/scale': 3, 'scan_limit/free': 0.015, 'scan_limit/free_threshold': 0.09, 'scan_limit/void': 6,
+        'free_gain/dynamic': 3000, 'free_gain/living': 60000, 'free_gain/persistence': 0.4},
 }
 
 

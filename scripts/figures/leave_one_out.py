@@ -12,7 +12,7 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-GAINS = {'persistence': (0.03, 0.04), 'dynamic': (100, 200), 'neighbourhood': (1.75, 2, 2.25, 2.5)}  # for robot
+GAINS = {'persistence': (0.03, 0.04), 'dynamic': (200, 1000, 3000), 'neighbourhood': (1.25, 1.5, 1.75, 2)}  # for robot
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
