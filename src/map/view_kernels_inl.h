@@ -2,7 +2,7 @@
 /// the same for one voxel, in double precision.
 #pragma once
 
-#include "map/calibration.h"
+#include "map/occupancy_constants.h"
 #include "map/vec_log_inl.h"
 #include "map/view_kernels.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "map/calibration.h"
 #include "map/neighbourhood.h"
+#include "map/occupancy_constants.h"
 #include "map/view_kernels.h"
 
 namespace bki_mapping {
