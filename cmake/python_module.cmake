@@ -16,7 +16,7 @@ else()
 endif()
 
 set(files python/${PROJECT_NAME}/__init__.py python/${PROJECT_NAME}/__init__.pyi python/${PROJECT_NAME}/py.typed
-  python/${PROJECT_NAME}/ros.py)
+  python/${PROJECT_NAME}/occupancy_message.py python/${PROJECT_NAME}/ros.py)
 foreach(file ${files})
   get_filename_component(name ${file} NAME)
   configure_file(${file} ${BKI_MAPPING_PYTHON_BUILD}/${name} COPYONLY)

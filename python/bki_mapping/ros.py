@@ -8,40 +8,22 @@
 
 Needs NumPy, but not the C++ library; only subscribe() needs ROS (rospy). docs/ros.md describes the topics.
 """
-import collections
 import operator
-import struct
 import threading
-from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, Optional, Tuple, Union
 
 import numpy as np
 
+from .occupancy_message import BLOCK, EDGE, VALUES, Content, OccupancyClass, content_of, decode
+
 __all__ = ['BLOCK', 'OccupancyClass', 'OccupancyFollower', 'decode']
 
-_EDGE, _VOXELS = 8, 512  # of a block [voxels]
 _UNKNOWN, _FREE_LABEL = 0, 255
 _STATES = {'free': 1, 'occupied': 2, 'occluded': 3}
 _FREE_COLOR, _OCCLUDED_COLOR = (200, 225, 240), (60, 60, 70)  # those of Map.voxels
-_VALUES = ('probability', 'occupancy', 'class_probability')
-
-#: A bki_mapping/OccupancyBlock as it lies in messages; voxels by z, y, x.
-BLOCK = np.dtype([(axis, '<i4') for axis in 'xyz'] + [(name, 'u1', (_EDGE,) * 3) for name in ('state', 'label')] +
-                 [(name, '<f4', (_EDGE,) * 3) for name in _VALUES])
 _VOXEL = np.dtype([(axis, '<f4') for axis in 'xyz'] + [(name, 'u1') for name in ('red', 'green', 'blue')] +
-                  [('label', '<u2'), ('state', 'u1')] + [(name, '<f4') for name in _VALUES])
-_SAID = np.dtype([('state', 'u1'), ('label', 'u1')] + [(name, '<f4') for name in _VALUES])
-
-
-class OccupancyClass(NamedTuple):
-    """A class of the mapper's class table."""
-    id: int
-    name: str
-    color: Tuple[int, int, int]
-    dynamic: bool
-
-
-#: What a message says. sequence: None for the topic occupancy. blocks: of dtype BLOCK. removed: indices of blocks, (N, 3).
-_Content = collections.namedtuple('_Content', 'stamp frame sequence whole resolution block_edge classes blocks removed')
+                  [('label', '<u2'), ('state', 'u1')] + [(name, '<f4') for name in VALUES])
+_SAID = np.dtype([('state', 'u1'), ('label', 'u1')] + [(name, '<f4') for name in VALUES])
 
 
 class OccupancyFollower:
@@ -111,7 +93,7 @@ class OccupancyFollower:
 
         Returns whether the map changed. Raises ValueError if the message is inconsistent; the map is then unchanged.
         """
-        content = message if isinstance(message, _Content) else _content_of(message)
+        content = message if isinstance(message, Content) else content_of(message)
         with self.lock:
             if content.whole:
                 if content.sequence is None and self._in_sync:
@@ -129,7 +111,7 @@ class OccupancyFollower:
             self._changed.notify_all()
             return True
 
-    def _replace(self, content: _Content) -> None:
+    def _replace(self, content: Content) -> None:
         rows = {key: row for row, key in enumerate(_keys_of(content.blocks))}
         if len(rows) < len(content.blocks):
             raise ValueError('the message has a block twice')
@@ -137,7 +119,7 @@ class OccupancyFollower:
         self._frame, self._resolution, self._classes = content.frame, content.resolution, content.classes
         self._store, self._rows, self._finder = np.array(content.blocks), rows, None
 
-    def _change(self, content: _Content) -> None:
+    def _change(self, content: Content) -> None:
         keys = _keys_of(content.blocks)
         count = len(self._rows)
         for key in keys:
@@ -239,10 +221,10 @@ class OccupancyFollower:
             voxels = np.floor(points / self._resolution)
             voxels[np.abs(voxels).max(axis=1) > 2**30] = 2**30  # beyond the grid
             voxels = voxels.astype(np.int64)
-            rows = self._find(voxels // _EDGE)
+            rows = self._find(voxels // EDGE)
             known = rows >= 0
-            place = (rows[known], *(voxels[known] % _EDGE).T[::-1])
-            for name in ('state', 'label', *_VALUES):
+            place = (rows[known], *(voxels[known] % EDGE).T[::-1])
+            for name in ('state', 'label', *VALUES):
                 said[name][known] = self._store[name][place]
         return said
 
@@ -265,8 +247,8 @@ class OccupancyFollower:
             rows = order[rows]
             voxels = np.empty(len(rows), _VOXEL)
             for axis, within in zip('xyz', place[::-1]):
-                voxels[axis] = (_EDGE * self._store[axis][rows].astype(float) + within + 0.5) * (self._resolution or 0.0)
-            for name in ('label', 'state', *_VALUES):
+                voxels[axis] = (EDGE * self._store[axis][rows].astype(float) + within + 0.5) * (self._resolution or 0.0)
+            for name in ('label', 'state', *VALUES):
                 voxels[name] = self._store[name][(rows, *place)]
         for channel, name in enumerate(('red', 'green', 'blue')):
             voxels[name] = np.where(voxels['state'] == _STATES['free'], _FREE_COLOR[channel], colors[voxels['label'], channel])
@@ -351,6 +333,17 @@ class _Subscription:
         self._subscriber.unregister()
 
 
+def _raw(kind: Any) -> Any:
+    """A type that is, for ROS, the given type of message, but keeps only its content."""
+    is_update = 'sequence' in kind.__slots__
+
+    class Raw(kind):
+        def deserialize(self, data):
+            self.content = decode(data, is_update)
+            return self
+    return Raw
+
+
 def _keys_of(blocks: np.ndarray) -> list:
     return list(zip(*(blocks[axis].tolist() for axis in 'xyz')))
 
@@ -363,93 +356,3 @@ def _number(axes: list, indices: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         occur &= known[at] == indices[:, axis]
         numbers = numbers * len(known) + at
     return numbers, occur
-
-
-def _checked(content: _Content) -> _Content:
-    if content.block_edge != _EDGE:
-        raise ValueError(f'the message has blocks of {content.block_edge} voxels along an edge, not of {_EDGE}; use the package of '
-                         'the mapper')
-    if not content.resolution > 0:
-        raise ValueError('the message has a resolution that is not above 0')
-    # The parameter as the user wrote it, which the message rounds to single precision.
-    return content._replace(resolution=float(str(np.float32(content.resolution))))
-
-
-def _content_of(message: Any) -> _Content:
-    """Of a message as ROS makes it, or of anything with the same fields."""
-    blocks = np.zeros(len(message.blocks), BLOCK)
-    for to, block in zip(blocks, message.blocks):
-        to['x'], to['y'], to['z'] = block.x, block.y, block.z
-        for name in ('state', 'label', *_VALUES):
-            values = getattr(block, name)
-            values = np.frombuffer(values, np.uint8) if isinstance(values, (bytes, bytearray)) else np.asarray(values)
-            if values.size != _VOXELS:
-                raise ValueError(f'the message has {values.size} values of {name} for the {_VOXELS} voxels of a block')
-            to[name] = values.reshape(to[name].shape)
-    is_update = hasattr(message, 'sequence')
-    removed = [(block.x, block.y, block.z) for block in message.removed] if is_update else []
-    header = message.header
-    return _checked(_Content(
-        header.stamp.secs * 10**9 + header.stamp.nsecs, header.frame_id, message.sequence if is_update else None,
-        bool(message.whole) if is_update else True, message.resolution, message.block_edge,
-        tuple(OccupancyClass(c.id, c.name, (c.red, c.green, c.blue), bool(c.dynamic)) for c in message.classes),
-        blocks, np.array(removed, np.int32).reshape(-1, 3)))
-
-
-class _Reader:
-    """Reads the values of a serialised message one after the other."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data, self._at = data, 0
-
-    def next(self, layout: str) -> tuple:
-        values = struct.unpack_from('<' + layout, self._data, self._at)
-        self._at += struct.calcsize('<' + layout)
-        return values
-
-    def text(self) -> str:
-        length, = self.next('I')
-        return self.next(f'{length}s')[0].decode(errors='replace')
-
-    def array(self, kind: np.dtype) -> np.ndarray:
-        count, = self.next('I')
-        values = np.frombuffer(self._data, kind, count, self._at)
-        self._at += values.nbytes
-        return values
-
-
-def decode(data: bytes, is_update: bool = True) -> _Content:
-    """Read a serialised bki_mapping/OccupancyUpdate or, with is_update=False, OccupancyMap. This is many times as fast as ROS's own
-    Python code, which makes an object of each number. OccupancyFollower.update takes the result.
-
-    Raises ValueError if the message is cut off or inconsistent.
-    """
-    read = _Reader(data)
-    try:
-        _, seconds, nanoseconds = read.next('III')
-        frame = read.text()
-        sequence, whole = read.next('QB') if is_update else (None, True)
-        resolution, block_edge = read.next('fI')
-        classes = []
-        for _ in range(read.next('I')[0]):
-            id_, = read.next('B')
-            name = read.text()
-            red, green, blue, dynamic = read.next('4B')
-            classes.append(OccupancyClass(id_, name, (red, green, blue), bool(dynamic)))
-        blocks = read.array(BLOCK)
-        removed = read.array(np.dtype(('<i4', 3))) if is_update else np.zeros((0, 3), np.int32)
-    except (struct.error, ValueError):
-        raise ValueError('the message is cut off, or of another type') from None
-    return _checked(_Content(seconds * 10**9 + nanoseconds, frame, sequence, bool(whole), resolution, block_edge, tuple(classes),
-                             blocks, removed.reshape(-1, 3)))
-
-
-def _raw(kind: Any) -> Any:
-    """A type that is, for ROS, the given type of message, but keeps only its content."""
-    is_update = 'sequence' in kind.__slots__
-
-    class Raw(kind):
-        def deserialize(self, data):
-            self.content = decode(data, is_update)
-            return self
-    return Raw
