@@ -5,6 +5,8 @@ from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
+__all__ = ['BLOCK', 'OccupancyClass', 'decode']
+
 EDGE = 8  #: of a block [voxels]
 VALUES = ('probability', 'occupancy', 'class_probability')
 

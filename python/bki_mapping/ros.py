@@ -14,7 +14,7 @@ from typing import Any, Dict, Iterable, Optional, Tuple, Union
 
 import numpy as np
 
-from .occupancy_message import BLOCK, EDGE, VALUES, Content, OccupancyClass, content_of, decode
+from bki_mapping.occupancy_message import BLOCK, EDGE, VALUES, Content, OccupancyClass, content_of, decode
 
 __all__ = ['BLOCK', 'OccupancyClass', 'OccupancyFollower', 'decode']
 

@@ -125,7 +125,6 @@ void RegionFiles::checkTiles(MapFile& file, std::size_t number) const {
   }
 }
 
-/// Checks that a file is as the first one.
 void RegionFiles::checkSame(const MapFile& file) const {
   if (file.info().frame != info_->frame) {
     throw MapFileError(file.path() + " is in frame '" + file.info().frame + "', and " + info_path_ +

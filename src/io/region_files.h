@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/store/map_file.h"
 #include "io/city_index.h"
 
 namespace bki_mapping {
@@ -37,7 +38,7 @@ class RegionFiles {
   std::optional<std::size_t> regionOf(const GridIndex& tile) const;
 
   /// Opens a file, unless it is open, and checks that it is what the index says. The reference is valid until
-  /// the next call.
+  /// another file is opened, which info() and resolution() may do; that of a map file stays valid.
   MapFile& file(std::size_t number);
   /// Of the file that was opened first. If there is none, opens regions until one is sound.
   const MapInfo& info();
@@ -51,6 +52,7 @@ class RegionFiles {
  private:
   MapFile openRegion(std::size_t number) const;
   void checkTiles(MapFile& file, std::size_t number) const;
+  /// Checks that a file has the frame and the grid of that of info().
   void checkSame(const MapFile& file) const;
   void learn(MapFile& file);
 

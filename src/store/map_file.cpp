@@ -1,11 +1,15 @@
 #include "bki_mapping/store/map_file.h"
 
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <utility>
 
+#include "store/database.h"
 #include "store/map_file_state.h"
+#include "store/records.h"
 #include "store/schema.h"
+#include "store/tile_codec.h"
 #include "store/tile_rows.h"
 
 namespace bki_mapping {
@@ -91,13 +95,12 @@ std::optional<TileEntry> MapFile::findTile(const TileKey& key) {
 
 bool MapFile::addTileTo(SemanticMap& map, const TileKey& key) {
   checkSameShape(map, state_->info);
-  TileCodec& codec = state_->tileCodec();
   const auto unpack = [&](const TileEntry& entry, const Statement::Bytes& content) {
-    const std::string fault = codec.unpack(key, entry, content.data, content.size);
-    if (!fault.empty()) throw damaged(path(), nameOf(key) + ": " + fault);
+    const std::string fault = state_->tileCodec().unpack(key, entry, content.data, content.size);
+    if (!fault.empty()) throw damaged(path(), nameOfTile(key) + ": " + fault);
   };
-  if (!readTile(state_->database, key, unpack)) return false;
-  codec.addTo(map, key);
+  if (!readTile(state_->database, key, std::ref(unpack))) return false;
+  state_->tileCodec().addTo(map, key);
   return true;
 }
 

@@ -28,7 +28,6 @@ void MapFile::State::readAll() {
   if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
 }
 
-/// Refuses counts that are impossible in a file of this size, because memory is allocated by them.
 void MapFile::State::checkTotals() const {
   const std::int64_t size = database.fileSize();
   bool too_many = totals.classes > static_cast<std::int64_t>(kMaxClasses);

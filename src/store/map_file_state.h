@@ -18,6 +18,7 @@ struct MapFile::State {
 
   /// Reads and checks everything except the content of the tiles.
   void readAll();
+  /// Made when first asked for.
   TileCodec& tileCodec();
   /// Makes an open transaction durable. @param next the totals of the file then.
   void commit(const Totals& next);
@@ -32,6 +33,7 @@ struct MapFile::State {
   Totals totals;
 
  private:
+  /// Refuses counts that are impossible in a file of this size, because memory is allocated by them.
   void checkTotals() const;
 
   std::optional<Totals> attempted_;  ///< the totals after a commit() that failed, until its outcome is known

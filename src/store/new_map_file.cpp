@@ -1,11 +1,15 @@
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "bki_mapping/store/map_file.h"
 #include "core/atomic_file.h"
+#include "store/database.h"
 #include "store/map_file_state.h"
+#include "store/records.h"
 #include "store/schema.h"
 
 namespace bki_mapping {

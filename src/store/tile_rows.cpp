@@ -108,11 +108,12 @@ std::optional<TileEntry> readTileEntry(Database& database, const TileKey& key) {
   return readEntry(select, database.name());
 }
 
-bool readTile(Database& database, const TileKey& key, const TileReader& use) {
+bool readTile(Database& database, const TileKey& key, const TileVisit& visit) {
   Statement select = database.prepare(kSelectTile);
   bindKey(select, key);
   if (!select.step()) return false;
-  use(readEntry(select, database.name()), select.bytes(6));
+  const TileEntry entry = readEntry(select, database.name());
+  visit(entry, select.bytes(6));
   return true;
 }
 
@@ -137,7 +138,7 @@ void eraseTile(Database& database, const TileKey& key, Totals& totals) {
   addTo(totals, key.part, *entry, -1);
 }
 
-std::string nameOf(const TileKey& key) {
+std::string nameOfTile(const TileKey& key) {
   return "tile (" + std::to_string(key.index.x) + ", " + std::to_string(key.index.y) + ", " +
          std::to_string(key.index.z) + ") of part " + std::to_string(key.part);
 }

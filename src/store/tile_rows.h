@@ -1,6 +1,7 @@
 /// @file The rows of a map file's table of tiles.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -17,7 +18,8 @@ namespace bki_mapping {
 constexpr int kMostTileIndex = (1 << 22) + 1;
 static_assert(GridGeometry::kMaxCoordinate == double{1 << 22} * kTileEdge);
 
-/// Adds all rows to `found`, and checks their order, on which searches rely. Stops after `expected` rows.
+/// Adds all rows to `found`, which has no tiles yet, and checks their order, on which searches rely. Stops
+/// one row after `expected`: then there are too many.
 void readTileList(Database& database, std::int64_t expected, Totals& found);
 /// The parts that have tiles, sorted.
 std::vector<int> readTileParts(Database& database);
@@ -26,10 +28,10 @@ std::vector<TileEntry> readTileRange(Database& database, const GridIndex& low, c
                                      int part);
 std::optional<TileEntry> readTileEntry(Database& database, const TileKey& key);
 
-/// What uses the packed content of a tile, which is valid during the call only.
-using TileReader = std::function<void(const TileEntry&, const Statement::Bytes& content)>;
+/// Called with a tile and its packed content, which is valid during the call only.
+using TileVisit = std::function<void(const TileEntry&, const Statement::Bytes& content)>;
 /// Reads a tile with its content. @return false if there is none.
-bool readTile(Database& database, const TileKey& key, const TileReader& use);
+bool readTile(Database& database, const TileKey& key, const TileVisit& visit);
 
 /// Writes a tile that the table does not have, and adds it to the totals.
 void insertTile(Database& database, const TileKey& key, const TileEntry& entry, const std::string& content,
@@ -38,6 +40,6 @@ void insertTile(Database& database, const TileKey& key, const TileEntry& entry, 
 void eraseTile(Database& database, const TileKey& key, Totals& totals);
 
 /// Names a tile in errors.
-std::string nameOf(const TileKey& key);
+std::string nameOfTile(const TileKey& key);
 
 }  // namespace bki_mapping
