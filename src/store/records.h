@@ -1,4 +1,5 @@
-/// @file The rows of a map file's tables but that of tiles, each described once for writing, reading and checksums.
+/// @file The rows of a map file's tables but that of tiles, each described once for writing, reading and
+/// checksums.
 #pragma once
 
 #include <cstdint>
