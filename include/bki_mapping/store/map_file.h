@@ -140,7 +140,8 @@ class MapFile {
   bool addTileTo(SemanticMap& map, const TileKey& key);
 
   /// A change of the file. commit() makes it durable as a whole; without it, the change is undone. The file
-  /// must outlive the change, and can have only one change at a time.
+  /// must outlive the change, and can have only one change at a time. Do not commit a change one of whose
+  /// functions has thrown: it may lack the tile or drive that was to be replaced.
   class Change {
    public:
     ~Change();
