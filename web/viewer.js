@@ -70,6 +70,7 @@ class Viewer {
     this.orbit = new OrbitCamera(this.canvas, () => this.draw(), (x, y) => this.pickAt(x, y));
     this.mode = 'class';
     this.frames = 0;  // drawn so far
+    this.asked = 0;  // voxels to show or to close so far
     this.times = {};  // [ms]
     this.canvas.addEventListener('webglcontextrestored', () => location.reload());
   }
@@ -347,14 +348,15 @@ class Viewer {
   }
 
   closeVoxel() {
+    ++this.asked;
     byId('voxel').hidden = true;
     this.highlight.visible = false;
     this.draw();
   }
 
   async showVoxel(x, y, z) {
-    const voxel = await describeVoxel(this.map, x, y, z), {header} = this;
-    if (!voxel) return;
+    const asked = ++this.asked, voxel = await describeVoxel(this.map, x, y, z), {header} = this;
+    if (!voxel || asked !== this.asked) return;  // reading takes time, and the user may have asked for another since
     const known = this.map.classes.get(voxel.label), nameOf = (id) => id === kFreeLabel ? 'free' : this.map.classes.get(id).name;
     const colorOf = (id) => id === kFreeLabel ? kFreeColor : this.map.classes.get(id).color;
     const occupied = voxel.state === kOccupied && known, title = occupied ? known.name : kStateNames[voxel.state];

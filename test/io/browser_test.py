@@ -220,6 +220,20 @@ class Browser(unittest.TestCase):
         self.key('Escape', 27)
         self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
 
+    def test_the_last_voxel_asked_for_is_shown(self):
+        far, near = self.voxels[0], self.voxels[-1]
+        # The first takes longer to read than the second.
+        self.js('const read = describeVoxel; let held; describeVoxel = async (...asked) => { const first = !held;'
+                'if (first) held = new Promise((release) => { window.release = release; }); const found = await read(...asked);'
+                'if (first) await held; return found; }')
+        first, second = ([int(voxel[axis] // 0.3) for axis in 'xyz'] for voxel in (far, near))
+        self.js('window.first = viewer.showVoxel(...arguments[0])', first)
+        self.wait(f'viewer.showVoxel({", ".join(map(str, second))})')
+        shown = self.text('voxel-facts')
+        self.assertIn(', '.join(map(str, second)), shown)
+        self.wait('(window.release(), window.first)')
+        self.assertEqual(self.text('voxel-facts'), shown, 'the one that was asked for last')
+
     def test_what_is_drawn_is_what_is_there(self):
         self.js('viewer.trajectories.visible = false')
         all_of_it = self.assert_drawn_as_picked()
