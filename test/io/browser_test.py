@@ -110,6 +110,13 @@ class Browser(unittest.TestCase):
         self.assertIsInstance(found, list, found)
         return found[0]
 
+    def wait_for_voxel(self):
+        """Waits until the page says what a voxel holds: it reads the evidence of the voxel's tile first."""
+        end = time.monotonic() + 60
+        while self.js('return document.getElementById("voxel").hidden'):
+            self.assertLess(time.monotonic(), end, 'no voxel is shown')
+            time.sleep(0.02)
+
     def text(self, name):
         return self.js('return document.getElementById(arguments[0]).innerText', name)
 
@@ -205,7 +212,7 @@ class Browser(unittest.TestCase):
         x, y = self.js('return [(innerWidth + viewer.orbit.insets.left) / 2, innerHeight / 2]')
         for kind in ('mousePressed', 'mouseReleased'):
             self.command('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left', clickCount=1)
-        self.wait('new Promise((done) => setTimeout(done, 100)).then(() => viewer.evidence)')
+        self.wait_for_voxel()
         facts = self.text('voxel-facts')
         centre = [float(number) for number in re.search(r'Centre\s+(\S+), (\S+), (\S+) m', facts).groups()]
         column = [voxel for voxel in self.voxels if voxel['state'] == 2 and abs(voxel['x'] - centre[0]) < 0.01 and
@@ -292,8 +299,9 @@ class Browser(unittest.TestCase):
         self.assertLess(self.js('return viewer.voxels.layers[1]'), 1e8)
         self.key('a', 65)
         self.assertGreater(self.js('return viewer.voxels.layers[1]'), 1e8)
+        self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
         self.key('Enter', 13)
-        self.wait('new Promise((done) => setTimeout(done, 200))')
+        self.wait_for_voxel()
         self.key('h', 72)
         self.assertTrue(self.js('return document.getElementById("help").open'))
 
@@ -333,8 +341,7 @@ class Browser(unittest.TestCase):
         x, y = 195, 390
         self.touch('touchStart', (x, y))
         self.touch('touchEnd')
-        self.wait('new Promise((done) => setTimeout(done, 300))')
-        self.assertFalse(self.js('return document.getElementById("voxel").hidden'), 'a tap reads a voxel')
+        self.wait_for_voxel()
         self.click('menu')
         self.assertLessEqual(self.js('return document.documentElement.scrollWidth'), 390)
         small = self.js('return [...document.querySelectorAll("#bar button")].filter((b) => b.getBoundingClientRect().height < 40).length')
