@@ -1,6 +1,10 @@
 #include "io/map_statistics.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 namespace bki_mapping {
 namespace {
@@ -33,12 +37,11 @@ void count(MapStatistics& statistics, const BlockIndex& index, const BlockView& 
   }
 }
 
-/// Counts the blocks of a map. @param tile only those in this one.
-void countAll(MapStatistics& statistics, const SemanticMap& map, const BlockVisit& visit,
-              const GridIndex* tile = nullptr) {
+/// Counts blocks of a map.
+void countAll(MapStatistics& statistics, const SemanticMap& map,
+              const std::vector<std::pair<BlockIndex, const Block*>>& blocks, const BlockVisit& visit) {
   BlockView view;
-  for (const auto& [index, block] : sortedBlocks(map)) {
-    if (tile && SemanticMap::regionOf(index) != *tile) continue;
+  for (const auto& [index, block] : blocks) {
     ++statistics.blocks;
     statistics.planes += block->classes().size();
     statistics.memory_bytes += block->bytes();
@@ -48,13 +51,57 @@ void countAll(MapStatistics& statistics, const SemanticMap& map, const BlockVisi
   }
 }
 
-/// Adds the tiles whose evidence may decide states in a tile.
-void addTilesAround(const GridIndex& tile, MapFile& file, SemanticMap& map) {
-  for (int n = 0; n < 27; ++n) {
-    const GridIndex beside{tile.x + n % 3 - 1, tile.y + n / 3 % 3 - 1, tile.z + n / 9 - 1};
-    if (beside != tile) file.addTileTo(map, {beside});
+/// The tiles of a file and, where the evidence around decides states, those beside them. The tiles are
+/// visited in strips along y, each a few tiles wide, so that a tile serves all its neighbours: it is read
+/// once, or twice at the edge of a strip, and few rows of a strip are in memory at once.
+class TileWindow {
+ public:
+  TileWindow(MapFile& file, SemanticMap& empty_map) : file_(file), map_(empty_map.snapshot()) {
+    for (const TileEntry& tile : file.tiles()) tiles_.push_back(tile.index);
+    std::sort(tiles_.begin(), tiles_.end(), [](const GridIndex& a, const GridIndex& b) {
+      return std::make_tuple(stripOf(a), a.y, a.x, a.z) < std::make_tuple(stripOf(b), b.y, b.x, b.z);
+    });
   }
-}
+
+  const std::vector<GridIndex>& tiles() const { return tiles_; }
+  const SemanticMap& map() const { return map_; }
+
+  void moveTo(const GridIndex& tile) {
+    const std::int32_t beside = map_.neighbourhoodRatio() > 0.0f ? 1 : 0, strip = stripOf(tile) * kStrip;
+    for (const GridIndex& held : map_.regions()) {
+      if (held.x < strip - beside || held.x >= strip + kStrip + beside ||
+          std::abs(held.y - tile.y) > beside) {
+        map_.takeRegion(held);
+      }
+    }
+    for (std::int32_t x = tile.x - beside; x <= tile.x + beside; ++x) {
+      for (std::int32_t y = tile.y - beside; y <= tile.y + beside; ++y) {
+        for (std::int32_t z = tile.z - beside; z <= tile.z + beside; ++z) {
+          if (!map_.hasRegion({x, y, z})) file_.addTileTo(map_, {GridIndex{x, y, z}});
+        }
+      }
+    }
+  }
+
+  /// The blocks of a tile.
+  std::vector<std::pair<BlockIndex, const Block*>> blocksOf(const GridIndex& tile) const {
+    std::vector<std::pair<BlockIndex, const Block*>> blocks;
+    if (const Region* const region = map_.findRegion(tile)) {
+      region->forEachIndex([&](const BlockIndex& index) { blocks.emplace_back(index, map_.find(index)); });
+    }
+    return blocks;
+  }
+
+ private:
+  static constexpr std::int32_t kStrip = 8;  // tiles
+  static std::int32_t stripOf(const GridIndex& tile) {
+    return tile.x >= 0 ? tile.x / kStrip : -1 - (-1 - tile.x) / kStrip;
+  }
+
+  MapFile& file_;
+  SemanticMap map_;
+  std::vector<GridIndex> tiles_;
+};
 
 }  // namespace
 
@@ -66,12 +113,11 @@ Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
 
 MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit) {
   MapStatistics statistics;
-  for (const TileEntry& tile : file.tiles()) {
-    SemanticMap map = empty_map.snapshot();
-    file.addTileTo(map, {tile.index});
-    if (empty_map.neighbourhoodRatio() > 0.0f) addTilesAround(tile.index, file, map);
+  TileWindow window(file, empty_map);
+  for (const GridIndex& tile : window.tiles()) {
+    window.moveTo(tile);
     ++statistics.tiles;
-    countAll(statistics, map, visit, &tile.index);
+    countAll(statistics, window.map(), window.blocksOf(tile), visit);
   }
   return statistics;
 }
@@ -79,7 +125,7 @@ MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockV
 MapStatistics statisticsOf(const SemanticMap& map, const BlockVisit& visit) {
   MapStatistics statistics;
   statistics.tiles = map.regions().size();
-  countAll(statistics, map, visit);
+  countAll(statistics, map, sortedBlocks(map), visit);
   return statistics;
 }
 
