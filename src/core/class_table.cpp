@@ -49,6 +49,12 @@ const SemanticClass* ClassTable::find(ClassId id) const {
   return index_of_id_[id] < 0 ? nullptr : &classes_[static_cast<std::size_t>(index_of_id_[id])];
 }
 
+const std::string& ClassTable::nameOf(ClassId id) const {
+  static const std::string none;
+  const SemanticClass* const found = find(id);
+  return found ? found->name : none;
+}
+
 std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
   if (raw < class_of_small_raw_.size()) {
     const std::int16_t id = class_of_small_raw_[raw];

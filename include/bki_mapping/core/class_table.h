@@ -48,6 +48,8 @@ class ClassTable {
 
   /// The class with this id; nullptr if the table has none, as for kFreeClass.
   const SemanticClass* find(ClassId id) const;
+  /// The name of a class; "" if the table has none, as for kFreeClass.
+  const std::string& nameOf(ClassId id) const;
   /// The class of a raw label; no value if the table neither lists it nor has a catch-all class.
   std::optional<ClassId> classOfRaw(std::uint32_t raw) const;
   /// The class of a label; no value if the table has none for it.

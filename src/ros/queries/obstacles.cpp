@@ -36,7 +36,7 @@ void query(const QueriedMap& map, const GetNearestObstacles::Request& asked,
     }
     answer.distance.push_back(found ? found->distance : kInfinity);
     answer.obstacle.push_back(fromVector(found ? map.states.geometry().voxelCentre(found->voxel) : nowhere));
-    answer.class_name.push_back(found ? nameOf(map.classes, found->label) : "");
+    answer.class_name.push_back(found ? map.classes.nameOf(found->label) : "");
   }
 }
 

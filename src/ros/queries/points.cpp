@@ -21,7 +21,7 @@ void query(const QueriedMap& map, const QueryPoints::Request& asked, QueryPoints
   answer.class_name.reserve(count);
   for (std::size_t n = 0; n < count; ++n) {
     answer.state.push_back(static_cast<std::int8_t>(states[n]));
-    answer.class_name.push_back(nameOf(map.classes, labels[n]));
+    answer.class_name.push_back(map.classes.nameOf(labels[n]));
   }
 }
 

@@ -29,7 +29,7 @@ void query(const QueriedMap& map, const CastRays::Request& asked, CastRays::Resp
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   for (const RayHit& hit : hits) {
     answer.met.push_back(static_cast<std::int8_t>(hit.end));
-    answer.class_name.push_back(nameOf(map.classes, hit.label));
+    answer.class_name.push_back(map.classes.nameOf(hit.label));
     answer.length.push_back(hit.length);
     answer.first_unknown.push_back(hit.first_unknown);
     answer.voxel.push_back(

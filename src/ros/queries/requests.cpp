@@ -16,10 +16,4 @@ ClassFilter classesOf(const ClassTable& table, const std::vector<std::string>& n
   return names.empty() || all_but ? ClassFilter::allBut(named) : named;
 }
 
-const std::string& nameOf(const ClassTable& table, ClassId id) {
-  static const std::string none;
-  const SemanticClass* const found = table.find(id);
-  return found ? found->name : none;
-}
-
 }  // namespace bki_mapping::ros_interface

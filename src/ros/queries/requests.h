@@ -56,7 +56,4 @@ const auto& valueFor(const Values& values, std::size_t n) {
 /// @throws std::invalid_argument that lists the names that the table lacks.
 ClassFilter classesOf(const ClassTable& table, const std::vector<std::string>& names, bool all_but);
 
-/// The name of a class; "" for kFreeClass.
-const std::string& nameOf(const ClassTable& table, ClassId id);
-
 }  // namespace bki_mapping::ros_interface

@@ -105,7 +105,7 @@ void query(const QueriedMap& map, const CheckSpace::Request& asked, CheckSpace::
     const std::optional<ClassId> worst = content.worst(order);
     answer.free.push_back(content.isKnown() && !content.classes.intersects(obstacles));
     answer.known.push_back(content.isKnown());
-    answer.worst_class.push_back(worst ? nameOf(map.classes, *worst) : "");
+    answer.worst_class.push_back(worst ? map.classes.nameOf(*worst) : "");
     answer.free_voxels.push_back(static_cast<std::uint32_t>(content.free));
     answer.occupied_voxels.push_back(static_cast<std::uint32_t>(content.occupied));
     answer.unknown_voxels.push_back(static_cast<std::uint32_t>(content.unknown));

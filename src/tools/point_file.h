@@ -1,0 +1,23 @@
+/// @file Points as text: "X Y Z" on a command line, and files with lines x,y,z.
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace bki_mapping::tools {
+
+/// Three finite numbers, separated by commas or spaces. @return nothing if the text is anything else.
+std::optional<Eigen::Vector3d> parsePoint(std::string text);
+
+/// Appends the points of a text with one point a line. Empty lines, lines that begin with #, and a first line
+/// of names are left out.
+/// @param name of the text, for errors. @throws std::invalid_argument if a line is not a point, or `points`
+/// would have more than ten million.
+void parsePoints(std::istream& in, const std::string& name, std::vector<Eigen::Vector3d>& points);
+/// The same for a file; "-": standard input. @throws std::invalid_argument also if it cannot be read.
+void readPointFile(const std::string& path, std::vector<Eigen::Vector3d>& points);
+
+}  // namespace bki_mapping::tools

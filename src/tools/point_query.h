@@ -1,0 +1,54 @@
+/// @file What a city or a map file says at points.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <iosfwd>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/query/queries.h"
+
+namespace bki_mapping::tools {
+
+/// Asks a map at points. They are sorted by the tile that holds them, so that each tile is read once.
+class PointQuery {
+ public:
+  /// @param points in the map frame [m]. They and the map are kept by reference.
+  /// @param memory_limit of the tiles that are in memory at once [bytes]; 0: none.
+  PointQuery(TiledMap& map, const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit);
+
+  /// Reads what the voxels of the points are. @throws as TiledMap.
+  void readAll();
+  /// Finds the obstacle nearest to each point. @param most distance of an obstacle [m]. @throws as TiledMap.
+  void findNearest(double most, const ClassFilter& classes);
+  /// Writes CSV: a line of names, and a line for each point, in the order in which they were given.
+  void print(std::ostream& out, const ClassTable& classes, bool with_nearest) const;
+
+ private:
+  struct Answer {
+    VoxelState state = VoxelState::kUnknown;
+    ClassId label = kFreeClass;
+    float occupancy = 0.0f, class_probability = 0.0f, probability = 0.0f, variance = 0.0f;
+    std::optional<NearestObstacle> nearest;
+  };
+  /// Stands for the tiles of points beyond the grid.
+  static constexpr GridIndex kNoTile{std::numeric_limits<std::int32_t>::max(), 0, 0};
+
+  /// Calls visit(numbers) for the points of each few tiles.
+  template <typename Visit>
+  void forEachGroup(std::size_t tiles, Visit&& visit);
+
+  TiledMap& map_;
+  GridGeometry grid_;
+  const std::vector<Eigen::Vector3d>& points_;
+  std::vector<Answer> answers_;                            ///< of the points, in their order
+  std::vector<std::pair<GridIndex, std::size_t>> sorted_;  ///< tile and number of each point
+  std::size_t limit_;
+};
+
+}  // namespace bki_mapping::tools
