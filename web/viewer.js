@@ -70,7 +70,7 @@ class Viewer {
     this.orbit = new OrbitCamera(this.canvas, () => this.draw(), (x, y) => this.pickAt(x, y));
     this.mode = 'class';
     this.frames = 0;  // drawn so far
-    this.asked = 0;  // voxels to show or to close so far
+    this.asked = 0;  // how often a voxel was asked for, or closed
     this.times = {};  // [ms]
     this.canvas.addEventListener('webglcontextrestored', () => location.reload());
   }
@@ -356,7 +356,7 @@ class Viewer {
 
   async showVoxel(x, y, z) {
     const asked = ++this.asked, voxel = await describeVoxel(this.map, x, y, z), {header} = this;
-    if (!voxel || asked !== this.asked) return;  // reading takes time, and the user may have asked for another since
+    if (!voxel || asked !== this.asked) return;  // while this one was read, another was asked for, or it was closed
     const known = this.map.classes.get(voxel.label), nameOf = (id) => id === kFreeLabel ? 'free' : this.map.classes.get(id).name;
     const colorOf = (id) => id === kFreeLabel ? kFreeColor : this.map.classes.get(id).color;
     const occupied = voxel.state === kOccupied && known, title = occupied ? known.name : kStateNames[voxel.state];

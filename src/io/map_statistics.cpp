@@ -51,9 +51,10 @@ void countAll(MapStatistics& statistics, const SemanticMap& map,
   }
 }
 
-/// The tiles of a file and, where the evidence around decides states, those beside them. The tiles are
-/// visited in strips along y, each a few tiles wide, so that a tile serves all its neighbours: it is read
-/// once, or twice at the edge of a strip, and few rows of a strip are in memory at once.
+/// The tiles of a file one after another, each with those beside it where their evidence decides states in
+/// it. They are visited in strips along y, a few tiles wide, so that a tile serves all its neighbours: it is
+/// read once, or twice at the edge of a strip. Three rows of a strip, with tiles of all heights, are in
+/// memory at once; without neighbours, one tile.
 class TileWindow {
  public:
   TileWindow(MapFile& file, SemanticMap& empty_map) : file_(file), map_(empty_map.snapshot()) {
@@ -66,10 +67,11 @@ class TileWindow {
   const std::vector<GridIndex>& tiles() const { return tiles_; }
   const SemanticMap& map() const { return map_; }
 
+  /// Reads what decides the states in a tile, and forgets what no later tile needs.
   void moveTo(const GridIndex& tile) {
     const std::int32_t beside = map_.neighbourhoodRatio() > 0.0f ? 1 : 0, strip = stripOf(tile) * kStrip;
     for (const GridIndex& held : map_.regions()) {
-      if (held.x < strip - beside || held.x >= strip + kStrip + beside ||
+      if (beside == 0 || held.x < strip - beside || held.x >= strip + kStrip + beside ||
           std::abs(held.y - tile.y) > beside) {
         map_.takeRegion(held);
       }

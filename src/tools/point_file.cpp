@@ -12,18 +12,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 10'000'000;
 
-}  // namespace
-
-std::optional<Eigen::Vector3d> parsePoint(std::string text) {
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::istringstream words(text);
-  Eigen::Vector3d point;
-  std::string rest;
-  if (!(words >> point.x() >> point.y() >> point.z()) || words >> rest || !point.allFinite())
-    return std::nullopt;
-  return point;
-}
-
+/// @param name of the text, for errors.
 void parsePoints(std::istream& in, const std::string& name, std::vector<Eigen::Vector3d>& points) {
   std::string line;
   for (std::size_t number = 1; std::getline(in, line); ++number) {
@@ -40,6 +29,18 @@ void parsePoints(std::istream& in, const std::string& name, std::vector<Eigen::V
     }
     points.push_back(*point);
   }
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> parsePoint(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  Eigen::Vector3d point;
+  std::string rest;
+  if (!(words >> point.x() >> point.y() >> point.z()) || words >> rest || !point.allFinite())
+    return std::nullopt;
+  return point;
 }
 
 void readPointFile(const std::string& path, std::vector<Eigen::Vector3d>& points) {

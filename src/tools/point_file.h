@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <iosfwd>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,12 +11,9 @@ namespace bki_mapping::tools {
 /// Three finite numbers, separated by commas or spaces. @return nothing if the text is anything else.
 std::optional<Eigen::Vector3d> parsePoint(std::string text);
 
-/// Appends the points of a text with one point a line. Empty lines, lines that begin with #, and a first line
-/// of names are left out.
-/// @param name of the text, for errors. @throws std::invalid_argument if a line is not a point, or `points`
-/// would have more than ten million.
-void parsePoints(std::istream& in, const std::string& name, std::vector<Eigen::Vector3d>& points);
-/// The same for a file; "-": standard input. @throws std::invalid_argument also if it cannot be read.
+/// Appends the points of a file, one a line; "-": of standard input. Empty lines, lines that begin with #,
+/// and a first line of names are left out. @throws std::invalid_argument if the file cannot be read, a line
+/// is not a point, or `points` would have more than ten million.
 void readPointFile(const std::string& path, std::vector<Eigen::Vector3d>& points);
 
 }  // namespace bki_mapping::tools

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <iosfwd>
 #include <limits>
 #include <optional>
@@ -10,26 +11,30 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/io/tiled_map.h"
 #include "bki_mapping/query/queries.h"
 
 namespace bki_mapping::tools {
 
-/// Asks a map at points. They are sorted by the tile that holds them, so that each tile is read once.
+/// Asks a map at points. They are sorted by the tile that holds them, so that the points of a tile are
+/// answered from one reading.
 class PointQuery {
  public:
   /// @param points in the map frame [m]. They and the map are kept by reference.
-  /// @param memory_limit of the tiles that are in memory at once [bytes]; 0: none.
+  /// @param memory_limit of the tiles that are in memory at once [bytes]; 0: no limit.
   PointQuery(TiledMap& map, const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit);
 
   /// Reads what the voxels of the points are. @throws as TiledMap.
   void readAll();
-  /// Finds the obstacle nearest to each point. @param most distance of an obstacle [m]. @throws as TiledMap.
+  /// Finds the obstacle nearest to each point. @param most the largest distance at which an obstacle counts
+  /// [m]. @param classes of obstacles. @throws as TiledMap.
   void findNearest(double most, const ClassFilter& classes);
   /// Writes CSV: a line of names, and a line for each point, in the order in which they were given.
   void print(std::ostream& out, const ClassTable& classes, bool with_nearest) const;
 
  private:
+  /// The answers for one point.
   struct Answer {
     VoxelState state = VoxelState::kUnknown;
     ClassId label = kFreeClass;
@@ -39,7 +44,8 @@ class PointQuery {
   /// Stands for the tiles of points beyond the grid.
   static constexpr GridIndex kNoTile{std::numeric_limits<std::int32_t>::max(), 0, 0};
 
-  /// Calls visit(numbers) for the points of each few tiles.
+  /// Calls visit(numbers) with the numbers of the points of `tiles` tiles at a time; of the last ones,
+  /// perhaps of fewer.
   template <typename Visit>
   void forEachGroup(std::size_t tiles, Visit&& visit);
 

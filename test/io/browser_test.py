@@ -111,7 +111,7 @@ class Browser(unittest.TestCase):
         return found[0]
 
     def wait_for_voxel(self):
-        """Waits until the page says what a voxel holds: it reads the evidence of the voxel's tile first."""
+        """Waits until the page says what a voxel holds, for which it reads the evidence of a tile. Before, it must show none."""
         end = time.monotonic() + 60
         while self.js('return document.getElementById("voxel").hidden'):
             self.assertLess(time.monotonic(), end, 'no voxel is shown')
@@ -182,15 +182,18 @@ class Browser(unittest.TestCase):
         facts = self.text('voxel-facts')
         self.assertEqual(facts.count(HOSTILE), 2, 'the class and the drive: ' + facts)
 
+    @staticmethod
+    def index_of(voxel):
+        return [int(voxel[axis] // 0.3) for axis in 'xyz']
+
     def show(self, voxel):
-        index = [int(voxel[axis] // 0.3) for axis in 'xyz']
-        self.wait(f'viewer.showVoxel({index[0]}, {index[1]}, {index[2]})')
+        self.wait(f'viewer.showVoxel({", ".join(map(str, self.index_of(voxel)))})')
 
     def test_says_of_voxels_what_the_map_says(self):
         step = len(self.voxels) // 400
         sample = self.voxels[::step]
         self.assertGreater(sum(voxel['state'] == 2 for voxel in sample), 30)
-        indices = [[int(voxel[axis] // 0.3) for axis in 'xyz'] for voxel in sample]
+        indices = [self.index_of(voxel) for voxel in sample]
         found = self.wait(f'Promise.all({json.dumps(indices)}.reduce((all, i) => [...all, all.length ? '
                           'all[all.length - 1].then(() => describeVoxel(viewer.map, ...i)) : describeVoxel(viewer.map, ...i)], []))')
         self.assertEqual(len(found), len(sample))
@@ -228,18 +231,22 @@ class Browser(unittest.TestCase):
         self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
 
     def test_the_last_voxel_asked_for_is_shown(self):
-        far, near = self.voxels[0], self.voxels[-1]
-        # The first takes longer to read than the second.
-        self.js('const read = describeVoxel; let held; describeVoxel = async (...asked) => { const first = !held;'
+        first, second = self.index_of(self.voxels[0]), self.index_of(self.voxels[-1])
+        # Each first reading ends when it is released.
+        self.js('const read = describeVoxel; window.hold = () => { let held; describeVoxel = async (...asked) => { const first = !held;'
                 'if (first) held = new Promise((release) => { window.release = release; }); const found = await read(...asked);'
-                'if (first) await held; return found; }')
-        first, second = ([int(voxel[axis] // 0.3) for axis in 'xyz'] for voxel in (far, near))
-        self.js('window.first = viewer.showVoxel(...arguments[0])', first)
+                'if (first) await held; return found; }; }')
+        self.js('hold(); window.first = viewer.showVoxel(...arguments[0])', first)
         self.wait(f'viewer.showVoxel({", ".join(map(str, second))})')
         shown = self.text('voxel-facts')
         self.assertIn(', '.join(map(str, second)), shown)
         self.wait('(window.release(), window.first)')
         self.assertEqual(self.text('voxel-facts'), shown, 'the one that was asked for last')
+        self.js('hold(); window.first = viewer.showVoxel(...arguments[0])', first)
+        self.key('Escape', 27)
+        self.wait('(window.release(), window.first)')
+        self.assertTrue(self.js('return document.getElementById("voxel").hidden'), 'it was closed')
+        self.assertFalse(self.js('return viewer.highlight.visible'))
 
     def test_what_is_drawn_is_what_is_there(self):
         self.js('viewer.trajectories.visible = false')
@@ -338,6 +345,7 @@ class Browser(unittest.TestCase):
         self.touch('touchEnd')
         self.assertAlmostEqual(self.camera()[2], turned[2] / 2, delta=0.05 * turned[2], msg='pinched to half the distance')
         self.click('reset')
+        self.assertTrue(self.js('return document.getElementById("voxel").hidden'), 'no gesture was a tap')
         x, y = 195, 390
         self.touch('touchStart', (x, y))
         self.touch('touchEnd')

@@ -68,7 +68,7 @@ SemanticMap withGains(const SemanticMap& evidence) {
   return map;
 }
 
-/// A look at each voxel.
+/// Compares the counts with a look at each voxel.
 void expectCounts(const MapStatistics& found, const SemanticMap& map) {
   MapStatistics expected;
   GridIndex low{1 << 30, 1 << 30, 1 << 30}, high{-(1 << 30), -(1 << 30), -(1 << 30)};
