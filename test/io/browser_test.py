@@ -113,12 +113,15 @@ class Browser(unittest.TestCase):
     def wait_for_voxel(self):
         """Waits until the page says what a voxel holds, for which it reads the evidence of a tile. Before, it must show none."""
         end = time.monotonic() + 60
-        while self.js('return document.getElementById("voxel").hidden'):
+        while self.hidden('voxel'):
             self.assertLess(time.monotonic(), end, 'no voxel is shown')
             time.sleep(0.02)
 
     def text(self, name):
         return self.js('return document.getElementById(arguments[0]).innerText', name)
+
+    def hidden(self, name):
+        return self.js('return document.getElementById(arguments[0]).hidden', name)
 
     def click(self, name):
         self.browser.find_element('id', name).click()
@@ -228,7 +231,7 @@ class Browser(unittest.TestCase):
         shown = self.text('voxel-classes')
         self.assertIn(f"{highest['probability']:.3f}", shown)
         self.key('Escape', 27)
-        self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
+        self.assertTrue(self.hidden('voxel'))
 
     def test_the_last_voxel_asked_for_is_shown(self):
         first, second = self.index_of(self.voxels[0]), self.index_of(self.voxels[-1])
@@ -245,7 +248,7 @@ class Browser(unittest.TestCase):
         self.js('hold(); window.first = viewer.showVoxel(...arguments[0])', first)
         self.key('Escape', 27)
         self.wait('(window.release(), window.first)')
-        self.assertTrue(self.js('return document.getElementById("voxel").hidden'), 'it was closed')
+        self.assertTrue(self.hidden('voxel'), 'it was closed')
         self.assertFalse(self.js('return viewer.highlight.visible'))
 
     def test_what_is_drawn_is_what_is_there(self):
@@ -276,7 +279,7 @@ class Browser(unittest.TestCase):
         before = self.picture()
         for mode in ('occupancy', 'class_probability', 'height'):
             self.js('document.getElementById("mode-" + arguments[0]).click()', mode)
-            self.assertFalse(self.js('return document.getElementById("ramp").hidden'))
+            self.assertFalse(self.hidden('ramp'))
             self.assertNotEqual(self.picture(), before, mode)
         self.js('document.getElementById("mode-class").click()')
         self.assertEqual(self.picture(), before)
@@ -306,7 +309,7 @@ class Browser(unittest.TestCase):
         self.assertLess(self.js('return viewer.voxels.layers[1]'), 1e8)
         self.key('a', 65)
         self.assertGreater(self.js('return viewer.voxels.layers[1]'), 1e8)
-        self.assertTrue(self.js('return document.getElementById("voxel").hidden'))
+        self.assertTrue(self.hidden('voxel'))
         self.key('Enter', 13)
         self.wait_for_voxel()
         self.key('h', 72)
@@ -345,7 +348,7 @@ class Browser(unittest.TestCase):
         self.touch('touchEnd')
         self.assertAlmostEqual(self.camera()[2], turned[2] / 2, delta=0.05 * turned[2], msg='pinched to half the distance')
         self.click('reset')
-        self.assertTrue(self.js('return document.getElementById("voxel").hidden'), 'no gesture was a tap')
+        self.assertTrue(self.hidden('voxel'), 'no gesture was a tap')
         x, y = 195, 390
         self.touch('touchStart', (x, y))
         self.touch('touchEnd')
