@@ -38,6 +38,8 @@ TEST(ClassTable, FlagsAndGainsBelongToClasses) {
                          "  - {id: 1, name: b, color: [1, 2, 3], flags: [ignored, dynamic]}\n"
                          "  - {id: 2, name: c, color: [1, 2, 3], flags: [living]}\n";
   const ClassTable table = loadClassTable(file);
+  EXPECT_EQ(table.nameOf(1), "b");
+  for (const ClassId none : {ClassId{3}, kFreeClass}) EXPECT_EQ(table.nameOf(none), "");
   EXPECT_TRUE(table.find(0)->ground && !table.find(0)->ignored && !table.find(0)->dynamic);
   EXPECT_EQ(table.find(0)->free_gain, 0.5);
   EXPECT_TRUE(table.find(1)->ignored && table.find(1)->dynamic && !table.find(1)->ground);
