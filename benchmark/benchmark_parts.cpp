@@ -171,7 +171,7 @@ void voxelCloud(benchmark::State& state) {
     const VoxelPoints points(f.mapper.map(), *f.classes, {{VoxelState::kOccupied, VoxelState::kFree}},
                              sortedBlocks(f.mapper.map()), f.pool);
     data.resize(points.count() * sizeof(VoxelPoint));
-    points.write(reinterpret_cast<VoxelPoint*>(data.data()));
+    points.write(reinterpret_cast<VoxelPoint*>(data.data()), Eigen::Vector3d::Zero());
     benchmark::DoNotOptimize(data.data());
   }
 }

@@ -37,9 +37,9 @@ py::array voxels(const FixedMap& map, py::handle states) {
   }
   using V = VoxelRecord;
   return ownedArray(std::move(records),
-                    structType({{"x", "f4", offsetof(V, x)},
-                                {"y", "f4", offsetof(V, y)},
-                                {"z", "f4", offsetof(V, z)},
+                    structType({{"x", "f8", offsetof(V, x)},
+                                {"y", "f8", offsetof(V, y)},
+                                {"z", "f8", offsetof(V, z)},
                                 {"red", "u1", offsetof(V, red)},
                                 {"green", "u1", offsetof(V, green)},
                                 {"blue", "u1", offsetof(V, blue)},

@@ -21,7 +21,7 @@ __all__ = ['BLOCK', 'OccupancyClass', 'OccupancyFollower', 'decode']
 _UNKNOWN, _FREE_LABEL = 0, 255
 _STATES = {'free': 1, 'occupied': 2, 'occluded': 3}
 _FREE_COLOR, _OCCLUDED_COLOR = (200, 225, 240), (60, 60, 70)  # those of Map.voxels
-_VOXEL = np.dtype([(axis, '<f4') for axis in 'xyz'] + [(name, 'u1') for name in ('red', 'green', 'blue')] +
+_VOXEL = np.dtype([(axis, '<f8') for axis in 'xyz'] + [(name, 'u1') for name in ('red', 'green', 'blue')] +
                   [('label', '<u2'), ('state', 'u1')] + [(name, '<f4') for name in VALUES])
 _SAID = np.dtype([('state', 'u1'), ('label', 'u1')] + [(name, '<f4') for name in VALUES])
 

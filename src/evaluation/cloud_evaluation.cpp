@@ -74,7 +74,7 @@ CloudEvaluation::CloudEvaluation(std::optional<TruthCloud> truth, double distanc
 void CloudEvaluation::add(const Scan& scan) {
   if (!nearest_in_truth_) truth_.add(scan);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
-    if (scan.points[i].allFinite()) points_.push_back(inMapFrame(scan, i));
+    if (scan.points[i].allFinite()) points_.push_back(truth_.relative(scan, i));
   }
 }
 
@@ -83,7 +83,7 @@ Scan CloudEvaluation::labelled(const Scan& scan) const {
   known.points.clear();
   known.labels.clear();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
-    const auto same = nearest_in_truth_->find(inMapFrame(scan, i), static_cast<float>(distance_));
+    const auto same = nearest_in_truth_->find(truth_.relative(scan, i), static_cast<float>(distance_));
     if (!same) continue;
     known.points.push_back(scan.points[i]);
     known.labels.push_back(truth_.moving[*same] ? kMovingCar : kUnlabelled);
@@ -94,7 +94,7 @@ Scan CloudEvaluation::labelled(const Scan& scan) const {
 CloudQuality CloudEvaluation::compare(const SemanticMap& map) const {
   std::vector<Eigen::Vector3f> cleaned;
   for (const Eigen::Vector3f& point : points_) {
-    const Eigen::Vector3d at = point.cast<double>();
+    const Eigen::Vector3d at = truth_.origin() + point.cast<double>();
     if (!map.geometry().contains(at)) continue;
     const VoxelView view = viewWithoutEntropy(map, map.geometry().voxelAt(at));
     if (view.state == VoxelState::kOccupied) cleaned.push_back(point);

@@ -35,7 +35,8 @@ struct CloudQuality : Accuracies {
 };
 
 /// A point of the truth counts as kept if a point of the cleaned cloud is within `distance`, otherwise as
-/// removed; what the cleaned cloud has beyond the truth does not count.
+/// removed; what the cleaned cloud has beyond the truth does not count. @param cleaned relative to the origin
+/// of the truth.
 CloudQuality compareClouds(const TruthCloud& truth, const std::vector<Eigen::Vector3f>& cleaned,
                            double distance);
 
@@ -55,7 +56,7 @@ class CloudEvaluation {
   TruthCloud truth_;
   std::optional<NearestPoints> nearest_in_truth_;  ///< if the truth was given
   double distance_;
-  std::vector<Eigen::Vector3f> points_;  ///< of all scans, map frame [m]
+  std::vector<Eigen::Vector3f> points_;  ///< of all scans, relative to the origin of truth_ [m]
 };
 
 }  // namespace bki_mapping

@@ -14,7 +14,7 @@ namespace bki_mapping {
 
 /// One point in the file, as it lies there.
 struct [[gnu::packed]] CleanedPoint {
-  float x, y, z;           ///< map frame [m]
+  float x, y, z;           ///< relative to the file's VIEWPOINT, map frame [m]
   float intensity;         ///< remission
   std::uint32_t label;     ///< raw label of the scan
   std::uint8_t map_class;  ///< class id of the voxel
@@ -26,7 +26,9 @@ struct CleanedCount {
 };
 
 /// Writes the points of scans that lie in occupied voxels of a map to a binary PCD file, as AtomicFile does.
-/// Objects that moved away, and that the map has cleared, are not in it. Reads the scans one at a time.
+/// Points are relative to the VIEWPOINT of the file: the origin of the map frame or, far from it, a place
+/// near the first scan. Objects that moved away, and that the map has cleared, are not in it. Reads the scans
+/// one at a time.
 /// @param scans indices in the sequence. @param progress called with the number of scans done.
 /// @throws std::runtime_error if a scan cannot be read, or the file cannot be written.
 CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,

@@ -2,11 +2,13 @@
 
 #include <pcl/io/pcd_io.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
 
 #include "core/atomic_file.h"
+#include "core/float_origin.h"
 #include "io/voxel_pcl.h"
 #include "io/voxel_points.h"
 
@@ -14,7 +16,6 @@ namespace bki_mapping {
 namespace {
 
 const char kPlyProperties[] =
-    "property float x\nproperty float y\nproperty float z\n"
     "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     "property ushort label\nproperty uchar state\n"
     "property float probability\nproperty float occupancy\nproperty float class_probability\n"
@@ -25,27 +26,46 @@ constexpr int kThreads = 1;
 
 /// The header followed by the points, of type Point. Bytes are in host order, which is little-endian on all
 /// platforms of ROS 1.
-template <typename Point>
-std::string withPoints(std::string header, const VoxelPoints& points) {
+template <typename Point, typename... Origin>
+std::string withPoints(std::string header, const VoxelPoints& points, const Origin&... origin) {
   const std::size_t begin = header.size();
   header.resize(begin + points.count() * sizeof(Point));
-  points.write(reinterpret_cast<Point*>(header.data() + begin));
+  points.write(reinterpret_cast<Point*>(header.data() + begin), origin...);
   return header;
 }
 
-std::string plyBytes(const VoxelPoints& points, double resolution) {
+std::string plyBytes(const VoxelPoints& points, double resolution, bool far) {
+  const std::string type = far ? "double" : "float";
   std::ostringstream header;
   header << "ply\nformat binary_little_endian 1.0\ncomment bki_mapping voxels, resolution " << resolution
-         << " m, map frame\nelement vertex " << points.count() << "\n"
-         << kPlyProperties << "end_header\n";
-  return withPoints<VoxelRecord>(header.str(), points);
+         << " m, map frame\nelement vertex " << points.count() << "\n";
+  for (const char axis : {'x', 'y', 'z'}) header << "property " << type << ' ' << axis << '\n';
+  header << kPlyProperties << "end_header\n";
+  return far ? withPoints<VoxelRecord>(header.str(), points)
+             : withPoints<FloatVoxelRecord>(header.str(), points);
 }
 
-std::string pcdBytes(const VoxelPoints& points) {
+std::string pcdBytes(const VoxelPoints& points, const Eigen::Vector3d& origin) {
+  Eigen::Vector4f viewpoint = Eigen::Vector4f::Zero();
+  viewpoint.head<3>() = origin.cast<float>();
   // PCL's own writer maps the file into memory, and the process dies if the disk fills up meanwhile.
-  const std::string header = pcl::PCDWriter().generateHeaderBinary(
-      pclHeader(points.count()), Eigen::Vector4f::Zero(), Eigen::Quaternionf::Identity());
-  return withPoints<VoxelPoint>(header + "DATA binary\n", points);
+  const std::string header = pcl::PCDWriter().generateHeaderBinary(pclHeader(points.count()), viewpoint,
+                                                                   Eigen::Quaternionf::Identity());
+  return withPoints<VoxelPoint>(header + "DATA binary\n", points, origin);
+}
+
+std::string bytesOf(const std::string& ending, const SemanticMap& map, const ClassTable& classes,
+                    const VoxelStates& states) {
+  const GridGeometry& geometry = map.geometry();
+  const VoxelPoints::Blocks blocks = sortedBlocks(map);
+  ThreadPool pool(kThreads);
+  const VoxelPoints points(map, classes, {states}, blocks, pool);
+  if (ending == ".pcd")
+    return pcdBytes(points, floatOrigin(placeOf(geometry, blocks), geometry.resolution()));
+  const bool far = std::any_of(blocks.begin(), blocks.end(), [&](const auto& block) {
+    return tooFarForFloats(geometry.blockCentre(block.first), geometry.resolution());
+  });
+  return plyBytes(points, geometry.resolution(), far);
 }
 
 std::string endingOf(const std::string& path) {
@@ -91,10 +111,8 @@ void checkExportName(const std::string& path) {
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states) {
   checkExportName(path);
-  ThreadPool pool(kThreads);
-  const VoxelPoints points(map, classes, {states}, sortedBlocks(map), pool);
   AtomicFile file(path);
-  file.write(endingOf(path) == ".ply" ? plyBytes(points, map.geometry().resolution()) : pcdBytes(points));
+  file.write(bytesOf(endingOf(path), map, classes, states));
   file.commit();
 }
 

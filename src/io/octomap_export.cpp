@@ -23,8 +23,8 @@ octomap::OcTreeKey keyOf(const VoxelIndex& voxel) {
     if (coordinate < -kKeyOfZero || coordinate >= kKeyOfZero) {
       throw std::invalid_argument("the map has a voxel " + std::to_string(coordinate) +
                                   " voxels from its origin along an axis, and an OctoMap can hold 32,768; "
-                                  "clear what lies far away with "
-                                  "clear_map, or use a coarser resolution");
+                                  "clear what lies far away with clear_map, use a coarser resolution, or "
+                                  "move the map to a local frame with merge_maps --transform");
     }
     return static_cast<octomap::key_type>(coordinate + kKeyOfZero);
   };

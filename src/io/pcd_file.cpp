@@ -158,8 +158,7 @@ PcdPoints readPcdPoints(const std::string& path) {
   }
   PcdPoints points;
   points.points.reserve(count);
-  for (std::size_t i = 0; i < count; ++i)
-    points.points.push_back(Eigen::Vector3d(x[i], y[i], z[i]).cast<float>());
+  for (std::size_t i = 0; i < count; ++i) points.points.emplace_back(x[i], y[i], z[i]);
   points.intensity = valuesOf(cloud, "intensity");
   points.label = valuesOf(cloud, "label");
   return points;
@@ -183,20 +182,29 @@ Eigen::Isometry3d readPcdViewpoint(const std::string& path) {
 }
 
 void writePcdPoints(const std::string& path, const std::vector<Eigen::Vector3f>& points,
-                    const std::vector<float>& intensity, const Eigen::Isometry3d& viewpoint) {
+                    const Eigen::Vector3d& origin, const std::vector<float>& intensity,
+                    const Eigen::Isometry3d& viewpoint) {
+  const bool far = !origin.isZero(0.0);
+  const std::string size = far ? "8" : "4";
   const Eigen::Vector3d at = viewpoint.translation();
   const Eigen::Quaterniond q(viewpoint.linear());
   std::ostringstream header;
   header.precision(17);
-  header << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\n"
+  header << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\nSIZE " << size
+         << ' ' << size << ' ' << size << " 4\n"
          << "TYPE F F F F\nCOUNT 1 1 1 1\nWIDTH " << points.size() << "\nHEIGHT 1\nVIEWPOINT " << at.x()
          << " " << at.y() << " " << at.z() << " " << q.w() << " " << q.x() << " " << q.y() << " " << q.z()
          << "\nPOINTS " << points.size() << "\nDATA binary\n";
   std::string bytes = header.str();
-  bytes.reserve(bytes.size() + 16 * points.size());
+  const auto append = [&bytes](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  bytes.reserve(bytes.size() + (far ? 28 : 16) * points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const float record[] = {points[i].x(), points[i].y(), points[i].z(), intensity[i]};
-    bytes.append(reinterpret_cast<const char*>(record), sizeof record);
+    for (const Eigen::Index axis : {0, 1, 2}) {
+      far ? append(origin[axis] + static_cast<double>(points[i][axis])) : append(points[i][axis]);
+    }
+    append(intensity[i]);
   }
   writeTextFile(path, bytes);
 }

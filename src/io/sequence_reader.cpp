@@ -140,8 +140,8 @@ void readPcd(const std::string& path, SequenceFrame& frame) {
   const PcdPoints cloud = readPcdPoints(path);
   const Eigen::Isometry3d T_sensor_map = frame.T_map_sensor.inverse();
   frame.points.reserve(cloud.points.size());
-  for (const Eigen::Vector3f& point : cloud.points) {
-    frame.points.push_back((T_sensor_map * point.cast<double>()).cast<float>());
+  for (const Eigen::Vector3d& point : cloud.points) {
+    frame.points.push_back((T_sensor_map * point).cast<float>());
   }
   frame.remissions.assign(cloud.points.size(), 0.0f);
   for (std::size_t i = 0; i < cloud.intensity.size(); ++i) {

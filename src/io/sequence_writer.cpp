@@ -8,6 +8,7 @@
 
 #include "bki_mapping/io/sequence.h"
 #include "core/atomic_file.h"
+#include "core/float_origin.h"
 #include "io/pcd_file.h"
 
 namespace bki_mapping {
@@ -54,11 +55,12 @@ void SequenceWriter::write(const SequenceFrame& frame) {
   char name[16];
   std::snprintf(name, sizeof(name), "%06zu", count_++);
   if (layout_ == SequenceLayout::kDynamicMap) {
+    const Eigen::Vector3d origin = floatOrigin(frame.T_map_sensor.translation(), kFineVoxel);
     std::vector<Eigen::Vector3f> points;
     points.reserve(frame.points.size());
     for (const Eigen::Vector3f& point : frame.points)
-      points.push_back((frame.T_map_sensor * point.cast<double>()).cast<float>());
-    writePcdPoints((fs::path(folder_) / "pcd" / (std::string(name) + ".pcd")).string(), points,
+      points.push_back((frame.T_map_sensor * point.cast<double>() - origin).cast<float>());
+    writePcdPoints((fs::path(folder_) / "pcd" / (std::string(name) + ".pcd")).string(), points, origin,
                    frame.remissions, frame.T_map_sensor);
   } else {
     std::vector<float> values;

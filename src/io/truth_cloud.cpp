@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
+#include "core/float_origin.h"
 #include "io/pcd_file.h"
 
 namespace bki_mapping {
@@ -19,19 +20,24 @@ std::set<std::uint32_t> movingOfSemanticKitti() {
   return {252, 253, 254, 255, 256, 257, 258, 259};
 }
 
-Eigen::Vector3f inMapFrame(const Scan& scan, std::size_t i) {
-  return (scan.origin + scan.points[i].cast<double>()).cast<float>();
+void TruthCloud::setOrigin(const Eigen::Vector3d& near) {
+  if (!fixed_origin) fixed_origin = floatOrigin(near, kFineVoxel);
+}
+
+Eigen::Vector3f TruthCloud::relative(const Scan& scan, std::size_t i) const {
+  return (scan.origin + scan.points[i].cast<double>() - origin()).cast<float>();
 }
 
 void TruthCloud::add(const Scan& scan) {
   static const std::set<std::uint32_t> moves = movingOfSemanticKitti();
+  setOrigin(scan.origin);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const float range = scan.points[i].norm();
     if (!std::isfinite(range)) ++not_finite;
     if (!(range < kMostRange)) continue;
     const std::uint32_t label = scan.labels[i];
     const bool own_car = range < kOwnCar && (label == kUnlabelled || label == kOutlier);
-    points.push_back(inMapFrame(scan, i));
+    points.push_back(relative(scan, i));
     moving.push_back(own_car || moves.count(label) > 0);
   }
 }
@@ -55,14 +61,15 @@ TruthCloud readTruthCloud(const std::string& path) {
       ++cloud.not_finite;
       continue;
     }
-    cloud.points.push_back(file.points[i]);
+    cloud.setOrigin(file.points[i]);
+    cloud.points.push_back((file.points[i] - cloud.origin()).cast<float>());
     cloud.moving.push_back(values[i] == 1.0);
   }
   return cloud;
 }
 
 void writeTruthCloud(const std::string& path, const TruthCloud& cloud) {
-  writePcdPoints(path, cloud.points, {cloud.moving.begin(), cloud.moving.end()},
+  writePcdPoints(path, cloud.points, cloud.origin(), {cloud.moving.begin(), cloud.moving.end()},
                  Eigen::Isometry3d::Identity());
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,19 +16,24 @@ namespace bki_mapping {
 /// SemanticKITTI's raw labels of moving objects, 252 to 259.
 std::set<std::uint32_t> movingOfSemanticKitti();
 
-/// A point of a scan in the map frame [m].
-Eigen::Vector3f inMapFrame(const Scan& scan, std::size_t i);
-
 /// A cloud in the map frame of which it is known what moves.
 struct TruthCloud {
-  std::vector<Eigen::Vector3f> points;  ///< all finite [m]
-  std::vector<std::uint8_t> moving;     ///< whether each point is of a moving object
-  std::size_t not_finite = 0;           ///< number of points left out
+  std::vector<Eigen::Vector3f> points;                         ///< relative to origin(); all finite [m]
+  std::vector<std::uint8_t> moving;                            ///< whether each point is of a moving object
+  std::size_t not_finite = 0;                                  ///< number of points left out
+  std::optional<Eigen::Vector3d> fixed_origin = std::nullopt;  ///< once it is set [m]
 
   /// Adds a scan with raw labels of SemanticKITTI, as the benchmark makes its clouds from them: 252 to 259
   /// move, and so do points without a class (0, 1) within 3 m, which are of the car itself. Points 50 m away
   /// and farther are left out, because their labels are not reliable.
   void add(const Scan& scan);
+
+  /// Sets the origin of the points if it is not yet set. @param near a place in the cloud [m].
+  void setOrigin(const Eigen::Vector3d& near);
+  /// That of the map frame or, far from it, a place near the first scan, so that float32 is precise [m].
+  Eigen::Vector3d origin() const { return fixed_origin.value_or(Eigen::Vector3d::Zero()); }
+  /// A point of a scan, relative to the origin.
+  Eigen::Vector3f relative(const Scan& scan, std::size_t i) const;
 };
 
 /// Reads a cloud whose field `label` or, if it has none, `intensity` is 1 for points of moving objects and 0

@@ -14,19 +14,20 @@ constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;
 void setColor(const Color& color, VoxelPoint& point) {
   point.rgb = std::uint32_t{color[0]} << 16 | std::uint32_t{color[1]} << 8 | color[2];
 }
-void setColor(const Color& color, VoxelRecord& record) {
+template <typename Record>
+void setColor(const Color& color, Record& record) {
   record.red = color[0];
   record.green = color[1];
   record.blue = color[2];
 }
 
-/// The centres of the voxels of a block along one axis [m].
-using Centres = std::array<float, kBlockEdge>;
-
-Centres centresOf(std::int32_t block, double resolution) {
-  Centres centres;
+/// The centres of the voxels of a block along one axis, relative to an origin [m].
+template <typename Coordinate>
+std::array<Coordinate, kBlockEdge> centresOf(std::int32_t block, double resolution, double origin) {
+  std::array<Coordinate, kBlockEdge> centres;
   for (int n = 0; n < kBlockEdge; ++n) {
-    centres[static_cast<std::size_t>(n)] = static_cast<float>((block * kBlockEdge + n + 0.5) * resolution);
+    const double centre = (block * kBlockEdge + n + 0.5) * resolution;
+    centres[static_cast<std::size_t>(n)] = static_cast<Coordinate>(centre - origin);
   }
   return centres;
 }
@@ -59,10 +60,9 @@ void VoxelPoints::forEachBlock(const Job& job) const {
 
 template <typename Visit>
 void VoxelPoints::forEachSelected(const BlockIndex& index, const BlockView& view, const Visit& visit) const {
-  const Centres z = centresOf(index.z, map_.geometry().resolution());
+  const auto z = centresOf<double>(index.z, map_.geometry().resolution(), 0.0);
   for (std::size_t layer = 0; layer < kBlockEdge; ++layer) {
-    const auto height = static_cast<double>(z[layer]);
-    if (height < selection_.min_z || height > selection_.max_z) continue;
+    if (z[layer] < selection_.min_z || z[layer] > selection_.max_z) continue;
     for (std::size_t v = layer * kLayer; v < (layer + 1) * kLayer; ++v) {
       if (selection_.states.contains(view.state[v])) visit(v);
     }
@@ -70,18 +70,20 @@ void VoxelPoints::forEachSelected(const BlockIndex& index, const BlockView& view
 }
 
 template <typename Point>
-void VoxelPoints::writeAs(Point* to) const {
+void VoxelPoints::writeAs(Point* to, const Eigen::Vector3d& origin) const {
   forEachBlock([&](std::size_t b) {
-    if (begin_[b + 1] > begin_[b]) writeBlock(b, to + begin_[b]);
+    if (begin_[b + 1] > begin_[b]) writeBlock(b, to + begin_[b], origin);
   });
 }
 
 template <typename Point>
-void VoxelPoints::writeBlock(std::size_t b, Point* to) const {
+void VoxelPoints::writeBlock(std::size_t b, Point* to, const Eigen::Vector3d& origin) const {
   const auto& [index, block] = blocks_[b];
   const double resolution = map_.geometry().resolution();
-  const Centres x = centresOf(index.x, resolution), y = centresOf(index.y, resolution),
-                z = centresOf(index.z, resolution);
+  using Coordinate = decltype(Point::x);
+  const auto x = centresOf<Coordinate>(index.x, resolution, origin.x()),
+             y = centresOf<Coordinate>(index.y, resolution, origin.y()),
+             z = centresOf<Coordinate>(index.z, resolution, origin.z());
   BlockView view;
   readBlock(map_, index, *block, BlockFields::kAll, view);
   forEachSelected(index, view, [&](std::size_t v) {
@@ -101,7 +103,13 @@ void VoxelPoints::writeBlock(std::size_t b, Point* to) const {
   });
 }
 
-template void VoxelPoints::writeAs(VoxelPoint* to) const;
-template void VoxelPoints::writeAs(VoxelRecord* to) const;
+template void VoxelPoints::writeAs(VoxelPoint* to, const Eigen::Vector3d& origin) const;
+template void VoxelPoints::writeAs(VoxelRecord* to, const Eigen::Vector3d& origin) const;
+template void VoxelPoints::writeAs(FloatVoxelRecord* to, const Eigen::Vector3d& origin) const;
+
+Eigen::Vector3d placeOf(const GridGeometry& geometry, const VoxelPoints::Blocks& blocks) {
+  if (blocks.empty()) return Eigen::Vector3d::Zero();
+  return geometry.blockCentre(blocks[blocks.size() / 2].first);
+}
 
 }  // namespace bki_mapping

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "bki_mapping/io/map_export.h"
 #include "parallel/thread_pool.h"
 
@@ -15,7 +17,7 @@ namespace bki_mapping {
 
 /// One voxel in PCD files and in the topics voxel_cloud and voxel_cloud_updates, as it lies in memory.
 struct [[gnu::packed]] VoxelPoint {
-  float x, y, z;      ///< centre, map frame [m]
+  float x, y, z;      ///< centre, relative to an origin [m]
   std::uint32_t rgb;  ///< as PCL packs it: red in bits 16 to 23, green, blue
   std::uint16_t label;
   std::uint8_t state;
@@ -47,6 +49,15 @@ inline constexpr std::array kVoxelFields = {
     VoxelField{"evidence", VoxelField::kFloat32, offsetof(VoxelPoint, evidence)},
 };
 
+/// A VoxelRecord with float32 coordinates.
+struct [[gnu::packed]] FloatVoxelRecord {
+  float x, y, z;  ///< centre, map frame [m]
+  std::uint8_t red, green, blue;
+  std::uint16_t label;
+  std::uint8_t state;
+  float probability, occupancy, class_probability, variance, entropy, evidence;
+};
+
 /// Which voxels become points.
 struct VoxelSelection {
   VoxelStates states;
@@ -66,15 +77,16 @@ class VoxelPoints {
 
   std::size_t count() const { return begin_.back(); }
   /// Writes all points, in the order of the blocks, by offset within each. @param to memory for count()
-  /// points, of any alignment.
-  void write(VoxelPoint* to) const { writeAs(to); }
-  void write(VoxelRecord* to) const { writeAs(to); }
+  /// points, of any alignment. @param origin of the coordinates, map frame [m].
+  void write(VoxelPoint* to, const Eigen::Vector3d& origin) const { writeAs(to, origin); }
+  void write(VoxelRecord* to) const { writeAs(to, Eigen::Vector3d::Zero()); }
+  void write(FloatVoxelRecord* to) const { writeAs(to, Eigen::Vector3d::Zero()); }
 
  private:
   template <typename Point>
-  void writeAs(Point* to) const;
+  void writeAs(Point* to, const Eigen::Vector3d& origin) const;
   template <typename Point>
-  void writeBlock(std::size_t block, Point* to) const;
+  void writeBlock(std::size_t block, Point* to, const Eigen::Vector3d& origin) const;
   /// Calls job(position in blocks_) for each block, on the pool's threads.
   template <typename Job>
   void forEachBlock(const Job& job) const;
@@ -89,5 +101,9 @@ class VoxelPoints {
   ThreadPool& pool_;
   std::vector<std::size_t> begin_;  ///< the first point of each block; last, the number of all
 };
+
+/// The place that decides the origin of a cloud of voxels [m]: the middle block of a sorted list, which a few
+/// wrong poses do not move; zero without blocks.
+Eigen::Vector3d placeOf(const GridGeometry& geometry, const VoxelPoints::Blocks& blocks);
 
 }  // namespace bki_mapping

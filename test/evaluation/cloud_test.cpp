@@ -46,6 +46,34 @@ TEST(CompareClouds, CountsPointsOfTheTruth) {
   EXPECT_EQ(compareClouds(truth, cleaned, 0.03).static_kept, 2u);
 }
 
+TEST(CloudEvaluation, IsTheSameFarFromTheOrigin) {
+  const auto evaluate = [](const GridIndex& blocks) {
+    const double resolution = 0.3;
+    SemanticMap map(GridGeometry(resolution), 0.001f, 2);
+    std::vector<EvidenceUnits> plane(kBlockVoxels, 0);
+    for (std::size_t v = 0; v < plane.size(); v += 2) plane[v] = 1000;  // every other column of x
+    map.getOrAllocate({blocks}).add(0, plane.data());
+    Scan scan;
+    scan.origin = 8.0 * resolution * Eigen::Vector3d(blocks.x, blocks.y, blocks.z);
+    for (int x = 0; x < 8; ++x) {
+      for (int n = 0; n < 20; ++n) {
+        const float along = 0.01f + 0.014f * static_cast<float>(n);
+        scan.points.emplace_back(0.3f * static_cast<float>(x) + along, 1.0f, 1.0f);
+        scan.labels.push_back(n % 2 ? 252u : 40u);
+      }
+    }
+    CloudEvaluation evaluation(std::nullopt, 0.005);
+    evaluation.add(scan);
+    return evaluation.compare(map);
+  };
+  const CloudQuality near = evaluate({0, 0, 0}), far = evaluate({208000, 1666000, 0});
+  EXPECT_EQ(near.static_points, 40u + 40u);
+  EXPECT_GT(near.static_kept, 20u);
+  EXPECT_EQ(far.static_kept, near.static_kept);
+  EXPECT_EQ(far.moving_removed, near.moving_removed);
+  EXPECT_EQ(far.cleaned_points, near.cleaned_points);
+}
+
 TEST(CompareClouds, NothingKeptAndNothingToKeep) {
   const CloudQuality none = compareClouds(truthOf({{{0, 0, 0}, false}, {{1, 0, 0}, true}}), {}, 0.05);
   EXPECT_EQ(none.static_kept, 0u);

@@ -17,14 +17,16 @@ namespace bki_mapping {
 namespace {
 
 /// Scans all over a map of random blocks, with points that are no numbers or far away.
-std::string writeSequence(const TemporaryFolder& folder) {
+/// @param place that the sensor starts at.
+std::string writeSequence(const TemporaryFolder& folder,
+                          const Eigen::Vector3d& place = Eigen::Vector3d::Zero()) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> draw(-8.0f, 8.0f);
   SequenceWriter writer(folder / "sequence");
   for (int s = 0; s < 3; ++s) {
     SequenceFrame frame;
     frame.T_map_sensor.linear() = Eigen::AngleAxisd(s, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    frame.T_map_sensor.translation() = Eigen::Vector3d(s, 0.5, -0.1);
+    frame.T_map_sensor.translation() = place + Eigen::Vector3d(s, 0.5, -0.1);
     for (int i = 0; i < 2000; ++i) {
       frame.points.emplace_back(draw(random), draw(random), draw(random));
       if (i % 100 == 0) frame.points.back().x() = i % 200 == 0 ? std::nanf("") : 1e30f;
@@ -75,6 +77,37 @@ TEST(CleanedPoints, LieInOccupiedVoxels) {
   for (std::size_t i = 0; i < expected.size(); ++i) {
     ASSERT_EQ(labelled[i].x, float{expected[i].x});
     ASSERT_EQ(labelled[i].label, std::uint32_t{expected[i].label});
+  }
+}
+
+TEST(CleanedPoints, AreRelativeToTheViewpointFarFromTheOrigin) {
+  const TemporaryFolder folder;
+  const GridIndex blocks{208000, 1666000, 0};  // a place in UTM coordinates
+  const Eigen::Vector3d place = 2.4 * Eigen::Vector3d(blocks.x, blocks.y, blocks.z);
+  const std::string written = writeSequence(folder, place);
+  const Sequence sequence(written, "labels", written + "/poses.txt");
+  const SemanticMap near = randomMap(2, 200, 3);
+  SemanticMap map = infoOf().emptyMap();
+  for (const auto& [index, block] : near.entries()) {
+    map.getOrAllocate({{index.x + blocks.x, index.y + blocks.y, index.z + blocks.z}}) = *block;
+  }
+  std::vector<Eigen::Vector3d> expected;
+  const Scan scan = sequence.read(0).scan();
+  for (const Eigen::Vector3f& relative : scan.points) {
+    const Eigen::Vector3d point = scan.origin + relative.cast<double>();
+    if (!((point - place).norm() < 1e6)) continue;
+    if (viewPoint(map, point).state == VoxelState::kOccupied) expected.push_back(point);
+  }
+  writeCleanedPoints(folder / "points.pcd", sequence, {0}, map);
+  pcl::PointCloud<pcl::PointXYZL> cloud;
+  ASSERT_EQ(pcl::io::loadPCDFile(folder / "points.pcd", cloud), 0);
+  EXPECT_EQ(cloud.sensor_origin_.head<3>(), Eigen::Vector3f(499000.0f, 3998000.0f, 0.0f));
+  ASSERT_GT(expected.size(), 100u);
+  ASSERT_EQ(cloud.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const Eigen::Vector3d point =
+        cloud.sensor_origin_.head<3>().cast<double>() + cloud[i].getVector3fMap().cast<double>();
+    ASSERT_LT((point - expected[i]).norm(), 1e-3) << i;
   }
 }
 

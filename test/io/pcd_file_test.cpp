@@ -56,7 +56,7 @@ TEST_F(PcdFile, EncodingsReadAlike) {
     EXPECT_TRUE(read.label.empty());
     EXPECT_FALSE(read.points[3].allFinite());
     for (std::size_t i = 4; i < cloud.size(); ++i) {
-      ASSERT_EQ(read.points[i], cloud[i].getVector3fMap()) << what << " " << i;
+      ASSERT_EQ(read.points[i].cast<float>(), cloud[i].getVector3fMap()) << what << " " << i;
       ASSERT_EQ(read.intensity[i], double{cloud[i].intensity});
     }
   };
@@ -72,9 +72,9 @@ TEST_F(PcdFile, ReadsWhatWasWritten) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   pose.translation() = Eigen::Vector3d(1234.567891, -0.1, 3.0);
-  writePcdPoints(path_, {{1, 2, 3}, {4, 5, 6.5f}}, {0, 1}, pose);
+  writePcdPoints(path_, {{1, 2, 3}, {4, 5, 6.5f}}, Eigen::Vector3d::Zero(), {0, 1}, pose);
   const PcdPoints read = readPcdPoints(path_);
-  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6.5f}}));
+  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3d>{{1, 2, 3}, {4, 5, 6.5f}}));
   EXPECT_EQ(read.intensity, (std::vector<double>{0, 1}));
   EXPECT_TRUE(readPcdViewpoint(path_).isApprox(pose, 1e-12));
   pcl::PCLPointCloud2 cloud;
@@ -82,12 +82,20 @@ TEST_F(PcdFile, ReadsWhatWasWritten) {
   EXPECT_EQ(cloud.width, 2u);
 }
 
+TEST_F(PcdFile, DoublesAreReadAndWrittenFarFromTheOrigin) {
+  const Eigen::Vector3d origin(500000.0, 4000000.0, 0.0);
+  writePcdPoints(path_, {{0.0625f, -2.125f, 3.0f}}, origin, {0.5f}, Eigen::Isometry3d::Identity());
+  const PcdPoints read = readPcdPoints(path_);
+  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3d>{{500000.0625, 3999997.875, 3.0}}));
+  EXPECT_EQ(read.intensity, (std::vector<double>{0.5}));
+}
+
 TEST_F(PcdFile, OtherTypesAndFieldsAreTaken) {
   write(
       "FIELDS label x y z\nSIZE 2 8 8 8\nTYPE U F F F\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n252 1 2 3\n");
   const PcdPoints read = readPcdPoints(path_);
   EXPECT_EQ(read.label, std::vector<double>{252});
-  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3f>{{1, 2, 3}}));
+  EXPECT_EQ(read.points, (std::vector<Eigen::Vector3d>{{1, 2, 3}}));
 }
 
 TEST_F(PcdFile, ThePoseIsThatOfTheViewpoint) {

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
 #include "temporary_folder.h"
 
@@ -40,6 +41,27 @@ TEST(TruthCloud, HoldsZerosAndOnes) {
       << fault();
   write("curvature", "1 2 3 1\n", 1);
   EXPECT_NE(fault().find("neither a field label nor a field intensity"), std::string::npos) << fault();
+}
+
+TEST(TruthCloud, IsExactFarFromTheOrigin) {
+  Scan scan;
+  scan.origin = Eigen::Vector3d(500000.3, 4000000.4, 30.0);
+  scan.points = {{10.0f, 0.0f, 0.0f}, {10.1f, 0.0f, 0.0f}};
+  scan.labels = {252, 40};
+  TruthCloud cloud;
+  cloud.add(scan);
+  const TemporaryFolder folder;
+  writeTruthCloud(folder / "gt_cloud.pcd", cloud);
+  const TruthCloud read = readTruthCloud(folder / "gt_cloud.pcd");
+  for (const TruthCloud* each : {&std::as_const(cloud), &read}) {
+    ASSERT_EQ(each->points.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Vector3d place = each->origin() + each->points[i].cast<double>(),
+                            expected = scan.origin + scan.points[i].cast<double>();
+      EXPECT_LT((place - expected).norm(), 1e-4) << i;
+      EXPECT_EQ(each->relative(scan, i), each->points[i]) << i;
+    }
+  }
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ class Follows(unittest.TestCase):
             block = world.blocks[key]
             for z, y, x in zip(*np.nonzero(np.isin(block['state'], (2, 3)))):
                 color = next((c.color for c in CLASSES if c.id == block['label'][z, y, x]), (60, 60, 70))
-                centre = [np.float32((8 * k + i + 0.5) * RESOLUTION) for k, i in zip(key, (x, y, z))]
+                centre = [(8 * k + i + 0.5) * RESOLUTION for k, i in zip(key, (x, y, z))]
                 expected.append((*centre, *color, *(block[name][z, y, x] for name in ('label', 'state', *listed.dtype.names[8:]))))
         np.testing.assert_array_equal(listed, np.array(expected, listed.dtype))
 

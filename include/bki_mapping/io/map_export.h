@@ -9,9 +9,9 @@
 
 namespace bki_mapping {
 
-/// One voxel of an exported map, laid out as a vertex of a PLY file; docs/files.md describes the fields.
+/// One voxel of an exported map; docs/files.md describes the fields.
 struct [[gnu::packed]] VoxelRecord {
-  float x, y, z;  ///< centre, map frame [m]
+  double x, y, z;  ///< centre, map frame [m]
   std::uint8_t red, green, blue;
   std::uint16_t label;  ///< class id; 255 unless occupied
   std::uint8_t state;   ///< VoxelState
@@ -26,7 +26,8 @@ std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable&
                                        const VoxelStates& states);
 
 /// Exports a map; the file appears complete or not at all. The extension, .ply or .pcd, chooses the format
-/// (both binary).
+/// (both binary). Coordinates are float32; far from the origin, they are float64 in a PLY file, and in a PCD
+/// file relative to its VIEWPOINT.
 /// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states);

@@ -11,6 +11,7 @@
 
 #include "io/voxel_pcl.h"
 #include "io/voxel_points.h"
+#include "ros/cloud_frame.h"
 #include "ros/map_snapshot.h"
 #include "streamed_message.h"
 
@@ -20,15 +21,16 @@ namespace bki_mapping::ros_interface {
 class StreamedPoints {
  public:
   StreamedPoints() = default;  ///< no points
-  /// Counts the points. @param snapshot must outlive this.
-  StreamedPoints(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
-      : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))) {}
+  /// Counts the points. @param snapshot must outlive this. @param origin of the coordinates [m].
+  StreamedPoints(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+                 const Eigen::Vector3d& origin)
+      : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))), origin_(origin) {}
 
   std::size_t points() const { return content_ ? content_->points.count() : 0; }
   std::uint32_t bytes() const { return messageBytes(points(), sizeof(VoxelPoint)); }
   std::uint32_t count() const { return bytes(); }  ///< elements of the array `data`
   void write(std::uint8_t* to) const {
-    if (content_) content_->points.write(reinterpret_cast<VoxelPoint*>(to));
+    if (content_) content_->points.write(reinterpret_cast<VoxelPoint*>(to), origin_);
   }
 
  private:
@@ -42,16 +44,19 @@ class StreamedPoints {
   };
 
   std::shared_ptr<const Content> content_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
 /// A sensor_msgs/PointCloud2 of voxels.
 struct StreamedCloud : StandsFor<sensor_msgs::PointCloud2> {
   StreamedCloud() = default;
-  /// @param snapshot must outlive this.
-  StreamedCloud(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
-      : data(snapshot, selection, std::move(blocks)) {
+  /// @param snapshot must outlive this. @param in the frame of the cloud.
+  StreamedCloud(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+                const CloudFrame& in)
+      : data(snapshot, selection, std::move(blocks), in.origin()) {
     pcl_conversions::fromPCL(pclHeader(data.points()), frame);
     frame.header = snapshot.header;
+    frame.header.frame_id = in.name(snapshot.header.frame_id);
   }
 
   template <typename Visit>

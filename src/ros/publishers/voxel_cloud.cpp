@@ -9,6 +9,15 @@ VoxelSelection known() {
   return {{VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}};
 }
 
+/// Makes a cloud of blocks, in a frame that follows them.
+StreamedCloud cloudOf(const MapSnapshot& snapshot, const VoxelSelection& selection,
+                      VoxelPoints::Blocks blocks, CloudFrame& frame) {
+  const GridGeometry& geometry = snapshot.map.geometry();
+  if (!blocks.empty())
+    frame.follow(placeOf(geometry, blocks), geometry.resolution(), snapshot.header.frame_id);
+  return {snapshot, selection, std::move(blocks), frame};
+}
+
 class VoxelCloud : public MapPublisher {
  public:
   explicit VoxelCloud(const PublisherContext& context) {
@@ -23,8 +32,10 @@ class VoxelCloud : public MapPublisher {
     VoxelPoints::Blocks blocks = sortedBlocks(snapshot.map);
     const auto hidden = [&](const auto& block) { return !snapshot.inView(block.first); };
     blocks.erase(std::remove_if(blocks.begin(), blocks.end(), hidden), blocks.end());
-    publisher_.publish(StreamedCloud(snapshot, in_view, std::move(blocks)));
+    publisher_.publish(cloudOf(snapshot, in_view, std::move(blocks), frame_));
   }
+
+  CloudFrame frame_;
 };
 
 class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
@@ -34,7 +45,7 @@ class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
 
  private:
   void fillWhole(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
-    message.cloud = {snapshot, known(), sortedBlocks(snapshot.map)};
+    message.cloud = cloudOf(snapshot, known(), sortedBlocks(snapshot.map), frame_);
   }
   void fillChanges(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
     VoxelPoints::Blocks blocks;
@@ -44,8 +55,10 @@ class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
       message.blocks.push_back(toMessage(index));
       if (const Block* block = snapshot.map.find({index})) blocks.emplace_back(BlockIndex{index}, block);
     }
-    message.cloud = {snapshot, known(), std::move(blocks)};
+    message.cloud = cloudOf(snapshot, known(), std::move(blocks), frame_);
   }
+
+  mutable CloudFrame frame_;
 };
 
 }  // namespace
