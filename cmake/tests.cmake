@@ -306,7 +306,7 @@ if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
-    test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
+    test/ros/large_coordinates_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
     test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
     test/ros/query_latency_rostest.py test/ros/rates_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
@@ -345,6 +345,7 @@ if(CATKIN_ENABLE_TESTING)
   endif()
   add_rostest(test/ros/city.test)
   add_rostest(test/ros/killed.test)
+  add_rostest(test/ros/large_coordinates.test)
   add_rostest(test/ros/launch.test)
   add_rostest(test/ros/lifecycle.test)
   add_rostest(test/ros/live.test)

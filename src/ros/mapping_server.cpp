@@ -6,6 +6,7 @@
 
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "ros/cloud_frame.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"
 
@@ -206,6 +207,7 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   warnOfFarPoints(waiting.input, stats.counts.beyond_max);
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
+  warnOfFarPlace();
   trajectory_.append({header.stamp, toPose(placed.T_map_sensor)}, mapper_->config().resolution);
   if (config_.window > 0.0) {
     trajectory_.keepWithin(sensor_, config_.window + mapper_->map().geometry().blockSize());
@@ -222,6 +224,14 @@ void MappingServer::warnOfFarPoints(std::size_t input, std::size_t count) {
       "%lu points of a cloud of %s are farther than %g m and left out as faults of the driver; set "
       "sensor_model/max_range to what the sensor sees",
       count, cloud_subscribers_[input].getTopic().c_str(), SensorModelConfig::kFarthest);
+}
+
+void MappingServer::warnOfFarPlace() {
+  if (warned_of_far_place_) return;
+  const std::string warning = farFromOriginWarning(sensor_, mapper_->config().resolution, config_.frame_id);
+  if (warning.empty()) return;
+  warned_of_far_place_ = true;
+  ROS_WARN("%s", warning.c_str());
 }
 
 ScanStats MappingServer::addToMap(const Scan& scan) {

@@ -72,6 +72,8 @@ class MappingServer {
   void onTimeJump(const ros::Time& new_time, const std::string& what);
   /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
+  /// Warns once that the sensor is too far from the origin for programs that calculate in float32.
+  void warnOfFarPlace();
   /// Logs what is wrong with the map file, when that changes.
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
@@ -111,6 +113,7 @@ class MappingServer {
   SensorTrajectory trajectory_;
   SentenceThrottle throttle_;
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
+  bool warned_of_far_place_ = false;
 
   std::unique_ptr<PoseSource> poses_;
   std::vector<ros::Subscriber> cloud_subscribers_;

@@ -114,6 +114,7 @@ class MappingTest(unittest.TestCase):
         self.assertAlmostEqual(block.class_probability[4], 1.0, places=5)
 
         cloud = self.latest('voxel_cloud', PointCloud2, stamp)
+        self.assertEqual(cloud.header.frame_id, 'map')
         names = [f.name for f in cloud.fields]
         self.assertEqual(names, ['x', 'y', 'z', 'rgb', 'label', 'state', 'probability', 'occupancy', 'class_probability',
                                  'variance', 'entropy', 'evidence'])

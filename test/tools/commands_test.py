@@ -53,6 +53,7 @@ LEFT_OUT = {
     **dict.fromkeys(('mkdir driven', "BKI_MAPPING_DRIVE=driven build/devel/lib/bki_mapping/navigation_test --gtest_filter='*Traffic*'",
                      'python3 examples/draw_path.py driven/driven.bkm driven/driven.csv --movers driven/movers.csv --output driven.png'),
                     'takes a minute; navigation_test drives'),
+    'rosrun tf2_ros static_transform_publisher 500000 4000000 0 0 0 0 utm map': 'needs poses in a frame utm',
     'rosrun octomap_server octomap_server_node ~/street.bt _frame_id:=map': 'not in Debian',
     **dict.fromkeys(('sbatch --ntasks=64 scripts/map_city.sbatch drives/city.yaml --output city',
                      'export DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES=1000',

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bki_mapping/map/voxel_state.h"
+#include "core/float_origin.h"
 #include "map/voxel_color.h"
 #include "ros/map_publisher.h"
 #include "streamed_markers.h"
@@ -148,9 +149,14 @@ class CellMarkers : public MapPublisher {
     }
   }
 
+  static double edgeOf(const MapSnapshot& snapshot) {
+    return kRegionEdge * snapshot.map.geometry().blockSize();
+  }
+  static Eigen::Vector3d centreOf(const GridIndex& region, const MapSnapshot& snapshot) {
+    return Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edgeOf(snapshot);
+  }
   bool inView(const GridIndex& region, const MapSnapshot& snapshot) const {
-    const double edge = kRegionEdge * snapshot.map.geometry().blockSize();
-    return snapshot.inView(Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edge, edge);
+    return snapshot.inView(centreOf(region, snapshot), edgeOf(snapshot));
   }
 
   /// Appends the markers of regions. Several threads count their voxels.
@@ -166,7 +172,8 @@ class CellMarkers : public MapPublisher {
     message.threads = snapshot.threadsFor(kBlocks * indices.size());
     ThreadPool pool(message.threads);
     pool.forEachInOrder(indices.size(), [&](std::size_t r, std::size_t) {
-      if (regions[r]->in_view) cells[r] = cellsOf(indices[r], snapshot);
+      cells[r].origin = floatOrigin(centreOf(indices[r], snapshot), snapshot.map.geometry().resolution());
+      if (regions[r]->in_view) count(indices[r], snapshot, cells[r]);
     });
     for (std::size_t r = 0; r < indices.size(); ++r) {
       MarkerGroup markers = markersOf(std::move(cells[r]), snapshot, *regions[r]);
@@ -191,12 +198,12 @@ class CellMarkers : public MapPublisher {
 
   /// What a region shows.
   struct Cells {
+    Eigen::Vector3d origin;  ///< of the markers' points: rviz rounds them to float32 [m]
     std::vector<std::pair<BlockIndex, const Block*>> blocks;
     std::array<std::uint32_t, 256> of_label{};  ///< number of voxels
   };
 
-  Cells cellsOf(const GridIndex& region, const MapSnapshot& snapshot) const {
-    Cells cells;
+  void count(const GridIndex& region, const MapSnapshot& snapshot, Cells& cells) const {
     BlockView view;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
@@ -210,14 +217,13 @@ class CellMarkers : public MapPublisher {
       });
       if (any) cells.blocks.emplace_back(index, block);
     }
-    return cells;
   }
 
   /// The markers of a region, and the deletion of those that have become empty.
   MarkerGroup markersOf(Cells cells, const MapSnapshot& snapshot, Region& region) const {
     MarkerGroup group;
     const auto append = [&](ClassId label, std::int32_t action) {
-      group.markers.push_back({emptyMarker(snapshot, label), cells.of_label[label]});
+      group.markers.push_back({emptyMarker(snapshot, label, cells.origin), cells.of_label[label]});
       group.markers.back().frame.id = region.id;
       group.markers.back().frame.action = action;
     };
@@ -238,34 +244,39 @@ class CellMarkers : public MapPublisher {
       for (std::size_t label = 0; label < of_label.size(); ++label) {
         if (cells.of_label[label] > 0) of_label[label] = &writers[number++];
       }
-      for (const auto& [index, block] : cells.blocks) writeCubes(index, *block, snapshot, of_label);
+      for (const auto& [index, block] : cells.blocks) {
+        writeCubes(index, *block, snapshot, cells.origin, of_label);
+      }
     };
     return group;
   }
 
   void writeCubes(const BlockIndex& index, const Block& block, const MapSnapshot& snapshot,
-                  const std::array<CubeWriter*, 256>& of_label) const {
+                  const Eigen::Vector3d& origin, const std::array<CubeWriter*, 256>& of_label) const {
     const ColorMode mode = snapshot.config.color_mode;
     const double edge = snapshot.map.geometry().resolution();
     BlockView view;
     readBlock(snapshot.map, index, block, fieldsOf(mode), view);
     double x[kBlockEdge], y[kBlockEdge];
     for (int n = 0; n < kBlockEdge; ++n) {
-      x[n] = (index.x * kBlockEdge + n + 0.5) * edge;
-      y[n] = (index.y * kBlockEdge + n + 0.5) * edge;
+      x[n] = (index.x * kBlockEdge + n + 0.5) * edge - origin.x();
+      y[n] = (index.y * kBlockEdge + n + 0.5) * edge - origin.y();
     }
     forEachShown(index, view, snapshot, [&](std::size_t v, double z) {
-      of_label[view.label[v]]->add({x[v % kBlockEdge], y[v / kBlockEdge % kBlockEdge], z},
+      of_label[view.label[v]]->add({x[v % kBlockEdge], y[v / kBlockEdge % kBlockEdge], z - origin.z()},
                                    rgba(colorOf(view, v, z, mode, snapshot.classes), alpha_));
     });
   }
 
-  Marker emptyMarker(const MapSnapshot& snapshot, ClassId label) const {
+  Marker emptyMarker(const MapSnapshot& snapshot, ClassId label, const Eigen::Vector3d& origin) const {
     const SemanticClass* known = snapshot.classes.find(label);
     Marker marker;
     marker.header = snapshot.header;
     marker.ns = known ? known->name : "free";
     marker.type = Marker::CUBE_LIST;
+    marker.pose.position.x = origin.x();
+    marker.pose.position.y = origin.y();
+    marker.pose.position.z = origin.z();
     marker.pose.orientation.w = 1.0;
     const double edge = snapshot.map.geometry().resolution();
     marker.scale.x = marker.scale.y = marker.scale.z = edge;

@@ -44,6 +44,11 @@ std::vector<TransformKind> valueKinds() {
             t.transform.translation.x = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
             t.transform.translation.y = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
           }),
+      one("tf/translation_utm", "a translation in UTM coordinates", {"mapped"},
+          [](TransformStamped& t, Dice& dice) {
+            t.transform.translation.x = dice.between(166e3, 834e3);
+            t.transform.translation.y = dice.between(0.0, 10e6);
+          }),
       one("tf/translation_denormal", "a translation of 5e-324 m", {"mapped"},
           [](TransformStamped& t, Dice&) { t.transform.translation.x = 5e-324; }),
       one("tf/rotation_nan", "a rotation that is NaN or infinite", {"bad transform"},
