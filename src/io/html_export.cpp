@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "io/display_colors.h"
 #include "io/html_page.h"
 #include "io/voxel_drives.h"
 #include "store/tile_codec.h"
@@ -201,7 +202,8 @@ class TileWriter {
 
 json classList(const ClassTable& classes, const Count& count) {
   json list = json::array();
-  for (const SemanticClass& c : classes.classes()) {
+  const ClassTable shown = displayTable(classes);
+  for (const SemanticClass& c : shown.classes()) {
     list.push_back({{"id", c.id}, {"name", c.name}, {"color", c.color}, {"voxels", count.by_class[c.id]}});
   }
   return list;

@@ -6,13 +6,18 @@
 #include <stdexcept>
 
 #include "core/atomic_file.h"
+#include "io/display_colors.h"
 
 namespace bki_mapping {
 namespace {
 
 constexpr Color kBackground = {255, 255, 255};
-/// Brightness of the farthest voxels, as a fraction of that of the nearest.
-constexpr double kFarthest = 0.45;
+/// Cells around a cell that shade it, in each direction.
+constexpr int kReach = 2;
+/// By how much each of them must be nearer to the viewer to shade it fully [voxels].
+constexpr double kFullRise = 8.0;
+/// Brightness of a cell that all others shade fully.
+constexpr double kDarkest = 0.7;
 
 Color darkened(const Color& color, double brightness) {
   Color darker;
@@ -42,7 +47,7 @@ void writePng(const std::string& path, const Picture& picture) {
 }
 
 MapPicture::MapPicture(View view, const GridIndex& low, const GridIndex& high)
-    : view_(view), along_y_(high.y - low.y > high.x - low.x) {
+    : view_(view), along_y_(high.y - low.y > high.x - low.x), highest_(high.z) {
   if (low.x > high.x) return;
   const Seen a = see(low), b = see(high);
   first_ = {std::min(a.right, b.right), std::min(a.up, b.up), std::min(a.nearness, b.nearness)};
@@ -66,7 +71,9 @@ void MapPicture::add(const BlockIndex& index, const BlockView& view) {
     const auto v = static_cast<std::size_t>(offset);
     const bool occupied = view.state[v] == VoxelState::kOccupied;
     if (!occupied && view.state[v] != VoxelState::kFree) continue;
-    const Seen seen = see(GridGeometry::voxelOf(index, offset));
+    const GridIndex voxel = GridGeometry::voxelOf(index, offset);
+    if (voxel.z > highest_) continue;
+    const Seen seen = see(voxel);
     const auto column = static_cast<std::size_t>((seen.right - first_.right) / voxels_);
     const auto row = static_cast<std::size_t>((seen.up - first_.up) / voxels_);
     Cell& cell = cells_.at(row * static_cast<std::size_t>(width_) + column);
@@ -80,22 +87,46 @@ void MapPicture::add(const BlockIndex& index, const BlockView& view) {
   }
 }
 
+const MapPicture::Cell& MapPicture::cellAt(int column, int row) const {
+  return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                static_cast<std::size_t>(column)];
+}
+
+// Only what is near shades a cell, so that a floor keeps its colour below a ceiling with gaps, and a street
+// below a single voxel high above it.
+double MapPicture::brightness(int column, int row) const {
+  const int own = cellAt(column, row).nearness;
+  double shade = 0.0;
+  int around = 0;
+  for (int y = std::max(0, row - kReach); y <= std::min(height_ - 1, row + kReach); ++y) {
+    for (int x = std::max(0, column - kReach); x <= std::min(width_ - 1, column + kReach); ++x) {
+      const int other = cellAt(x, y).nearness;
+      if (other == kNothing || (x == column && y == row)) continue;
+      ++around;
+      shade += std::clamp((other - own) / kFullRise, 0.0, 1.0);
+    }
+  }
+  return around == 0 ? 1.0 : 1.0 - (1.0 - kDarkest) * shade / around;
+}
+
 Picture MapPicture::draw(const ClassTable& classes) const {
+  const ClassTable shown = displayTable(classes);
   Picture picture{std::max(1, width_ * pixels_), std::max(1, height_ * pixels_), {}};
   picture.pixels.assign(static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height),
                         kBackground);
-  const double depth = std::max(1, last_.nearness - first_.nearness);
-  for (int y = 0; y < height_ * pixels_; ++y) {
-    for (int x = 0; x < width_ * pixels_; ++x) {
-      const Cell& cell = cells_[static_cast<std::size_t>(y / pixels_ * width_ + x / pixels_)];
-      Color& pixel = picture.pixels[static_cast<std::size_t>((picture.height - 1 - y) * picture.width + x)];
-      if (cell.nearness == kNothing) {
-        if (cell.free) pixel = kFreeColor;
-        continue;
+  for (int row = 0; row < height_; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      const Cell& cell = cellAt(column, row);
+      if (cell.nearness == kNothing && !cell.free) continue;
+      const Color color =
+          cell.nearness == kNothing
+              ? kFreeColor
+              : darkened(semanticColor(VoxelState::kOccupied, cell.label, shown), brightness(column, row));
+      for (int y = row * pixels_; y < (row + 1) * pixels_; ++y) {
+        const auto first = picture.pixels.begin() + std::ptrdiff_t{picture.height - 1 - y} * picture.width +
+                           column * pixels_;
+        std::fill(first, first + pixels_, color);
       }
-      const double near = (cell.nearness - first_.nearness) / depth;
-      pixel = darkened(semanticColor(VoxelState::kOccupied, cell.label, classes),
-                       kFarthest + (1.0 - kFarthest) * near);
     }
   }
   return picture;

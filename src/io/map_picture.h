@@ -32,12 +32,13 @@ class MapPicture {
   /// Longest edge of a picture [pixels]. Larger maps are reduced to it, smaller ones enlarged.
   static constexpr int kMostPixels = 2048;
 
-  /// @param low, high the first and last voxel that is shown; without voxels, low.x > high.x.
+  /// @param low, high the first and last voxel that is shown; without voxels, low.x > high.x. What lies above
+  /// high.z is left out; no voxel may lie outside of the box otherwise.
   MapPicture(View view, const GridIndex& low, const GridIndex& high);
 
   void add(const BlockIndex& index, const BlockView& view);
-  /// Occupied voxels in the colours of their classes, farther ones darker; free space light blue; the rest
-  /// white.
+  /// Occupied voxels in the colours of displayTable, darker beside voxels that are nearer to the viewer; free
+  /// space light blue; the rest white.
   Picture draw(const ClassTable& classes) const;
   /// Edge of a pixel [voxels].
   double voxelsPerPixel() const { return static_cast<double>(voxels_) / pixels_; }
@@ -55,9 +56,13 @@ class MapPicture {
     int right, up, nearness;
   };
   Seen see(const GridIndex& voxel) const;
+  const Cell& cellAt(int column, int row) const;
+  /// The brightness of an occupied cell, 0.7 to 1.
+  double brightness(int column, int row) const;
 
   View view_;
   bool along_y_;                 ///< in a profile, whether the map extends along y
+  int highest_;                  ///< z of the highest voxels that are shown
   Seen first_{}, last_{};        ///< least and greatest coordinates
   int voxels_ = 1, pixels_ = 1;  ///< `voxels_` adjacent voxels take `pixels_` pixels; one of the two is 1
   int width_ = 0, height_ = 0;   ///< [cells]

@@ -1,8 +1,11 @@
 // Prints what is in a map file, and draws it.
+#include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <iomanip>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
@@ -25,6 +28,8 @@ po::options_description options() {
   options.add_options()("json", text("FILE.json"), "also write the figures as JSON")(
       "top", text("FILE.png"), "draw the map as seen from above")(
       "profile", text("FILE.png"), "draw the map as seen from its longer side")(
+      "max-z", po::value<double>()->value_name("M"),
+      "draw only voxels up to this height [m], to look below ceilings and trees")(
       "parameters", po::bool_switch(), "print the parameters in the file as YAML, and exit");
   return options;
 }
@@ -134,12 +139,26 @@ std::string pictureFile(const po::variables_map& given, const char* option) {
   return path;
 }
 
-void draw(MapFile& file, SemanticMap& empty_map, const MapStatistics& found, const std::string& top,
-          const std::string& profile) {
+/// The last voxel to be drawn. @param most greatest height of centres, if there is a limit [m].
+GridIndex lastDrawn(const MapStatistics& found, double resolution, const std::optional<double>& most) {
+  GridIndex last = found.high;
+  if (!most || found.low.x > found.high.x) return last;
+  const double layer = std::floor(*most / resolution - 0.5);
+  if (!(layer >= found.low.z)) {
+    throw std::invalid_argument("--max-z " + numberText(*most) +
+                                " is below the map; its lowest voxels are at z = " +
+                                numberText((found.low.z + 0.5) * resolution) + " m");
+  }
+  last.z = static_cast<std::int32_t>(std::min<double>(last.z, layer));
+  return last;
+}
+
+void draw(MapFile& file, SemanticMap& empty_map, const MapStatistics& found, const GridIndex& last,
+          const std::string& top, const std::string& profile) {
   std::vector<std::pair<std::string, MapPicture>> pictures;
-  if (!top.empty()) pictures.emplace_back(top, MapPicture(MapPicture::View::kTop, found.low, found.high));
+  if (!top.empty()) pictures.emplace_back(top, MapPicture(MapPicture::View::kTop, found.low, last));
   if (!profile.empty())
-    pictures.emplace_back(profile, MapPicture(MapPicture::View::kProfile, found.low, found.high));
+    pictures.emplace_back(profile, MapPicture(MapPicture::View::kProfile, found.low, last));
   if (pictures.empty()) return;
   readStatistics(file, empty_map, [&](const BlockIndex& index, const BlockView& view) {
     for (auto& [path, picture] : pictures) picture.add(index, view);
@@ -159,14 +178,20 @@ int inspect(const po::variables_map& given) {
     return 0;
   }
   const std::string top = pictureFile(given, "top"), profile = pictureFile(given, "profile");
+  std::optional<double> most;
+  if (given.count("max-z")) most = given["max-z"].as<double>();
+  if (most && top.empty() && profile.empty()) {
+    throw std::invalid_argument("--max-z limits pictures; give --top or --profile as well");
+  }
   if (given.count("json")) checkWritable(given["json"].as<std::string>());
   SemanticMap empty_map = emptyMapWithGains(path, file.info());
   const MapStatistics found = readStatistics(file, empty_map);
+  const GridIndex last = lastDrawn(found, file.info().resolution, most);
   print(std::cout, file, found);
   if (given.count("json")) {
     writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found).dump(2) + "\n");
   }
-  draw(file, empty_map, found, top, profile);
+  draw(file, empty_map, found, last, top, profile);
   return 0;
 }
 

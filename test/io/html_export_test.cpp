@@ -236,6 +236,8 @@ TEST_F(HtmlExport, CountsClassesAndBounds) {
   });
   ASSERT_EQ(page.header["classes"].size(), 3u);
   for (const json& c : page.header["classes"]) EXPECT_EQ(c["voxels"], voxels[c["id"]]) << c;
+  EXPECT_EQ(page.header["classes"][0]["color"], (json{140, 140, 140}))
+      << "unlabelled, which the table colours";
   for (std::size_t a = 0; a < 3; ++a) {
     EXPECT_EQ(page.header["bounds"]["min"][a], *places[a].begin());
     EXPECT_EQ(page.header["bounds"]["max"][a], *places[a].rbegin());

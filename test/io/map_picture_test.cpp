@@ -8,6 +8,7 @@
 
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/yaml.h"
+#include "io/display_colors.h"
 #include "io/map_statistics.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
@@ -143,35 +144,53 @@ int coordinate(const GridIndex& i, int axis) {
   return axis < 0 ? -values[-1 - axis] : values[axis];
 }
 
+/// The place of the nearest voxel in each cell of a picture, by right and up.
+using Nearest = std::map<std::pair<int, int>, std::pair<int, ClassId>>;
+
+/// How bright a cell is: 0.7 if all 24 cells around it are 8 voxels nearer.
+double brightnessOf(const Nearest& nearest, const std::pair<int, int>& cell) {
+  double shade = 0.0;
+  int around = 0;
+  for (const auto& [other, seen] : nearest) {
+    if (seen.second == kFreeClass || other == cell) continue;
+    if (std::abs(other.first - cell.first) > 2 || std::abs(other.second - cell.second) > 2) continue;
+    ++around;
+    shade += std::min(8, std::max(0, seen.first - nearest.at(cell).first)) / 8.0;
+  }
+  return around == 0 ? 1.0 : 1.0 - 0.3 * shade / around;
+}
+
 /// The colours of what is nearest.
 Picture drawn(const SemanticMap& map, const MapStatistics& found, const Axes& axes, int pixels) {
   const int right = axes.right, up = axes.up, towards = axes.towards;
   const int left = coordinate(found.low, right), below = coordinate(found.low, up);
   const int far = std::min(coordinate(found.low, towards), coordinate(found.high, towards));
-  const int near = std::max(coordinate(found.low, towards), coordinate(found.high, towards));
   Picture picture;
   picture.width = (coordinate(found.high, right) - left + 1) * pixels;
   picture.height = (coordinate(found.high, up) - below + 1) * pixels;
   picture.pixels.assign(static_cast<std::size_t>(picture.width * picture.height), Color{255, 255, 255});
-  std::map<std::pair<int, int>, std::pair<int, Color>> nearest;  // nearness and colour by right and up
+  const ClassTable shown = displayTable(*infoOf().classes);
+  Nearest nearest;
   forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state == VoxelState::kOccluded) return;
     const int nearness = view.state == VoxelState::kFree ? far - 1 : coordinate(voxel, towards);
-    Color color = kFreeColor;
-    if (view.state == VoxelState::kOccupied) {
-      const double brightness = 0.45 + 0.55 * (nearness - far) / std::max(1, near - far);
-      color = infoOf().classes->find(view.label)->color;
-      for (std::uint8_t& part : color) part = static_cast<std::uint8_t>(brightness * part);
-    }
+    const ClassId label = view.state == VoxelState::kFree ? kFreeClass : view.label;
     const std::pair<int, int> cell(coordinate(voxel, right) - left, coordinate(voxel, up) - below);
     const auto known = nearest.find(cell);
-    if (known == nearest.end() || known->second.first < nearness) nearest[cell] = {nearness, color};
+    if (known == nearest.end() || known->second.first < nearness) nearest[cell] = {nearness, label};
   });
   for (const auto& [cell, seen] : nearest) {
+    Color color = kFreeColor;
+    if (seen.second != kFreeClass) {
+      color = shown.find(seen.second)->color;
+      for (std::uint8_t& part : color) {
+        part = static_cast<std::uint8_t>(brightnessOf(nearest, cell) * part);
+      }
+    }
     for (int y = 0; y < pixels; ++y) {
       const int row = picture.height - 1 - (cell.second * pixels + y);
       const auto first = picture.pixels.begin() + row * picture.width + cell.first * pixels;
-      std::fill(first, first + pixels, seen.second);
+      std::fill(first, first + pixels, color);
     }
   }
   return picture;
@@ -222,9 +241,64 @@ TEST(MapPicture, TurnsProfilesToTheLongerSide) {
     EXPECT_EQ(profile.height, 2048 / 40 * 8);
     const auto width = static_cast<std::size_t>(profile.width);
     EXPECT_EQ(profile.pixels[width / 4], (Color{1, 128, 255})) << along_y;
-    EXPECT_GT(profile.pixels[width - 1][2], 100) << along_y;
-    EXPECT_LT(profile.pixels[width - 1][2], 200) << along_y;
+    const Color behind = displayTable(*infoOf().classes).find(80)->color;
+    EXPECT_EQ(profile.pixels[width - 1], behind) << along_y;
+    const Color beside = profile.pixels[width / 40 * 24 + 5];  // the first column behind
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_LE(beside[c], behind[c]) << along_y;
+      EXPECT_GE(beside[c], behind[c] / 2) << along_y;
+    }
+    EXPECT_NE(beside, behind) << along_y;
   }
+}
+
+TEST(MapPicture, FloorsKeepTheirColourBelowCeilings) {
+  SemanticMap map = infoOf().emptyMap();
+  std::vector<EvidenceUnits> floor(kBlockVoxels, 0), ceiling(kBlockVoxels, 0);
+  for (std::size_t v = 0; v < 64; ++v) floor[v] = 100;
+  for (std::size_t v = 0; v < 64; v += 4) ceiling[v] = 100;  // a fourth of it, as few beams meet it
+  for (int x = 0; x < 6; ++x) {
+    for (int y = 0; y < 6; ++y) {
+      map.getOrAllocate({{x, y, 0}}).add(40, floor.data());
+      if (x < 4) map.getOrAllocate({{x, y, 3}}).add(80, ceiling.data());
+    }
+  }
+  const TemporaryFolder folder;
+  saveMap(folder / "map.bkm", infoOf(), {}, map);
+  const Picture top = inspect(folder / "map.bkm").top;
+  const Color floor_color = infoOf().classes->find(40)->color;  // (1, 128, 255)
+  const int pixels = top.width / 48;
+  std::size_t plain = 0, darkened = 0;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      const Color color = top.pixels[static_cast<std::size_t>((y * top.width + x) * pixels)];
+      if (x < 32 && x % 4 == 0) continue;  // the ceiling
+      EXPECT_GE(color[1], floor_color[1] * 3 / 4) << x << " " << y;
+      EXPECT_GE(color[2], floor_color[2] * 3 / 4) << x << " " << y;
+      (color == floor_color ? plain : darkened) += 1;
+    }
+  }
+  EXPECT_GT(darkened, 500u) << "below the ceiling";
+  EXPECT_GT(plain, 500u) << "beside it";
+}
+
+TEST(MapPicture, LeavesOutWhatIsAboveTheHighestVoxel) {
+  MapPicture picture(MapPicture::View::kTop, {0, 0, 0}, {7, 7, 3});
+  BlockView view;
+  view.state.fill(VoxelState::kUnknown);
+  view.label.fill(40);
+  view.state[0] = view.state[64 * 3 + 1] = view.state[64 * 4 + 2] = VoxelState::kOccupied;
+  view.state[64 * 7 + 3] = VoxelState::kFree;
+  picture.add({{0, 0, 0}}, view);
+  const Picture drawn = picture.draw(*infoOf().classes);
+  const auto at = [&](std::size_t x) {
+    return drawn.pixels[drawn.pixels.size() - static_cast<std::size_t>(drawn.width) +
+                        x * static_cast<std::size_t>(drawn.width) / 8];
+  };
+  EXPECT_NE(at(0), (Color{255, 255, 255}));
+  EXPECT_NE(at(1), (Color{255, 255, 255}));
+  EXPECT_EQ(at(2), (Color{255, 255, 255})) << "above";
+  EXPECT_EQ(at(3), (Color{255, 255, 255})) << "above";
 }
 
 TEST(MapPicture, ReducesLargeMaps) {
