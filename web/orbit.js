@@ -83,9 +83,14 @@ class OrbitCamera {
     this.update();
   }
 
+  /// The length of a pixel at the target.
+  unitsPerPixel() {
+    return 2 * this.distance * Math.tan(THREE.Math.degToRad(this.camera.fov / 2)) / this.element.clientHeight;
+  }
+
   /// Moves the target with the pointer, over the ground. @param dx, dy [pixels].
   pan(dx, dy) {
-    const per_pixel = 2 * this.distance * Math.tan(THREE.Math.degToRad(this.camera.fov / 2)) / this.element.clientHeight;
+    const per_pixel = this.unitsPerPixel();
     const c = Math.cos(this.azimuth), s = Math.sin(this.azimuth), sine = Math.sin(this.elevation);
     const forward = per_pixel * dy * (Math.abs(sine) > 0.35 ? 1 / sine : 0), right = -per_pixel * dx;
     this.target.x += -s * right - c * forward;

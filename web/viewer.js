@@ -104,8 +104,20 @@ class Viewer {
     const {common} = this.voxels, {camera} = this.orbit;
     common.u_eye.value.copy(camera.position);
     common.u_size.value = kPointEdge * camera.projectionMatrix.elements[5] * this.canvas.height / 2;
+    this.lines.u_view.value.set(this.canvas.width, this.canvas.height);
+    this.lines.u_near.value = camera.near;
+    this.lines.u_ratio.value = this.renderer.getPixelRatio();
     this.renderer.render(this.scene, this.orbit.camera);
+    this.drawScale();
     ++this.frames;
+  }
+
+  /// Draws a bar of a round length, as long as it is in the middle of the view.
+  drawScale() {
+    const most = 110, metres = this.header.resolution * this.orbit.unitsPerPixel() * most;  // of a bar of `most` pixels
+    const power = 10 ** Math.floor(Math.log10(metres)), length = [5, 2, 1].find((n) => n * power <= metres) * power;
+    byId('scale-bar').style.width = `${most * length / metres}px`;
+    byId('scale-text').textContent = length >= 1000 ? `${length / 1000} km` : length >= 1 ? `${length} m` : `${Math.round(100 * length)} cm`;
   }
 
   resize() {
@@ -156,18 +168,12 @@ class Viewer {
 
   addTrajectories() {
     this.trajectories = new THREE.Group();
+    this.lines = {u_view: {value: new THREE.Vector2()}, u_near: {value: 1}, u_ratio: {value: 1}};
     this.header.trajectories.forEach((trajectory, n) => {
       const places = trajectory.points.map((p) => new THREE.Vector3(...p.map((m, a) => m / this.header.resolution - this.voxels.middle[a])));
       if (places.length < 2) return;
-      const [r, g, b] = this.header.trajectories.length === 1 ? kTrajectoryColor : kDriveColors[1 + n % 9];
-      const path = new THREE.CurvePath();
-      for (let i = 0; i + 1 < places.length; ++i) {
-        if (places[i].distanceTo(places[i + 1]) > 1e-3) path.add(new THREE.LineCurve3(places[i], places[i + 1]));
-      }
-      if (path.curves.length === 0) return;
-      const radius = Math.max(0.3, 0.15 / this.header.resolution), segments = Math.min(4000, 2 * path.curves.length);
-      const tube = new THREE.TubeBufferGeometry(path, segments, radius, 6);
-      this.trajectories.add(new THREE.Mesh(tube, new THREE.MeshBasicMaterial({color: new THREE.Color(r / 255, g / 255, b / 255)})));
+      const color = this.header.trajectories.length === 1 ? kTrajectoryColor : kDriveColors[1 + n % 9];
+      this.trajectories.add(trajectoryLine(places, color, this.lines));
     });
     this.trajectories.visible = this.trajectories.children.length > 0;
     this.scene.add(this.trajectories);

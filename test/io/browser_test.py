@@ -53,6 +53,8 @@ def vertices(path):
 
 
 class Browser(unittest.TestCase):
+    FAR = (499200, 3998400, 38.4)  # a place in UTM coordinates [m], a whole number of tiles away, so that these are the same
+
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp()
@@ -63,6 +65,8 @@ class Browser(unittest.TestCase):
         call('map_sequence', '--sequence', drive, '--classes', table, '--output', bkm, '--drive', HOSTILE)
         call('export_map', bkm, '--html', cls.path('map.html'), '--trajectory', drive)
         call('export_map', bkm, '--output', cls.path('map.ply'), '--include', 'occupied,free')
+        call('merge_maps', bkm, '--transform', f'{bkm}={",".join(map(str, cls.FAR))},0', '--output', cls.path('far.bkm'))
+        call('export_map', cls.path('far.bkm'), '--html', cls.path('far.html'))
         cls.voxels = vertices(cls.path('map.ply'))
         options = webdriver.ChromeOptions()
         options.binary_location = CHROMIUM
@@ -84,12 +88,12 @@ class Browser(unittest.TestCase):
     def setUp(self):
         self.open_page()
 
-    def open_page(self, width=900, height=700, mobile=False, before=''):
+    def open_page(self, width=900, height=700, mobile=False, before='', name='map.html'):
         self.command('Emulation.setDeviceMetricsOverride', width=width, height=height, deviceScaleFactor=1, mobile=mobile)
         self.command('Emulation.setTouchEmulationEnabled', enabled=mobile)
         script = self.command('Page.addScriptToEvaluateOnNewDocument', source=before)['identifier']
         self.browser.get_log('browser')  # forgets those of the page before
-        self.browser.get('file://' + self.path('map.html'))
+        self.browser.get('file://' + self.path(name))
         self.command('Page.removeScriptToEvaluateOnNewDocument', identifier=script)
         end = time.monotonic() + 120
         while self.js('return document.documentElement.dataset.ready') is None:
@@ -178,7 +182,7 @@ class Browser(unittest.TestCase):
     def test_text_of_the_map_stays_text(self):
         self.assertIn(HOSTILE, self.text('classes'))
         self.assertEqual(self.js('return document.scripts.length'),
-                         self.js('return 7 + document.querySelectorAll("script.evidence").length'), 'none was added')
+                         self.js('return 8 + document.querySelectorAll("script.evidence").length'), 'none was added')
         road = next(voxel for voxel in self.voxels if voxel['label'] == 9)
         self.show(road)
         self.assertEqual(self.text('voxel-title'), HOSTILE)
@@ -272,10 +276,73 @@ class Browser(unittest.TestCase):
         self.js('viewer.orbit.zoom(0.5)')
         self.assert_drawn_as_picked()
 
+    def pixels(self):
+        """The picture, as (width, height, colours of all pixels from the bottom left)."""
+        width, height, data = self.js('''
+          viewer.drawNow();
+          const gl = viewer.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight, pixels = new Uint8Array(4 * w * h);
+          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          return [w, h, Array.from(pixels.filter((byte, i) => i % 4 < 3), (byte) => String.fromCharCode(byte)).join("")]''')
+        return width, height, [tuple(map(ord, data[i:i + 3])) for i in range(0, len(data), 3)]
+
+    def trajectory_pixels(self):
+        """How many pixels the trajectory changes, and how many of them are of its own colour."""
+        self.js('viewer.trajectories.visible = true')
+        shown = self.pixels()[2]
+        self.js('viewer.trajectories.visible = false')
+        hidden = self.pixels()[2]
+        changed = [one for one, other in zip(shown, hidden) if one != other]
+        return len(changed), changed.count((255, 255, 255))
+
+    def test_the_trajectory_is_seen_from_any_distance(self):
+        length = 'const p = viewer.header.trajectories[0].points.map((point) => new THREE.Vector3(...point.map((m, a) => m / ' \
+                 'viewer.header.resolution - viewer.voxels.middle[a])).project(viewer.orbit.camera)), a = p[0], b = p[p.length - 1]; ' \
+                 'return Math.hypot((a.x - b.x) * innerWidth / 2, (a.y - b.y) * innerHeight / 2)'
+        self.click('from-top')
+        for zoom in (1.0, 2.0, 2.0, 2.0):
+            self.js('viewer.orbit.zoom(arguments[0])', zoom)
+            changed, white = self.trajectory_pixels()
+            pixels = self.js(length)
+            self.assertGreater(white, 3.0 * pixels, 'as wide as it should be')
+            self.assertLess(changed, 14.0 * (pixels + 14.0), 'and no wider than it and its edge')
+        self.slide('top', 1000)
+        self.click('reset')
+        self.click('theme')
+        self.assertGreater(self.trajectory_pixels()[1], 50, 'in front of the other background')
+
+    def test_the_trajectory_shines_through(self):
+        self.js('viewer.orbit.elevation = -0.5; viewer.orbit.update()')  # from below the ground
+        changed, white = self.trajectory_pixels()
+        self.assertGreater(changed, 50)
+        self.assertLess(white, changed / 20, 'only through gaps in the ground')
+
+    def test_the_scale(self):
+        lengths = set()
+        for zoom in (1.0, 1.5, 1.5, 0.05, 0.2, 20.0):
+            self.js('viewer.orbit.zoom(arguments[0]); viewer.drawNow()', zoom)
+            number, unit = self.text('scale-text').split(' ')
+            metres = float(number) * {'cm': 0.01, 'm': 1.0, 'km': 1000.0}[unit]
+            self.assertIn(number.rstrip('0').replace('.', '').lstrip('0'), ('1', '2', '5'), number)
+            # The same length at the target, across the view, as the camera sees it.
+            pixels = self.js('''
+              const {camera, target} = viewer.orbit, right = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+              const end = target.clone().addScaledVector(right, arguments[0] / viewer.header.resolution).project(camera);
+              return (end.x - target.clone().project(camera).x) * innerWidth / 2''', metres)
+            width = self.js('return document.getElementById("scale-bar").getBoundingClientRect().width')
+            self.assertAlmostEqual(width, pixels, delta=1.0, msg=self.text('scale-text'))
+            self.assertTrue(40 < width <= 110, width)
+            lengths.add(metres)
+        self.assertGreater(len(lengths), 3)
+        self.open_page(390, 844, mobile=True)
+        self.assertTrue(self.js('''
+          const box = document.getElementById('scale').getBoundingClientRect(), bar = document.getElementById('bar').getBoundingClientRect();
+          return box.bottom < bar.top && box.right < innerWidth'''), 'above the buttons of a phone')
+
     def test_colours(self):
         def ramp(value):
             return self.js('return [...viewer.voxels.ramp.image.data.slice(4 * arguments[0], 4 * arguments[0] + 3)]', value)
         self.assertEqual(ramp(253), [255, 200, 0])
+        self.assertEqual(ramp(0), [140, 140, 140], 'unlabelled is grey, although the table says black')
         before = self.picture()
         for mode in ('occupancy', 'class_probability', 'height'):
             self.js('document.getElementById("mode-" + arguments[0]).click()', mode)
@@ -374,6 +441,20 @@ class Browser(unittest.TestCase):
         unnamed = self.js('''return [...document.querySelectorAll('button, input')].filter((e) =>
           !(e.textContent.trim() || e.getAttribute('aria-label') || (e.labels && e.labels.length && e.labels[0].textContent.trim()))).map((e) => e.id)''')
         self.assertEqual(unnamed, [])
+
+    def test_a_map_far_from_the_origin_looks_the_same(self):
+        self.js('viewer.trajectories.visible = false')
+        near = self.pixels()[2]
+        self.open_page(name='far.html')
+        far = self.pixels()[2]
+        self.assertLess(sum(one != other for one, other in zip(near, far)), 1e-3 * len(near))
+        voxel = self.voxels[0]
+        centre = [voxel[axis] + shift for axis, shift in zip('xyz', self.FAR)]
+        index = [i + round(shift / 0.3) for i, shift in zip(self.index_of(voxel), self.FAR)]
+        found = self.wait(f'describeVoxel(viewer.map, {", ".join(map(str, index))})')
+        self.assertEqual((found['state'], found['label']), (voxel['state'], voxel['label']))
+        for axis in range(3):
+            self.assertAlmostEqual(found['centre'][axis], centre[axis], places=4)
 
     def test_a_browser_without_decompression_stream(self):
         road = next(voxel for voxel in self.voxels if voxel['label'] == 9)

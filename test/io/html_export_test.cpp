@@ -272,7 +272,7 @@ TEST_F(HtmlExport, TextOfTheMapCannotBecomePartOfThePage) {
     for (std::size_t at = 0; (at = page.html.find(word, at)) != std::string::npos; ++at) ++found;
     return found;
   };
-  EXPECT_EQ(count("</script>"), 7 + 2 * page.voxels.size());
+  EXPECT_EQ(count("</script>"), 8 + 2 * page.voxels.size());
   EXPECT_EQ(count("<script src"), 0u) << "the page loads nothing";
   EXPECT_EQ(count("Permission is hereby granted"), 1u) << "the license of three.js";
 }
