@@ -225,6 +225,17 @@ class Queries(unittest.TestCase):
         for field, values in (('state', states), ('label', labels), ('probability', probabilities), ('variance', variances)):
             np.testing.assert_array_equal(whole[field], values)
 
+    def test_voxels_are_exact_far_from_the_origin(self):
+        mapper, place = bki.SemanticMapper(classes='semantic_kitti', resolution=0.1), np.array([500000.0, 4000000.0, 30.0])
+        points = np.random.default_rng(5).uniform(-5, 5, (500, 3))
+        mapper.integrate(place, points, np.full(500, 50, np.uint32))
+        voxels = mapper.map.voxels(['occupied', 'free'])
+        places = np.stack([voxels[axis] for axis in 'xyz'], axis=1)
+        self.assertGreater(len(voxels), 1000)
+        self.assertEqual(len(np.unique(places, axis=0)), len(voxels))
+        np.testing.assert_allclose(places / 0.1 % 1.0, 0.5, atol=1e-3)
+        np.testing.assert_array_equal(mapper.map.states(places), voxels['state'])
+
     def test_voxels_agree_with_queries(self):
         voxels = self.map.voxels(['occupied', 'free'])
         points = np.stack([voxels['x'], voxels['y'], voxels['z']], axis=1)
