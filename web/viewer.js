@@ -223,6 +223,8 @@ class Viewer {
         this.trajectories.visible = on;
         this.draw();
       });
+    } else {
+      byId('states').append(make('p', {id: 'no-trajectory'}, 'No trajectory: map files hold none; give export_map --trajectory.'));
     }
     for (const c of [...header.classes].filter((one) => one.voxels > 0).sort((a, b) => b.voxels - a.voxels)) {
       const input = make('input', {type: 'checkbox', checked: true, id: `class-${c.id}`, className: 'class'});

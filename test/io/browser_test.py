@@ -445,7 +445,9 @@ class Browser(unittest.TestCase):
     def test_a_map_far_from_the_origin_looks_the_same(self):
         self.js('viewer.trajectories.visible = false')
         near = self.pixels()[2]
+        self.assertIsNone(self.js('return document.getElementById("no-trajectory")'))
         self.open_page(name='far.html')
+        self.assertIn('export_map --trajectory', self.text('no-trajectory'))
         far = self.pixels()[2]
         self.assertLess(sum(one != other for one, other in zip(near, far)), 1e-3 * len(near))
         voxel = self.voxels[0]
