@@ -9,6 +9,7 @@ bki_mapping_room(ros SOURCES
     kept_map.cpp
     label_reader.cpp
     live_settings.cpp
+    reconfigure_server.cpp
     load_advice.cpp
     publisher_set.cpp
     mapping_diagnostics.cpp

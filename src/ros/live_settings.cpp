@@ -1,7 +1,5 @@
 #include "ros/live_settings.h"
 
-#include <ros/param.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -42,11 +40,9 @@ std::map<std::string, std::string> valuesOf(const ServerConfig& server, const Ma
 LiveSettings::LiveSettings(const ros::NodeHandle& private_node, const ServerConfig& server,
                            const MapperConfig& mapper, Apply apply, std::function<void()> answered)
     : server_(server), mapper_(mapper), apply_(std::move(apply)), answered_(std::move(answered)) {
-  ros::NodeHandle node(private_node, "reconfigure");
-  ros::param::del(node.getNamespace());  // values of an earlier run
-  offered_ = std::make_unique<dynamic_reconfigure::Server<MappingConfig>>(mutex_, node);
-  offered_->updateConfig(show(server_, mapper_));
-  offered_->setCallback([this](MappingConfig& config, std::uint32_t) { onChange(config); });
+  offered_ = std::make_unique<ReconfigureServer>(
+      private_node, show(server_, mapper_),
+      [this](const dynamic_reconfigure::Config& asked) { return onChange(asked); });
 }
 
 MappingConfig LiveSettings::show(const ServerConfig& server, const MapperConfig& mapper) {
@@ -80,10 +76,13 @@ void LiveSettings::take(const MappingConfig& from, ServerConfig& server, MapperC
   setParameters(changed, server, mapper);
 }
 
-void LiveSettings::onChange(MappingConfig& config) {
+MappingConfig LiveSettings::onChange(dynamic_reconfigure::Config asked) {
   ServerConfig server = server_;
   MapperConfig mapper = mapper_;
+  MappingConfig config = show(server, mapper);
   try {
+    checkSettings(asked, config);
+    config.__fromMessage__(asked);
     take(config, server, mapper);
     if (valuesOf(server, mapper) != valuesOf(server_, mapper_)) apply_(server, mapper);
     server_ = server;
@@ -96,6 +95,7 @@ void LiveSettings::onChange(MappingConfig& config) {
   answered_();
   config = show(server_, mapper_);
   config.last_refusal = last_refusal_;
+  return config;
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <bki_mapping/MappingConfig.h>
-#include <dynamic_reconfigure/server.h>
+#include <dynamic_reconfigure/Config.h>
 
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "ros/reconfigure_server.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
@@ -43,15 +44,14 @@ class LiveSettings {
   static void take(const MappingConfig& from, ServerConfig& server, MapperConfig& mapper);
 
  private:
-  void onChange(MappingConfig& config);
+  MappingConfig onChange(dynamic_reconfigure::Config asked);
 
   ServerConfig server_;
   MapperConfig mapper_;
   Apply apply_;
   std::function<void()> answered_;
   std::string last_refusal_;
-  boost::recursive_mutex mutex_;  ///< protects offered_
-  std::unique_ptr<dynamic_reconfigure::Server<MappingConfig>> offered_;
+  std::unique_ptr<ReconfigureServer> offered_;
 };
 
 }  // namespace bki_mapping::ros_interface

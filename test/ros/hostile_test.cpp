@@ -9,6 +9,7 @@
 #include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/SaveMap.h>
 #include <dynamic_reconfigure/Reconfigure.h>
+#include <dynamic_reconfigure/config_tools.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
@@ -273,6 +274,11 @@ class Attack {
     dynamic_reconfigure::Reconfigure change;
     kind.change(change.request.config, dice_);
     ASSERT_TRUE(mapper_.call("reconfigure/set_parameters", change)) << where();
+    std::string refusal;
+    dynamic_reconfigure::ConfigTools::getParameter(change.response.config, "last_refusal", refusal);
+    ++results_.answers[kind.name][refusal.empty() ? "applied" : "refused"];
+    if (kind.refused) EXPECT_GT(refusal.size(), 20u) << where();
+    EXPECT_LT(refusal.size(), 3000u) << where();
     // Applied settings must be able to map at least a small cloud.
     const ros::Time stamp = nextStamp();
     publishHonestTransforms(stamp);
@@ -497,7 +503,8 @@ std::vector<std::pair<std::string, std::string>> allRows() {
   for (const CloudKind& kind : cloudKinds()) add(kind.name, kind.sent, join(kind.answers));
   for (const TransformKind& kind : transformKinds()) add(kind.name, kind.sent, join(kind.answers));
   for (const PathKind& kind : pathKinds()) add(kind.name, kind.sent, kind.written ? "written" : "refused");
-  for (const SettingsKind& kind : settingsKinds()) add(kind.name, kind.sent, "applied or refused as a whole");
+  for (const SettingsKind& kind : settingsKinds())
+    add(kind.name, kind.sent, kind.refused ? "refused as a whole" : "applied or refused as a whole");
   for (const QueryKind& kind : queryKinds())
     add(kind.name, kind.sent, kind.answered ? "answered" : "refused");
   for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud by itself");

@@ -6,13 +6,16 @@ import sys
 import rospy
 import rostest
 from bki_mapping.msg import OccupancyMap
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.msg import Config, DoubleParameter, IntParameter
+from dynamic_reconfigure.srv import Reconfigure
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import PointField
 from std_srvs.srv import Trigger
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import CAR, ROAD, Listener, MapperTest, Robot, adds_up, make_cloud, random_scan, wait_until  # noqa: E402
+from harness import CAR, ROAD, TIMEOUT, Listener, MapperTest, Robot, adds_up, make_cloud, random_scan, wait_until  # noqa: E402
 
 QUEUE = 3  # queue_size in live.test
 CAR_COLOR = 0x6496f5  # of config/classes/semantic_kitti.yaml
@@ -33,6 +36,11 @@ class Live(MapperTest):
         """The next stamp of the robot, for a cloud of another input."""
         other.seconds = self.robot.seconds = self.robot.seconds + 1
         return rospy.Time(other.seconds)
+
+    def client(self):
+        client = Client('/mapping/reconfigure', timeout=TIMEOUT)
+        self.addCleanup(client.close)
+        return client
 
     def fill_queue(self, clouds):
         """Publishes more clouds than the queue holds, and then their poses; returns the stamps."""
@@ -169,6 +177,39 @@ class Live(MapperTest):
         self.log.wait_for(lambda m: 'resolution cannot change while mapping' in m.msg, 'the reason in the log')
         self.assertEqual(self.reconfigure(view_range=3.0).last_refusal, '', 'taken over')
         wait_until(lambda: self.status.messages[-1].last_refusal == '', 'the status without a refusal')
+
+    def test_a_value_beyond_its_limits_is_refused_and_not_clamped(self):
+        updates, client = Listener('/mapping/reconfigure/parameter_updates', Config), self.client()
+        before = client.get_configuration(TIMEOUT)
+        names = set(before) - {'last_refusal', 'groups'}
+        for settings, words in (({'free_gain_dynamic': -1.0}, "free_gain/dynamic is '-1', but must be a number > 0"),
+                                ({'free_gain_dynamic': 0.0}, "free_gain/dynamic is '0'"),
+                                ({'queue_size': -1}, "queue_size is '-1', but must be an integer from 1 to 10000"),
+                                ({'queue_size': 20000}, "queue_size is '20000'"),
+                                ({'view_range': 3.0, 'publish_rate': -1.0}, "publish_rate is '-1'")):
+            seen = len(updates.messages)
+            answer = client.update_configuration(settings)
+            self.assertIn(words, answer.last_refusal)
+            self.assertEqual({name: answer[name] for name in names}, {name: before[name] for name in names}, 'as a whole')
+            wait_until(lambda: len(updates.messages) > seen, 'an update for clients that show the values')
+            shown = {p.name: p.value for p in updates.messages[-1].doubles + updates.messages[-1].ints}
+            self.assertEqual(shown, {name: before[name] for name in shown}, 'the values in force')
+            self.assertEqual(rospy.get_param('/mapping/reconfigure/free_gain_dynamic'), before['free_gain_dynamic'])
+            self.status.wait_for(lambda m: m.last_refusal == answer.last_refusal, 'the refusal in the status')
+        self.assertIn('min', client.get_parameter_descriptions(TIMEOUT)[0], 'limits, for sliders')
+
+    def test_settings_that_are_unknown_or_of_another_type_are_refused(self):
+        change = rospy.ServiceProxy('/mapping/reconfigure/set_parameters', Reconfigure)
+        for asked, words in ((Config(doubles=[DoubleParameter('free_gain_dynamc', 2.0)]),
+                              "setting 'free_gain_dynamc' is unknown; did you mean 'free_gain_dynamic'?"),
+                             (Config(ints=[IntParameter('free_gain_dynamic', 2)]),
+                              'setting free_gain_dynamic is an integer, but must be a floating-point number'),
+                             (Config(doubles=[DoubleParameter('window', 20.0), DoubleParameter('window', 30.0)]),
+                              'setting window is given twice; keep one')):
+            asked.doubles.append(DoubleParameter('view_range', 3.0))
+            answer = change(asked).config
+            self.assertEqual([p.value for p in answer.strs if p.name == 'last_refusal'], [words])
+            self.assertEqual([p.value for p in answer.doubles if p.name == 'view_range'], [0.0])
 
     def test_window_and_memory_are_bounded(self):
         self.reconfigure(window=40.0)

@@ -149,7 +149,7 @@ const std::vector<PathKind>& pathKinds() {
 
 const std::vector<SettingsKind>& settingsKinds() {
   static const std::vector<SettingsKind> kinds = {
-      {"settings/allowed", "other modes, ranges, gains, windows and queues", setAllowed},
+      {"settings/allowed", "other modes, ranges, gains, windows and queues", setAllowed, false},
       {"settings/nan", "NaN",
        [](Config& config, Dice& dice) {
          for (int n = 0; n < 3; ++n) set(config, dice.oneOf(kNumbers), kNan);
@@ -163,6 +163,16 @@ const std::vector<SettingsKind>& settingsKinds() {
          for (int n = 0; n < 3; ++n)
            set(config, dice.oneOf(kNumbers), dice.oneOf<double>({1e300, -1e300, 0.0, -0.0}));
          set(config, "queue_size", dice.oneOf<int>({0, -1, 2147483647, -2147483647 - 1}));
+       }},
+      {"settings/outside", "one number just beyond its limits, which clients show",
+       [](Config& config, Dice& dice) {
+         const auto [name, value] =
+             dice.oneOf<std::pair<std::string, double>>({{"free_gain_dynamic", -1.0},
+                                                         {"free_gain_static", 0.0},
+                                                         {"sensor_model_min_range", -0.1},
+                                                         {"scan_limit_hits", -1e-9},
+                                                         {"publish_rate", 0.0}});
+         set(config, name, value);
        }},
       {"settings/word", "words that are not among the choices",
        [](Config& config, Dice& dice) {

@@ -76,6 +76,7 @@ struct SettingsKind {
   std::string name;
   std::string sent;  ///< description
   std::function<void(dynamic_reconfigure::Config&, Dice&)> change;
+  bool refused = true;  ///< always; else it may be applied
 };
 const std::vector<SettingsKind>& settingsKinds();
 
