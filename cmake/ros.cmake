@@ -94,7 +94,7 @@ endif()
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
-catkin_install_python(PROGRAMS scripts/body_box.py scripts/class_table_path.py scripts/mapping_summary.py scripts/play_bag.py
+catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py scripts/play_bag.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 
 # pcl_ros serves at run time: launch files load its nodelets, nothing is linked with it. Debian's describes them as being in

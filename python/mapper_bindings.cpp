@@ -2,8 +2,6 @@
 
 #include <pybind11/stl.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
@@ -13,7 +11,6 @@
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "io/share_path.h"
 #include "map_bindings.h"
 
 namespace bki_mapping::python {
@@ -44,25 +41,9 @@ auto alone(Mapper& self, Function&& function) {
   return function();
 }
 
-/// A parameter file: a path, or the name of one of the presets that come with the package.
-std::string presetFile(const std::string& name_or_file) {
-  namespace fs = std::filesystem;
-  if (fs::is_regular_file(name_or_file)) return name_or_file;
-  const fs::path folder = fs::path(sharePath()) / "config" / "presets";
-  const fs::path preset = folder / (name_or_file + ".yaml");
-  if (name_or_file.find('/') == std::string::npos && fs::is_regular_file(preset)) return preset.string();
-  std::vector<std::string> known;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored))
-    known.push_back(entry.path().stem().string());
-  std::sort(known.begin(), known.end());
-  throw std::invalid_argument("parameter file '" + name_or_file + "' is neither a file nor " +
-                              wordsText(known) + nearestWord(name_or_file, known));
-}
-
 MapperConfig configOf(py::handle config, py::handle resolution, py::dict parameters) {
   MapperConfig result;
-  if (!config.is_none()) setParameters(result, loadParameterFile(presetFile(pathOf(config, "config"))));
+  if (!config.is_none()) setParameters(result, loadParameterFile(pathOf(config, "config")));
   if (!resolution.is_none()) parameters["resolution"] = resolution;
   setParameters(result, settingsOf(parameters));
   return result;

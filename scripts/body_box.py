@@ -30,9 +30,12 @@ def fault_of(box):
 
 
 def names_inputs(config):
-    with open(os.path.expanduser(config)) as file:
-        settings = yaml.safe_load(file) or {}
-    return any(str(name).split('/')[0] == 'inputs' for name in settings)
+    try:
+        with open(os.path.expanduser(config)) as file:
+            settings = yaml.safe_load(file)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return False  # a preset, none of which has inputs, or the node says what is wrong
+    return isinstance(settings, dict) and any(str(name).split('/')[0] == 'inputs' for name in settings)
 
 
 if __name__ == '__main__':

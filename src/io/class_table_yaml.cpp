@@ -9,36 +9,11 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "io/share_path.h"
+#include "io/named_file.h"
 #include "io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {
-
-namespace fs = std::filesystem;
-
-fs::path classFolder() {
-  return fs::path(sharePath()) / "config" / "classes";
-}
-
-std::vector<std::string> knownTables() {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(classFolder(), ignored)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-std::string findFile(const std::string& name_or_file) {
-  if (fs::is_regular_file(name_or_file)) return name_or_file;
-  const fs::path known = classFolder() / (name_or_file + ".yaml");
-  if (name_or_file.find('/') == std::string::npos && fs::is_regular_file(known)) return known.string();
-  std::string text = "class table '" + name_or_file + "' is neither a file nor one of:";
-  for (const std::string& name : knownTables()) text += " " + name;
-  throw std::invalid_argument(text + nearestWord(name_or_file, knownTables()));
-}
 
 [[noreturn]] void fail(const std::string& file, const std::string& why) {
   throw std::invalid_argument("class table " + file + ": " + why);
@@ -138,7 +113,7 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
 }  // namespace
 
 ClassTable loadClassTable(const std::string& name_or_file) {
-  const std::string file = findFile(name_or_file);
+  const std::string file = findNamedFile("class table", "config/classes", name_or_file);
   try {
     const YAML::Node root = loadYamlFile(file);
     if (!root.IsMap()) fail(file, "it must be a map with a list 'classes'");
@@ -148,8 +123,9 @@ ClassTable loadClassTable(const std::string& name_or_file) {
     for (const YAML::Node& node : root["classes"]) {
       classes.push_back(parseClass(file, node, classes.size() + 1));
     }
-    return ClassTable(root["name"] ? nameOf(file, root["name"], "the table") : fs::path(file).stem().string(),
-                      classes);
+    return ClassTable(
+        root["name"] ? nameOf(file, root["name"], "the table") : std::filesystem::path(file).stem().string(),
+        classes);
   } catch (const YAML::Exception& error) {
     fail(file, error.what());
   }

@@ -4,10 +4,26 @@
 #include <stdexcept>
 
 #include "bki_mapping/mapping/mapper_config.h"
+#include "io/named_file.h"
 #include "io/yaml_file.h"
 
 namespace bki_mapping {
 namespace {
+
+/// The text of a scalar. The truth words of YAML 1.1, which roslaunch reads as such, become "true" and
+/// "false".
+std::string textOf(const YAML::Node& scalar) {
+  const std::string text = scalar.as<std::string>();
+  const bool is_quoted = scalar.Tag() == "!";
+  if (is_quoted) return text;
+  for (const char* word : {"true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON"}) {
+    if (text == word) return "true";
+  }
+  for (const char* word : {"false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF"}) {
+    if (text == word) return "false";
+  }
+  return text;
+}
 
 void flatten(const YAML::Node& node, const std::string& name, std::map<std::string, std::string>& values) {
   if (node.IsMap()) {
@@ -17,7 +33,7 @@ void flatten(const YAML::Node& node, const std::string& name, std::map<std::stri
   } else if (name.empty() && !node.IsNull()) {
     throw std::invalid_argument("it must be a map of parameters, as 'resolution: 0.2' is");
   } else if (node.IsScalar()) {
-    if (!values.emplace(name, node.as<std::string>()).second) {
+    if (!values.emplace(name, textOf(node)).second) {
       throw std::invalid_argument("parameter '" + name + "' is given twice; keep one");
     }
   } else if (!(node.IsNull() && name.empty())) {  // an empty file sets nothing
@@ -41,7 +57,8 @@ std::string comment(const std::string& sentence, const std::string& indent) {
 
 }  // namespace
 
-std::map<std::string, std::string> loadParameterFile(const std::string& file) {
+std::map<std::string, std::string> loadParameterFile(const std::string& name_or_file) {
+  const std::string file = findNamedFile("parameter file", "config/presets", name_or_file);
   std::map<std::string, std::string> values;
   try {
     flatten(loadYamlFile(file), "", values);

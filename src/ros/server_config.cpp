@@ -5,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::ros_interface {
@@ -28,6 +29,9 @@ std::string textOf(const std::string& name, XmlRpc::XmlRpcValue value) {
 /// What dynamic_reconfigure writes.
 const std::string kLive = "reconfigure/";
 
+/// The parameter that names a file of parameters.
+const std::string kConfig = "config";
+
 /// What the names of inputs' parameters begin with.
 const std::string kInputs = "inputs/";
 
@@ -41,6 +45,16 @@ std::set<std::string> inputNames(const std::map<std::string, std::string>& value
     }
   }
   return names;
+}
+
+/// The parameters in a file. @throws std::invalid_argument also if it names another file.
+std::map<std::string, std::string> fileParameters(const std::string& file) {
+  std::map<std::string, std::string> values = loadParameterFile(file);
+  if (values.count(kConfig) != 0) {
+    throw std::invalid_argument("parameter file " + file +
+                                " names another one as config; put all in one file");
+  }
+  return values;
 }
 
 /// What setParameters sets: one table of all kinds, so that one message lists every fault, and names near to
@@ -69,6 +83,10 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
       textParameter("classes", &C::classes, "a name of config/classes, or a YAML file", Changes::kAtStart,
                     "Class table: the names, colours and flags of the labels. Set it to the table of the "
                     "network that labels the points."),
+      textParameter(
+          "config", &C::config, "a name of config/presets, or a YAML file", Changes::kAtStart,
+          "Parameters to start from: a preset or a file of your own. Parameters that the node is given "
+          "itself go before those of the file. Empty: the defaults."),
       realParameter(
           "tf_timeout", &C::tf_timeout, NumberRange::atLeast(0.0).slider(0.0, 60.0), "s",
           Changes::kWhileMapping,
@@ -163,6 +181,9 @@ void readParameters(const ros::NodeHandle& private_node, ServerConfig& server, M
     if (name.compare(0, kLive.size(), kLive) != 0 && private_node.getParam(full, value)) {
       values[name] = textOf(name, value);
     }
+  }
+  if (const auto config = values.find(kConfig); config != values.end() && !config->second.empty()) {
+    values.merge(fileParameters(config->second));
   }
   setParameters(values, server, mapper);
 }

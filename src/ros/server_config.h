@@ -23,6 +23,7 @@ enum class ColorMode { kSemantics, kProbability, kVariance, kHeight };
 struct ServerConfig {
   std::string frame_id = "map";            ///< the map frame
   std::string classes = "semantic_kitti";  ///< name of a class table, or a file
+  std::string config;                      ///< name of a preset, or a file of parameters; "": none
   double tf_timeout = 0.5;                 ///< how long a cloud waits for its transform [s of wall time]
   int queue_size = 10;                     ///< most clouds that wait
   QueuePolicy queue_policy = QueuePolicy::kDropOldest;
@@ -58,8 +59,9 @@ std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfi
 /// The server's own parameters; the mapper's are in mapping/mapper_config.h.
 std::vector<NamedParameter<ServerConfig>> serverParameters();
 
-/// Reads all parameters of a private namespace.
-/// @throws std::invalid_argument that names every unknown parameter and every value not allowed.
+/// Reads all parameters of a private namespace, and those of the file `config` that the namespace lacks.
+/// @throws std::invalid_argument that names every unknown parameter and every value not allowed, or the
+/// fault of the file.
 void readParameters(const ros::NodeHandle& private_node, ServerConfig& server, MapperConfig& mapper);
 
 /// The same from names and text.

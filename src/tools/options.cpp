@@ -122,7 +122,8 @@ po::options_description mapperOptions() {
   options.add_options()("classes",
                         po::value<std::string>()->default_value("semantic_kitti")->value_name("NAME|FILE"),
                         "class table: a name in config/classes, or a YAML file")(
-      "config", po::value<std::string>()->value_name("FILE"), "YAML file of parameters")(
+      "config", po::value<std::string>()->value_name("NAME|FILE"),
+      "parameters: a preset in config/presets, or a YAML file")(
       "set", po::value<std::vector<std::string>>()->value_name("NAME=VALUE")->composing(),
       "set a parameter, overriding --config; repeatable, once per parameter")(
       "threads", po::value<std::string>()->value_name("N"), "threads of the map update; 0: all cores");

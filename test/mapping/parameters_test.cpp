@@ -221,7 +221,42 @@ TEST(ParameterFile, NamesItsFaults) {
   names("kernel: {length: 0.2}\nkernel: {scale: 0.1}\n", "'kernel' is given twice");
   EXPECT_EQ(faultOf("kernel: {length: 0.2}\nkernel/scale: 0.1\n"), "");
   EXPECT_NE(faultOf("prior: [1\n").find(file), std::string::npos);
-  EXPECT_THROW(loadParameterFile("/no/such/file.yaml"), std::invalid_argument);
+}
+
+TEST(ParameterFile, HasAPathOrTheNameOfAPreset) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "robot.yaml") << "prior: 0.5\n";
+  EXPECT_EQ(loadParameterFile("robot").at("prior"), "0.0001");
+  EXPECT_EQ(loadParameterFile(folder / "robot.yaml").at("prior"), "0.5");
+  const auto faultOf = [](const std::string& name) -> std::string {
+    try {
+      loadParameterFile(name);
+    } catch (const std::invalid_argument& fault) {
+      return fault.what();
+    }
+    return "";
+  };
+  const std::string known =
+      "neither a file nor one of baseline_even, crowded, occupancy_only, paper_line, paper_linear, "
+      "paper_none, "
+      "robot, small_cpu";
+  EXPECT_EQ(faultOf("crowdd"), "parameter file 'crowdd' is " + known + "; did you mean 'crowded'?");
+  EXPECT_EQ(faultOf("/no/such/crowded.yaml"),
+            "parameter file '/no/such/crowded.yaml' is " + known + "; did you mean 'crowded'?");
+  const std::string here = std::filesystem::current_path().string();
+  EXPECT_EQ(faultOf("robot.yaml"),
+            "parameter file 'robot.yaml' (" + here + "/robot.yaml) is " + known + "; did you mean 'robot'?");
+  EXPECT_EQ(faultOf("./xyzxyzxyz"), "parameter file './xyzxyzxyz' (" + here + "/xyzxyzxyz) is " + known);
+  EXPECT_NE(faultOf("."), "") << "a folder is no file";
+  EXPECT_NE(faultOf(""), "");
+}
+
+TEST(ParameterFile, HasTheTruthWordsOfYaml) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "file.yaml") << "a: True\nb: yes\nc: Off\nd: 'no'\ne: \"True\"\nf: y\n";
+  EXPECT_EQ(loadParameterFile(folder / "file.yaml"),
+            (std::map<std::string, std::string>{
+                {"a", "true"}, {"b", "true"}, {"c", "false"}, {"d", "no"}, {"e", "True"}, {"f", "y"}}));
 }
 
 }  // namespace

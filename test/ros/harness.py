@@ -136,11 +136,11 @@ class Mapping:
     """A running launch file with the mapper `mapping`, and a robot."""
     points = [(0.2 * i - 10.0, 8.0, 0.1 * (i % 20) - 1.0) for i in range(100)]
 
-    def __init__(self, *arguments, launch=('bki_mapping', 'mapping.launch')):
+    def __init__(self, *arguments, launch=('bki_mapping', 'mapping.launch'), cwd=None):
         self.output = tempfile.TemporaryFile('w+')
         self.status = Listener('/mapping/status', MappingStatus)
         self.robot = Robot('/velodyne_points')
-        self.launch = subprocess.Popen(['roslaunch', '--wait', *launch, *arguments],
+        self.launch = subprocess.Popen(['roslaunch', '--wait', *launch, *arguments], cwd=cwd,
                                        stdout=self.output, stderr=subprocess.STDOUT)
         try:
             self.robot.connect()

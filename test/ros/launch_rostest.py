@@ -2,16 +2,19 @@
 """mapping.launch as users start it: with every preset, as node and as nodelet, with simulated time that jumps back."""
 import glob
 import os
+import subprocess
 import sys
+import tempfile
 import unittest
 
 import roslib.packages
 import rospy
 import rostest
+from bki_mapping.msg import OccupancyMap
 from rosgraph_msgs.msg import Clock, Log
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import Listener, Mapping, wait_until  # noqa: E402
+from harness import TIMEOUT, Listener, Mapping, wait_until  # noqa: E402
 
 
 class Launch(unittest.TestCase):
@@ -23,9 +26,10 @@ class Launch(unittest.TestCase):
         presets = glob.glob(os.path.join(roslib.packages.get_pkg_dir('bki_mapping'), 'config/presets/*.yaml'))
         self.assertGreaterEqual(len(presets), 8)
         for number, preset in enumerate(sorted(presets)):
+            name = os.path.splitext(os.path.basename(preset))[0]
             plain = ['labelled:=false', 'classes:=occupancy'] if 'occupancy_only' in preset else []
             nodelet = 'true' if number % 2 else 'false'
-            with Mapping(f'config:={preset}', f'nodelet:={nodelet}', *plain) as mapping:
+            with Mapping(f'config:={name}', f'nodelet:={nodelet}', *plain) as mapping:
                 status = mapping.scan()
             self.assertTrue(status.integrated_last, f'{preset}: {status}')
             self.assertGreater(status.blocks, 2, preset)
@@ -38,7 +42,53 @@ class Launch(unittest.TestCase):
             status = mapping.scan()
         self.assertTrue(status.integrated_last, status)
         self.assertEqual([settings[name] for name in ('occupancy_height', 'occupancy_min_z', 'occupancy_max_z')], ['ground', 0.1, 2.0])
-        self.assertEqual(settings['prior'], 0.0001, 'besides, the preset of robots')
+        self.assertEqual(settings['config'], 'robot', 'besides, the preset of robots')
+
+    def test_voxels_are_as_large_as_asked_for(self):
+        occupancy = Listener('/occupancy', OccupancyMap)
+        self.addCleanup(occupancy.close)
+        with Mapping('resolution:=0.5', 'config:=paper_none') as mapping:
+            mapping.scan()
+            self.assertEqual(occupancy.wait_for(lambda m: m.blocks, 'the map').resolution, 0.5)
+
+    def test_a_map_file_is_relative_to_the_folder_of_the_shell(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for _ in range(2):  # the second continues the file
+                with Mapping("map_file:=rob's street.bkm", cwd=folder) as mapping:
+                    status = mapping.scan()
+                self.assertEqual(status.map_file_fault, '')
+                self.assertEqual(os.listdir(folder), ["rob's street.bkm"])
+            self.assertGreater(status.blocks, 0)
+
+    def test_a_wrong_setting_ends_the_launch_with_one_sentence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with open(os.path.join(folder, 'two.yaml'), 'w') as file:
+                file.write('config: robot\nprior: 0.001\n')
+            for arguments, words in ((['config:=crowdd'], "neither a file nor one of baseline_even, crowded, occupancy_only, "),
+                                     (['config:=none.yaml'], f"parameter file '{folder}/none.yaml' is neither a file nor one of"),
+                                     (['config:=two.yaml'], f'parameter file {folder}/two.yaml names another one as config'),
+                                     (['classes:=tooy'], "did you mean 'toy'?"),
+                                     (['resolution:=ten'], "resolution is 'ten', but must be a number"),
+                                     (['map_file:=map.ply'], 'must end in .bkm')):
+                for nodelet in 'true', 'false':
+                    launch = subprocess.run(['roslaunch', '--wait', 'bki_mapping', 'mapping.launch', f'nodelet:={nodelet}', *arguments],
+                                            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT,
+                                            check=False)
+                    self.assertEqual(sum(words in line for line in launch.stdout.splitlines()), 1, launch.stdout)
+                    self.assertNotRegex(launch.stdout, 'Traceback|RLException')
+
+    def test_other_nodes_go_on_where_the_mapper_is_not_required(self):
+        launch = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', 'mapping.launch', 'required:=false', 'config:=crowdd'],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.addCleanup(launch.communicate)
+        self.addCleanup(launch.terminate)
+        for line in launch.stdout:
+            if 'has died' in line or 'finished cleanly' in line:
+                break
+        else:
+            self.fail('the launch has ended')
+        rospy.wait_for_service('/mapping_manager/list', TIMEOUT)
+        self.assertIsNone(launch.poll())
 
     def test_a_clock_that_goes_back_is_a_time_jump(self):
         rospy.set_param('/use_sim_time', True)

@@ -134,7 +134,6 @@ class Replay(unittest.TestCase):
                   'sequence:=none')
         self.ends(f"{self.path('drive/predictions/000000.label')} cannot be read; check", 'semantic_kitti.launch',
                   'sequence:=drive', 'labels:=predictions')
-        self.ends('file does not exist [none.yaml]', 'semantic_kitti.launch', 'sequence:=drive', 'config:=none.yaml')
 
     def test_a_mapper_that_does_not_start_ends_the_launch(self):
         for nodelet in ('true', 'false'):
@@ -143,6 +142,9 @@ class Replay(unittest.TestCase):
         self.ends("did you mean 'toy'?", 'replay.launch', 'bag:=my drive.bag', 'classes:=tooy')
         self.ends(f"'{self.path('none.yaml')}' is neither a file nor one of", 'replay.launch', 'bag:=my drive.bag',
                   'classes:=./none.yaml')
+        self.ends(f"'{self.path('none.yaml')}' is neither a file nor one of", 'semantic_kitti.launch', 'sequence:=drive',
+                  'config:=none.yaml')
+        self.ends("did you mean 'crowded'?", 'replay.launch', 'bag:=my drive.bag', 'config:=crowdd')
 
     def test_rate_0_waits_for_the_mapper_and_not_for_just_any_listener(self):
         clouds, poses = Listener('/velodyne_points', PointCloud2), Listener('/tf', TFMessage)

@@ -16,9 +16,10 @@ namespace bki_mapping {
 ClassTable loadClassTable(const std::string& name_or_file);
 
 /// Reads a YAML file of nested maps into a flat map: names joined by `/`, values as text.
-/// @throws std::invalid_argument in one sentence: no such file, invalid YAML (see yaml_file.h), a value that
-/// is a list, or a name that occurs twice.
-std::map<std::string, std::string> loadParameterFile(const std::string& file);
+/// @param name_or_file a preset of config/presets (its name without .yaml), or the path of a file.
+/// @throws std::invalid_argument in one sentence: unknown name or file, invalid YAML (see yaml_file.h), a
+/// value that is a list, or a name that occurs twice.
+std::map<std::string, std::string> loadParameterFile(const std::string& name_or_file);
 
 /// The same for the text of such a file, as parameterYaml returns it. @throws std::invalid_argument as above,
 /// but without the name of a file.

@@ -29,7 +29,7 @@ class Drive(NamedTuple):
 class City(NamedTuple):
     drives: Tuple[Drive, ...]  # sorted by name
     classes: str
-    config: str  # '' or the path of a YAML file of parameters
+    config: str  # '', the name of a preset, or the path of a YAML file of parameters
     settings: Tuple[str, ...]  # NAME=VALUE, sorted
     piece_scans: int  # scans that one task maps
     region_tiles: int  # edge of a region [tiles of 64 voxels]
@@ -71,12 +71,16 @@ def read_city(path, add=(), without=()) -> City:
         raise CityError(f'set in {path} has threads, but each task uses one core; leave it out, and use more workers')
     config = text_of(text, 'config', '', path) if 'config' in text else ''
     classes = text_of(text, 'classes', 'semantic_kitti', path)
-    if (path.parent / classes).is_file():
-        classes = str((path.parent / classes).absolute())
-    return City(tuple(drives[name] for name in sorted(drives)), classes,
-                str((path.parent / config).absolute()) if config else '',
+    return City(tuple(drives[name] for name in sorted(drives)), named_file(path.parent, classes),
+                named_file(path.parent, config) if config else '',
                 tuple(sorted(f'{key}={scalar(value)}' for key, value in settings.items())),
                 count_of(text, 'piece_scans', 200, path), count_of(text, 'region_tiles', 16, path))
+
+
+def named_file(folder, text):
+    """The absolute path of a file in a folder; or, where there is none, the text: a name that the programs know or refuse."""
+    path = (folder / text).absolute()
+    return str(path) if path.is_file() or path.suffix or '/' in text else text
 
 
 def read_drive(entry, path) -> Drive:
