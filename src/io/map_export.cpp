@@ -60,8 +60,7 @@ std::string bytesOf(const std::string& ending, const SemanticMap& map, const Cla
   const VoxelPoints::Blocks blocks = sortedBlocks(map);
   ThreadPool pool(kThreads);
   const VoxelPoints points(map, classes, {states}, blocks, pool);
-  if (ending == ".pcd")
-    return pcdBytes(points, floatOrigin(placeOf(geometry, blocks), geometry.resolution()));
+  if (ending == ".pcd") return pcdBytes(points, pcdOrigin(map));
   const bool far = std::any_of(blocks.begin(), blocks.end(), [&](const auto& block) {
     return tooFarForFloats(geometry.blockCentre(block.first), geometry.resolution());
   });
@@ -99,6 +98,10 @@ std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable&
   std::vector<VoxelRecord> voxels(points.count());
   points.write(voxels.data());
   return voxels;
+}
+
+Eigen::Vector3d pcdOrigin(const SemanticMap& map) {
+  return floatOrigin(placeOf(map.geometry(), sortedBlocks(map)), map.geometry().resolution());
 }
 
 void checkExportName(const std::string& path) {

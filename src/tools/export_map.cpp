@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/tiled_map.h"
 #include "io/export_file.h"
@@ -85,6 +86,15 @@ Eigen::AlignedBox3d boxOf(const po::variables_map& given) {
   return {Eigen::Vector3d::Constant(-kInfinity), Eigen::Vector3d::Constant(kInfinity)};
 }
 
+/// Where the origin of a file's coordinates is, as a clause; "" if it is that of the map frame.
+std::string originText(const std::string& output, const SemanticMap& map) {
+  if (std::filesystem::path(output).extension() != ".pcd") return "";
+  const Eigen::Vector3d origin = pcdOrigin(map);
+  if (origin.isZero(0.0)) return "";
+  return ", relative to its VIEWPOINT at " + numberText(origin.x()) + ", " + numberText(origin.y()) + ", " +
+         numberText(origin.z()) + " m";
+}
+
 int exportMapFile(const po::variables_map& given) {
   const std::string path = tools::onlyMapFile(given), output = outputOf(given);
   const Eigen::AlignedBox3d box = boxOf(given);
@@ -98,7 +108,8 @@ int exportMapFile(const po::variables_map& given) {
   options.html.drives = stored.drives;
   options.html.parts = map.file();
   exportFile(output, stored.map, *stored.info.classes, options);
-  std::cout << output << ": written, in frame " << stored.info.frame << "\n";
+  std::cout << output << ": written, in frame " << stored.info.frame << originText(output, stored.map)
+            << "\n";
   return 0;
 }
 

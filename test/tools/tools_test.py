@@ -690,6 +690,11 @@ class Tools(unittest.TestCase):
             above_ground = file.read()
         self.assertEqual(len(all_heights), len(above_ground))
         self.assertGreater(all_heights.count(b'\0'), above_ground.count(b'\0'))
+        far = self.path('far.bkm')
+        self.succeeds('merge_maps', a, '--transform', f'{a}=499800,3999900,0,0', '--output', far)
+        self.assertIn('written, in frame map, relative to its VIEWPOINT at 500000, 4000000, 0 m',
+                      self.succeeds('export_map', far, '--output', self.path('map.pcd')).stdout)
+        self.fails('move the map to a local frame with merge_maps --transform', 'export_map', far, '--output', self.path('map.ot'))
         self.fails('name one map file', 'export_map', '--output', exported)
         self.fails('--output FILE is missing', 'export_map', a)
         self.fails('must end in .ply, .pcd, .ot, .bt, .yaml or .html', 'export_map', a, '--output', self.path('map.bkm'))

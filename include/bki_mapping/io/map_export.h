@@ -31,6 +31,9 @@ std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable&
 /// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states);
+/// The origin of the coordinates in a PCD file of a map, which the file has as its VIEWPOINT: zero or, far
+/// from it, a place in the map in whole kilometres [m].
+Eigen::Vector3d pcdOrigin(const SemanticMap& map);
 /// Checks the extension before long work. @throws std::invalid_argument if exportMap does not support it.
 void checkExportName(const std::string& path);
 
