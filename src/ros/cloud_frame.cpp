@@ -1,5 +1,6 @@
 #include "ros/cloud_frame.h"
 
+#include <ros/console.h>
 #include <ros/time.h>
 
 #include <cmath>
@@ -28,6 +29,8 @@ void CloudFrame::follow(const Eigen::Vector3d& place, double resolution, const s
   transform.transform.translation.y = origin_.y();
   transform.transform.translation.z = origin_.z();
   transform.transform.rotation.w = 1.0;
+  ROS_INFO("Voxels are too far from the origin of '%s' for 32-bit floats: clouds of them are sent in '%s'",
+           map_frame.c_str(), transform.child_frame_id.c_str());
   if (!tf_) tf_.emplace();
   tf_->sendTransform(transform);
 }

@@ -81,6 +81,7 @@ class LargeCoordinates(MapperTest):
         cloud = self.listen('voxel_cloud', PointCloud2).wait_for(lambda m: m.header.stamp == stamp, 'the cloud')
         voxels = self.voxels(stamp)
         self.expect_cloud(cloud, voxels)
+        self.log.wait_for(lambda m: f"clouds of them are sent in '{FRAME}'" in m.msg, 'saying so, also without a scan')
         updates = self.listen('voxel_cloud_updates', VoxelCloudUpdate)
         whole = updates.wait_for(lambda m: m.whole and m.header.stamp == stamp, 'the whole cloud')
         self.assertEqual(whole.header.frame_id, 'map')
