@@ -302,7 +302,9 @@ add_test(NAME vector_symbols_test
 if(CATKIN_ENABLE_TESTING)
   bki_mapping_script_test(tools commands_test)
   bki_mapping_script_test(scripts generated_parameters_test)
-  set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}")
+  list(JOIN BKI_MAPPING_DEMO_TARGETS " " demo_targets)
+  set_property(TEST commands_test APPEND PROPERTY ENVIRONMENT 
+    "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}" "BKI_MAPPING_DEMO_TARGETS=${demo_targets}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py

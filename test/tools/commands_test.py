@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Every command of README.md and docs, word for word, in a copy of the source tree, on stand-in data.
 
+README.md's are for the build of scripts/demo, so they are typed where nothing else is built; those of docs are for all targets.
 A block of commands is what a user types: what does not end by itself (roslaunch, rviz) goes on in a terminal of its own
 until the block's last command has ended. Launch files must map what is played to them.
 """
@@ -19,6 +20,16 @@ import xmlrpc.client
 
 SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
 DEVEL = os.environ['BKI_MAPPING_DEVEL']
+DEMO_TARGETS = os.environ['BKI_MAPPING_DEMO_TARGETS'].split()  # of cmake/demo.cmake
+PROGRAM_FOLDER, PACKAGE = 'lib/bki_mapping', 'lib/python3/dist-packages/bki_mapping'
+# What targets other than programs make, as beginnings of paths in DEVEL. What programs are linked with is built with them.
+MADE_BY = {
+    f'{PACKAGE}/msg/': 'bki_mapping_generate_messages_py',
+    f'{PACKAGE}/srv/': 'bki_mapping_generate_messages_py',
+    f'{PACKAGE}/cfg/': 'bki_mapping_gencfg',
+    f'{PACKAGE}/_core': 'bki_mapping_python',
+    'lib/libbki_mapping_nodelets': 'bki_mapping_nodelets',
+}
 DOCUMENTS = ['README.md', *(f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md'))]
 OF_DASK = {'docs/city.md'}  # Debian 11's python3-distributed lacks tornado
 TIMEOUT = 60.0  # maximum duration of a command, and of waiting for an event [s]
@@ -27,6 +38,7 @@ SCANS = 6
 # Commands that are not run, and why.
 LEFT_OUT = {
     'catkin build': 'builds a whole workspace, for minutes',
+    'cmake --build build -j2': 'builds everything',
     **dict.fromkeys(("sudo apt-get install --no-install-recommends $(grep -v '^#' scripts/dependencies.debian.txt)",
                      'mkdir -p ~/catkin_ws/src', 'git clone . ~/catkin_ws/src/bki_mapping', 'cd ~/catkin_ws',
                      'catkin_make -DCMAKE_BUILD_TYPE=Release', 'source devel/setup.bash'), 'the same'),
@@ -149,6 +161,28 @@ def wait_until(condition, what):
     raise AssertionError(f'{what} did not happen within {TIMEOUT} s')
 
 
+def is_program(path):
+    with open(path, 'rb') as file:
+        return file.read(4) == b'\x7fELF'
+
+
+def target_of(path):
+    """The target that makes a file of DEVEL; None if configuring makes it, or it comes with what is linked with it."""
+    if os.path.dirname(path) == PROGRAM_FOLDER and is_program(f'{DEVEL}/{path}'):
+        return os.path.basename(path)
+    return next((target for beginning, target in MADE_BY.items() if path.startswith(beginning)), None)
+
+
+def link_build_of_demo(folder):
+    """Makes a folder like DEVEL with what scripts/demo builds, and nothing else."""
+    for parent, _, names in os.walk(DEVEL):
+        for name in names:
+            path = os.path.relpath(os.path.join(parent, name), DEVEL)
+            if target_of(path) in (None, *DEMO_TARGETS):
+                os.makedirs(os.path.dirname(f'{folder}/{path}'), exist_ok=True)
+                os.symlink(f'{DEVEL}/{path}', f'{folder}/{path}')
+
+
 class Shell:
     """What a user types in the clone's folder, in terminals that share a ROS master."""
 
@@ -235,9 +269,12 @@ class Commands(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp()
         cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.demo_build = os.path.join(cls.folder, 'demo_build')
+        link_build_of_demo(cls.demo_build)
         cls.display = cls.start_display()
         shell = Shell(cls.folder, cls.display)
         cls.copy_source(shell.clone)
+        cls.use_build_of('docs')
         os.makedirs(os.path.join(shell.home, 'kitti/sequences'))
         shell.run(f'{DEVEL}/lib/bki_mapping/simulate_drive --output ~/kitti/sequences/04 --scans {SCANS} --beams 16 '
                   '--columns 400')
@@ -270,7 +307,14 @@ class Commands(unittest.TestCase):
                 os.makedirs(os.path.dirname(os.path.join(clone, name)), exist_ok=True)
                 shutil.copy(os.path.join(SOURCE, name), os.path.join(clone, name))
         os.mkdir(os.path.join(clone, 'build'))
-        os.symlink(DEVEL, os.path.join(clone, 'build/devel'))
+
+    @classmethod
+    def use_build_of(cls, document):
+        """Puts the build that a document speaks of into the clone."""
+        link = os.path.join(cls.folder, 'bki_mapping/build/devel')
+        if os.path.lexists(link):
+            os.unlink(link)
+        os.symlink(cls.demo_build if document == 'README.md' else DEVEL, link)
 
     def start_mapper(self, shell):
         """Starts the mapper of README.md if a command needs one in another terminal."""
@@ -338,6 +382,7 @@ class Commands(unittest.TestCase):
     def test_every_command(self):
         seen, count = set(), 0
         for document in DOCUMENTS:
+            self.use_build_of(document)
             for block in blocks_of(document):
                 seen |= {without_comment(command) for command in block}
                 commands = [command for command in block if without_comment(command) not in LEFT_OUT]
@@ -351,6 +396,24 @@ class Commands(unittest.TestCase):
                     self.check_block(commands)
         self.assertGreaterEqual(count, 6)
         self.assertLessEqual(set(LEFT_OUT), seen, 'commands left out that no text has')
+
+    def test_the_readme_names_only_programs_that_the_demo_builds(self):
+        programs = {name for name in os.listdir(f'{DEVEL}/{PROGRAM_FOLDER}') if target_of(f'{PROGRAM_FOLDER}/{name}')}
+        self.assertLess(set(DEMO_TARGETS) & programs, programs, 'other targets are built, too')
+        self.assertLessEqual(set(re.findall(r'\w+', text_of('README.md'))) & programs, set(DEMO_TARGETS))
+
+    def test_python_of_the_readme_runs_on_the_build_of_the_demo(self):
+        self.use_build_of('README.md')
+        given = 'import numpy\npose = numpy.eye(4)\npoints = numpy.full((9, 3), 4.0)\nlabels = numpy.full(9, 50)\n'
+        blocks = re.findall(r'^```python\n(.*?)^```$', text_of('README.md'), re.MULTILINE | re.DOTALL)
+        self.assertTrue(blocks)
+        shell = Shell(self.folder, self.display)
+        folder = os.path.join(shell.clone, 'of_readme')
+        os.mkdir(folder)
+        with open(os.path.join(folder, 'blocks.py'), 'w') as file:
+            file.write(given + ''.join(blocks))
+        shell.run('cd of_readme && /usr/bin/python3 blocks.py')
+        self.assertIn('street.bkm', os.listdir(folder))
 
     def test_arguments_of_launch_files_are_explained_and_documented(self):
         rows = dict(re.findall(r'^\| `(\w+\.launch)` \|.*\| (.*) \|$', text_of('docs/ros.md'), re.MULTILINE))
