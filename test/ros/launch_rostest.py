@@ -2,11 +2,14 @@
 """mapping.launch as users start it: with every preset, as node and as nodelet, with simulated time that jumps back."""
 import glob
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import unittest
+import xmlrpc.client
 
+import rosgraph
 import roslib.packages
 import rospy
 import rostest
@@ -76,6 +79,13 @@ class Launch(unittest.TestCase):
                                             check=False)
                     self.assertEqual(sum(words in line for line in launch.stdout.splitlines()), 1, launch.stdout)
                     self.assertNotRegex(launch.stdout, 'Traceback|RLException')
+
+    def test_a_manager_that_is_killed_ends_the_launch(self):
+        with Mapping() as mapping:
+            uri = rosgraph.Master(rospy.get_name()).lookupNode('/mapping_manager')
+            with xmlrpc.client.ServerProxy(uri) as manager:
+                os.kill(manager.getPid(rospy.get_name())[2], signal.SIGKILL)
+            mapping.launch.wait(TIMEOUT)
 
     def test_other_nodes_go_on_where_the_mapper_is_not_required(self):
         launch = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', 'mapping.launch', 'required:=false', 'config:=crowdd'],
