@@ -6,12 +6,13 @@
 namespace bki_mapping::python {
 namespace {
 
-/// The object as an array, of whatever numbers it holds.
-py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted) {
-  py::array array = py::array::ensure(object);
-  if (array) return array;
-  PyErr_Clear();
-  throw py::type_error(name + " must be " + wanted + ", not " + typeName(object));
+void refuseMask(py::handle object, const std::string& name) {
+  if (!py::hasattr(object, "mask")) return;
+  if (!py::cast<bool>(py::module::import("numpy.ma").attr("is_masked")(object))) return;
+  throw std::invalid_argument(
+      name +
+      " has masked values, which would count like the others; leave their rows out of all "
+      "arrays, or give them a value with filled()");
 }
 
 std::string shapeText(const py::array& array) {
@@ -72,6 +73,14 @@ bool isInteger(py::handle object) {
   return PyIndex_Check(object.ptr()) != 0;
 }
 
+/// The integer of at most 63 bits; -1 for everything else.
+py::ssize_t integerOf(py::handle object) {
+  const py::ssize_t value =
+      isInteger(object) ? PyNumber_AsSsize_t(object.ptr(), PyExc_OverflowError) : py::ssize_t{-1};
+  if (value < 0) PyErr_Clear();
+  return value < 0 ? py::ssize_t{-1} : value;
+}
+
 /// The value of a setting as YAML writes it.
 std::string settingText(py::handle value, const std::string& name) {
   const std::string type = typeName(value);
@@ -100,6 +109,14 @@ void flatten(const py::dict& settings, const std::string& group, std::map<std::s
 
 std::string typeName(py::handle object) {
   return py::str(py::handle(reinterpret_cast<PyObject*>(Py_TYPE(object.ptr()))).attr("__name__"));
+}
+
+py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted) {
+  refuseMask(object, name);
+  py::array array = py::array::ensure(object);
+  if (array) return array;
+  PyErr_Clear();
+  throw py::type_error(name + " must be " + wanted + ", not " + typeName(object));
 }
 
 Points::Points(py::handle object, const std::string& name) {
@@ -173,13 +190,17 @@ double numberOf(py::handle object, const std::string& name) {
 }
 
 std::size_t countOf(py::handle object, const std::string& name) {
-  const auto count =
-      isInteger(object) ? PyNumber_AsSsize_t(object.ptr(), PyExc_OverflowError) : py::ssize_t{-1};
-  if (count < 0) {
-    PyErr_Clear();
-    throw std::invalid_argument(name + " must be an integer, 0 or more, of at most 63 bits");
-  }
+  const py::ssize_t count = integerOf(object);
+  if (count < 0) throw std::invalid_argument(name + " must be an integer, 0 or more, of at most 63 bits");
   return static_cast<std::size_t>(count);
+}
+
+std::uint64_t stampOf(py::handle object) {
+  const py::ssize_t stamp = integerOf(object);
+  if (stamp >= 0) return static_cast<std::uint64_t>(stamp);
+  throw std::invalid_argument(
+      "stamp must be an integer of nanoseconds, 0 or more, of at most 63 bits; for a time t in seconds, give "
+      "int(t * 1e9)");
 }
 
 bool truthOf(py::handle object, const std::string& name) {

@@ -22,6 +22,10 @@ namespace py = pybind11;
 /// The name of an object's type, for messages.
 std::string typeName(py::handle object);
 
+/// An object as an array. @param wanted what it must be, for messages. @throws std::invalid_argument also if
+/// it is a masked array of NumPy with masked values: as an array it would show what lies below the mask.
+py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted);
+
 /// Points as NumPy has them, without a copy where they are contiguous single or double precision.
 class Points {
  public:
@@ -105,6 +109,8 @@ class Numbers {
 
 double numberOf(py::handle object, const std::string& name);
 std::size_t countOf(py::handle object, const std::string& name);
+/// The time of a scan [ns].
+std::uint64_t stampOf(py::handle object);
 bool truthOf(py::handle object, const std::string& name);
 std::string textOf(py::handle object, const std::string& name);
 /// Two numbers, which may be infinite or NaN.

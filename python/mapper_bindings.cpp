@@ -84,9 +84,9 @@ struct Pose {
 
 /// @param object an origin, (3,), or T_map_sensor, (4, 4).
 Pose poseOf(py::handle object) {
-  const py::array array = py::array::ensure(object);
-  if (!array) PyErr_Clear();
-  if (!array || array.ndim() != 2) return {vectorOf(object, "origin"), Eigen::Matrix3f::Identity(), false};
+  const py::array array =
+      arrayOf(object, "origin", "three numbers, or a pose: an array of numbers of shape (4, 4)");
+  if (array.ndim() != 2) return {vectorOf(object, "origin"), Eigen::Matrix3f::Identity(), false};
   const auto values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
   if (!values) PyErr_Clear();
   if (!values || array.shape(0) != 4 || array.shape(1) != 4) {
@@ -133,7 +133,7 @@ bool areInMap(const std::string& points_in) {
 ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels,
                         py::handle scan_stamp, py::handle points_in, py::handle labels_are_ids,
                         bool withdraws) {
-  const std::uint64_t stamp = countOf(scan_stamp, "stamp");
+  const std::uint64_t stamp = stampOf(scan_stamp);
   const bool in_map = areInMap(textOf(points_in, "points_in"));
   const Pose pose = poseOf(origin);
   const Points given(points, "points");

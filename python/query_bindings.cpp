@@ -24,9 +24,9 @@ namespace {
 std::vector<Ray> raysOf(const StateMap& states, py::handle origins, py::handle directions,
                         py::handle max_length) {
   const Points ways(directions, "directions");
-  const py::array array = py::array::ensure(origins);
-  if (!array) PyErr_Clear();
-  const bool one_origin = array && array.ndim() == 1;
+  const py::array array =
+      arrayOf(origins, "origins", "an array of numbers of shape (N, 3), or three numbers");
+  const bool one_origin = array.ndim() == 1;
   const Points from = one_origin ? ways : Points(origins, "origins");
   const Eigen::Vector3d origin = one_origin ? tripleOf(origins, "origins") : Eigen::Vector3d();
   if (!one_origin && from.size() != ways.size()) {

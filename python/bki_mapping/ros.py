@@ -206,8 +206,10 @@ class OccupancyFollower:
 
         Returns (N,), structured: state, label, probability, occupancy and class_probability, as in bki_mapping/OccupancyBlock.
         Where the map has no block, state is 0 (unknown), label 255, and all others NaN. Raises ValueError for a point that is not
-        finite, or if there is no map yet.
+        finite or masked, or if there is no map yet.
         """
+        if np.ma.is_masked(points):
+            raise ValueError('points has masked values, which would count like the others; leave their rows out')
         points = np.asarray(points, float)
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError(f'points must be an array of numbers of shape (N, 3), not of shape {points.shape}')

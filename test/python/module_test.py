@@ -397,9 +397,9 @@ class WrongInput(WithFolder):
                     (ValueError, 'the pose must be a rotation and a translation', (nan_pose, points, labels)),
                     (ValueError, "points_in is 'car', but must be sensor or map", ((0, 0, 0), points, labels, 0, 'car')),
                     (TypeError, 'points_in must be a str, not int', ((0, 0, 0), points, labels, 0, 1)),
-                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, -1)),
-                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, 1.5)),
-                    (ValueError, 'stamp must be an integer, 0 or more', ((0, 0, 0), points, labels, 2**80)),
+                    (ValueError, 'stamp must be an integer of nanoseconds, 0 or more', ((0, 0, 0), points, labels, -1)),
+                    (ValueError, r'in seconds, give int\(t \* 1e9\)', ((0, 0, 0), points, labels, 1.5)),
+                    (ValueError, 'stamp must be an integer of nanoseconds, 0 or more', ((0, 0, 0), points, labels, 2**80)),
                     (TypeError, 'labels_are_ids must be True or False, not str', ((0, 0, 0), points, labels, 0, 'map', 'no'))):
                 with self.subTest(words=words, arguments=arguments):
                     self.refused(error, words, lambda: call(*arguments))
@@ -409,6 +409,31 @@ class WrongInput(WithFolder):
         limited = bki.SemanticMapper(scan_limit={'blocks': 1})
         self.refused(bki.ScanRefused, 'scan_limit/blocks', lambda: limited.integrate((0, 0, 0), *wall()))
         self.assertTrue(issubclass(bki.ScanRefused, RuntimeError))
+
+    def test_masks(self):
+        """A masked value must not count like the others: np.asarray would drop the mask."""
+        points, labels = wall()
+        map_ = mapper_with_wall().map
+        nowhere = np.zeros(len(labels), bool)
+        some = nowhere.copy()
+        some[3] = True
+        masked_points = np.ma.array(points, mask=np.repeat(some[:, None], 3, axis=1))
+        masked_labels = np.ma.array(labels, mask=some)
+        words = 'has masked values, which would count like the others; leave their rows out of all arrays'
+        mapper = bki.SemanticMapper()
+        for call in (mapper.integrate, mapper.withdraw):
+            for arguments in (((0, 0, 0), masked_points, labels), ((0, 0, 0), points, masked_labels),
+                              (np.ma.array([0.0, 0.0, 0.0], mask=[0, 0, 1]), points, labels),
+                              (np.ma.array(np.eye(4), mask=np.eye(4)), points, labels)):
+                self.refused(ValueError, words, lambda: call(*arguments))
+        self.assertEqual(len(mapper.map.blocks), 0)
+        for query in (map_.states, map_.labels, map_.query, map_.posterior):
+            self.refused(ValueError, f'points {words}', lambda: query(masked_points))
+        far = np.ma.array([[1.0, 0, 0]], mask=[[0, 0, 1]])
+        self.refused(ValueError, f'directions {words}', lambda: map_.cast_rays([0, 0, 0], far, 5.0))
+        self.refused(ValueError, f'origins {words}', lambda: map_.cast_rays(far, [[1.0, 0, 0]], 5.0))
+        mapper.integrate((0, 0, 1), np.ma.array(points, mask=False), np.ma.array(labels, mask=nowhere))
+        self.assertEqual(evidence_of(mapper.map), evidence_of(map_))
 
     def test_settings(self):
         for words, call in (

@@ -248,6 +248,7 @@ class WrongInput(unittest.TestCase):
                 ('the message is cut off, or of another type', lambda: decode(b'')),
                 ('the message is cut off, or of another type', lambda: decode(data[:12] + b'\xff\xff\xff\xff' + data[16:])),
                 ('point 1 of 2 has a coordinate that is not finite', lambda: follower.query([[0, 0, 0], [0, np.inf, 0]])),
+                ('points has masked values', lambda: follower.query(np.ma.array([[1.0, 0, 0]], mask=[[0, 0, 1]]))),
                 (r'points must be an array of numbers of shape \(N, 3\)', lambda: follower.query([0, 0, 0])),
                 ('index must be three integers', lambda: follower.block((1, 2))),
                 ('index must be three integers', lambda: follower.block((1, 2, 0.5))),
