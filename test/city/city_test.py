@@ -285,6 +285,18 @@ class Made(MadeCity):
             work.identity_of(programs, ())
         self.assertTrue(raised.exception.of_worker)
 
+    def test_files_are_beside_the_description_and_names_are_of_the_package(self):
+        path = self.folder / 'named.yaml'
+        (self.folder / 'mine').write_text('prior: 0.001\n')
+        for given, read in (('robot', 'robot'), ('mine', str(self.folder / 'mine')), ('none.yaml', str(self.folder / 'none.yaml')),
+                            ('sub/none', str(self.folder / 'sub/none')), ('/no/such.yaml', '/no/such.yaml')):
+            path.write_text(f'{{drives: [{{sequence: d1}}], classes: {given}, config: {given}}}')
+            city = read_city(path)
+            self.assertEqual((city.classes, city.config), (read, read))
+        for config, status in (('robt', 1), ('robot', 0)):
+            text = self.finish(self.start(self.describe(['d1'], config=config), '--workers', '1', '--no-picture', '--resume'), status)
+            self.assertEqual("did you mean 'robot'?" in text, status == 1, text)
+
     def test_wrong_descriptions_are_refused(self):
         path = self.folder / 'wrong.yaml'
         for text, sentence in (
