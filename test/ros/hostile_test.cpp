@@ -277,7 +277,9 @@ class Attack {
     std::string refusal;
     dynamic_reconfigure::ConfigTools::getParameter(change.response.config, "last_refusal", refusal);
     ++results_.answers[kind.name][refusal.empty() ? "applied" : "refused"];
-    if (kind.refused) EXPECT_GT(refusal.size(), 20u) << where();
+    if (kind.refused) {
+      EXPECT_GT(refusal.size(), 20u) << where();
+    }
     EXPECT_LT(refusal.size(), 3000u) << where();
     // Applied settings must be able to map at least a small cloud.
     const ros::Time stamp = nextStamp();
