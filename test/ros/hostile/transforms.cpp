@@ -44,7 +44,7 @@ std::vector<TransformKind> valueKinds() {
             t.transform.translation.x = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
             t.transform.translation.y = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
           }),
-      one("tf/translation_utm", "a translation in UTM coordinates", {"mapped"},
+      one("tf/translation_utm", "a translation in UTM coordinates", {"mapped", "bad transform"},
           [](TransformStamped& t, Dice& dice) {
             t.transform.translation.x = dice.between(166e3, 834e3);
             t.transform.translation.y = dice.between(0.0, 10e6);
