@@ -188,6 +188,8 @@ void addClasses(py::module& m) {
            "Read a class table: one that comes with the package by its name, such as 'semantic_kitti', or a "
            "YAML file.\n\nRaises ValueError if there is no such table, or the file is no class table.")
       .def_property_readonly("name", &ClassTable::name, "The name of the table.")
+      .def_property_readonly("label_mask", &ClassTable::labelMask,
+                             "Which bits of a label are the class; the others may hold an instance.")
       .def_property_readonly("colors", &colorsOf,
                              "The colour of each class id: (256, 3), uint8; white where no class has the id.")
       .def(

@@ -87,7 +87,7 @@ void addSequence(py::module& m) {
           "The reflectivity of each hit: (N,), float32.")
       .def_property_readonly(
           "labels", [](const py::object& self) { return view(self, py::cast<const Frame&>(self).labels); },
-          "The raw label of each hit: (N,), uint32.")
+          "The label of each hit, as in the file: (N,), uint32.")
       .def_property_readonly(
           "pose",
           [](const Frame& frame) {

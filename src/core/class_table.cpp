@@ -1,17 +1,29 @@
 #include "bki_mapping/core/class_table.h"
 
+#include <algorithm>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 namespace bki_mapping {
+namespace {
 
-ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
-    : name_(std::move(name)), classes_(std::move(classes)) {
+std::string hexText(std::uint32_t bits) {
+  std::ostringstream text;
+  text << "0x" << std::uppercase << std::hex << bits;
+  return text.str();
+}
+
+}  // namespace
+
+ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes, std::uint32_t label_mask)
+    : name_(std::move(name)), classes_(std::move(classes)), label_mask_(label_mask) {
   std::string faults;
   const auto fault = [&](const std::string& text) { faults += (faults.empty() ? "" : "; ") + text; };
   if (classes_.empty()) fault("it has no class");
   if (classes_.size() > kMaxClasses) fault("it has more than 254 classes");
+  if (label_mask_ == 0) fault("its label_mask is 0, which leaves nothing of a label");
 
   index_of_id_.fill(-1);
   std::set<std::string> names;
@@ -34,6 +46,10 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
       if (!class_of_raw_.emplace(raw, c.id).second) {
         fault("raw label " + std::to_string(raw) + " is given twice");
       }
+      if (raw != kNoLabel && (raw & ~label_mask_) != 0) {
+        fault("raw label " + std::to_string(raw) + " of class '" + c.name + "' has bits that label_mask " +
+              hexText(label_mask_) + " leaves out");
+      }
     }
   }
   constexpr std::uint32_t kSmall = 4096;
@@ -43,6 +59,10 @@ ClassTable::ClassTable(std::string name, std::vector<SemanticClass> classes)
     class_of_small_raw_[raw] = id;
   }
   if (!faults.empty()) throw std::invalid_argument("class table '" + name_ + "' is invalid: " + faults);
+}
+
+bool ClassTable::saysWhatMoves() const {
+  return std::any_of(classes_.begin(), classes_.end(), [](const SemanticClass& c) { return c.dynamic; });
 }
 
 const SemanticClass* ClassTable::find(ClassId id) const {
@@ -56,6 +76,7 @@ const std::string& ClassTable::nameOf(ClassId id) const {
 }
 
 std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
+  if (raw != kNoLabel) raw &= label_mask_;
   if (raw < class_of_small_raw_.size()) {
     const std::int16_t id = class_of_small_raw_[raw];
     return id < 0 ? any_raw_ : static_cast<ClassId>(id);
@@ -67,7 +88,10 @@ std::optional<ClassId> ClassTable::classOfRaw(std::uint32_t raw) const {
 
 std::optional<ClassId> ClassTable::classOf(std::uint32_t label, LabelValues values) const {
   if (values == LabelValues::kRaw) return classOfRaw(label);
-  if (label < kMaxClasses && find(static_cast<ClassId>(label))) return static_cast<ClassId>(label);
+  if (label == kNoLabel) return std::nullopt;
+  for (const std::uint32_t id : {label, label & label_mask_}) {
+    if (id < kMaxClasses && find(static_cast<ClassId>(id))) return static_cast<ClassId>(id);
+  }
   return std::nullopt;
 }
 

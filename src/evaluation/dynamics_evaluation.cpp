@@ -17,7 +17,7 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     const std::uint32_t n = index_of_.insert(index, fresh);
     if (n == fresh) voxels_.push_back({index});
     Voxel& voxel = voxels_[n];
-    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
+    const bool moving = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
     const SemanticClass& known = *classes.find(*id);
     voxel.ground_points += !moving && known.ground;
     voxel.standing_points += !moving && known.dynamic;

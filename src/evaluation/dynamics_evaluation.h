@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "evaluation/passing_beams.h"
+#include "io/truth_cloud.h"
 
 namespace bki_mapping {
 
@@ -78,8 +78,7 @@ class DynamicsEvaluation {
 
   /// @param scans number of scans that will be added. @param late voxels hit in this many last scans need not
   /// be cleared.
-  DynamicsEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving, std::size_t scans,
-                     std::size_t late)
+  DynamicsEvaluation(const GridGeometry& geometry, KittiLabels moving, std::size_t scans, std::size_t late)
       : geometry_(geometry), moving_(std::move(moving)), scans_(scans), late_(late) {}
 
   /// Adds the next scan. Skips points that are not finite, unlabelled, or have a label outside of the class
@@ -120,7 +119,7 @@ class DynamicsEvaluation {
   }
 
   GridGeometry geometry_;
-  std::set<std::uint32_t> moving_;
+  KittiLabels moving_;
   std::size_t scans_, late_, added_ = 0;
   GridTable index_of_;
   std::vector<Voxel> voxels_;

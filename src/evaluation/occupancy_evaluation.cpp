@@ -17,7 +17,7 @@ void OccupancyEvaluation::add(const Scan& scan) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     if (!geometry_.contains(point)) continue;
     Seen& voxel = seen(geometry_.voxelAt(point));
-    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
+    const bool moving = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
     (moving ? voxel.moving : voxel.standing) = true;
   }
   forEachCrossedVoxel(scan, geometry_, [this](const VoxelIndex& index) { seen(index); });

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "evaluation/reliability.h"
+#include "io/truth_cloud.h"
 
 namespace bki_mapping {
 
@@ -22,7 +22,7 @@ namespace bki_mapping {
 class OccupancyEvaluation {
  public:
   /// @param moving raw labels of objects that move.
-  OccupancyEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving)
+  OccupancyEvaluation(const GridGeometry& geometry, KittiLabels moving)
       : geometry_(geometry), moving_(std::move(moving)) {}
 
   /// Adds the next scan: all its finite points, and the voxels of forEachCrossedVoxel.
@@ -41,7 +41,7 @@ class OccupancyEvaluation {
   Seen& seen(const VoxelIndex& index);
 
   GridGeometry geometry_;
-  std::set<std::uint32_t> moving_;
+  KittiLabels moving_;
   GridTable index_of_;
   std::vector<Seen> voxels_;
 };

@@ -88,7 +88,7 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
     const auto truth = classes.classOf(scan.labels[i], labelValues(scan));
     if (!truth || truth == classes.unlabelled() || !geometry_.contains(point)) continue;
     const ClassId given = classes.classOf(predicted[i], labelValues(scan)).value_or(kFreeClass);
-    const bool moving = !scan.labels_are_ids && moving_.count(scan.labels[i]) > 0;
+    const bool moving = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
     const VoxelIndex index = geometry_.voxelAt(point);
     const auto fresh = static_cast<std::uint32_t>(voxels_.size());
     const std::uint32_t n = index_of_.insert(index, fresh);

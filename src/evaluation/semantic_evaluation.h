@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/map/voxel_state.h"
 #include "evaluation/reliability.h"
+#include "io/truth_cloud.h"
 
 namespace bki_mapping {
 
@@ -61,7 +61,7 @@ struct SemanticQuality {
 class SemanticEvaluation {
  public:
   /// @param moving raw labels of objects that move.
-  explicit SemanticEvaluation(const GridGeometry& geometry, std::set<std::uint32_t> moving = {})
+  explicit SemanticEvaluation(const GridGeometry& geometry, KittiLabels moving = {})
       : geometry_(geometry), moving_(std::move(moving)) {}
 
   /// Adds the points of a scan. Skips those that are not finite, unlabelled, or have a true label outside of
@@ -86,7 +86,7 @@ class SemanticEvaluation {
   };
 
   GridGeometry geometry_;
-  std::set<std::uint32_t> moving_;
+  KittiLabels moving_;
   GridTable index_of_;
   std::vector<VoxelIndex> voxels_;
   std::vector<std::vector<Points>> points_;  ///< in each voxel

@@ -15,6 +15,9 @@
 namespace bki_mapping {
 namespace {
 
+/// Of the package's tables, relative to sharePath().
+constexpr char kClassFolder[] = "config/classes";
+
 [[noreturn]] void fail(const std::string& file, const std::string& why) {
   throw std::invalid_argument("class table " + file + ": " + why);
 }
@@ -42,13 +45,15 @@ std::uint8_t byteOf(const std::string& file, const YAML::Node& node, const std::
   return static_cast<std::uint8_t>(value);
 }
 
-/// Read as a signed number: to yaml-cpp 0.6, -1 is a large unsigned one.
-std::uint32_t labelOf(const std::string& file, const YAML::Node& node, const std::string& owner) {
+/// A number of 32 bits; read as a signed one: to yaml-cpp 0.6, -1 is a large unsigned one.
+/// @param owner what it belongs to, for the message.
+std::uint32_t numberOf(const std::string& file, const YAML::Node& node, const std::string& what,
+                       const std::string& owner, std::int64_t least) {
   constexpr auto kLargest = std::numeric_limits<std::uint32_t>::max();
   const auto value = node.as<std::int64_t>();
-  if (value < 0 || value > kLargest) {
-    fail(file, "raw label " + std::to_string(value) + " of class '" + owner + "' is not in 0 to " +
-                   std::to_string(kLargest));
+  if (value < least || value > kLargest) {
+    fail(file, what + " " + std::to_string(value) + " of " + owner + " is not in " + std::to_string(least) +
+                   " to " + std::to_string(kLargest));
   }
   return static_cast<std::uint32_t>(value);
 }
@@ -91,7 +96,9 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
   } else if (!node["raw"].IsSequence()) {
     fail(file, "raw of class '" + c.name + "' must be a list of numbers, or any");
   } else {
-    for (const YAML::Node& each : node["raw"]) c.raw.push_back(labelOf(file, each, c.name));
+    for (const YAML::Node& each : node["raw"]) {
+      c.raw.push_back(numberOf(file, each, "raw label", "class '" + c.name + "'", -1));
+    }
   }
   const YAML::Node flags = node["flags"];
   if (flags && !flags.IsSequence()) {
@@ -112,20 +119,27 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
 
 }  // namespace
 
+std::vector<std::string> classTableNames() {
+  return namedFiles(kClassFolder);
+}
+
 ClassTable loadClassTable(const std::string& name_or_file) {
-  const std::string file = findNamedFile("class table", "config/classes", name_or_file);
+  const std::string file = findNamedFile("class table", kClassFolder, name_or_file);
   try {
     const YAML::Node root = loadYamlFile(file);
     if (!root.IsMap()) fail(file, "it must be a map with a list 'classes'");
-    checkKeys(file, root, "the table", {"name", "classes"});
+    checkKeys(file, root, "the table", {"name", "label_mask", "classes"});
     if (!root["classes"] || !root["classes"].IsSequence()) fail(file, "it has no list 'classes'");
+    const YAML::Node mask = root["label_mask"];
+    const std::uint32_t label_mask =
+        mask ? numberOf(file, mask, "label_mask", "the table", 1) : ClassTable::kAllBits;
     std::vector<SemanticClass> classes;
     for (const YAML::Node& node : root["classes"]) {
       classes.push_back(parseClass(file, node, classes.size() + 1));
     }
     return ClassTable(
         root["name"] ? nameOf(file, root["name"], "the table") : std::filesystem::path(file).stem().string(),
-        classes);
+        classes, label_mask);
   } catch (const YAML::Exception& error) {
     fail(file, error.what());
   }

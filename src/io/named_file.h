@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace bki_mapping {
 
@@ -12,5 +13,8 @@ namespace bki_mapping {
 /// @throws std::invalid_argument if there is neither, with the known names and the path that was tried.
 std::string findNamedFile(const std::string& what, const std::string& folder,
                           const std::string& name_or_file);
+
+/// The names of the package's files in a folder, without .yaml, sorted.
+std::vector<std::string> namedFiles(const std::string& folder);
 
 }  // namespace bki_mapping

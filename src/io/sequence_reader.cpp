@@ -256,7 +256,6 @@ SequenceFrame Sequence::read(std::size_t i) const {
     fail(label.string() + " has " + std::to_string(frame.labels.size()) + " labels, but " + scan.string() +
          " has " + std::to_string(frame.points.size()) + " points; they must be as many");
   }
-  for (std::uint32_t& raw : frame.labels) raw &= 0xffffu;  // the upper 16 bits are the instance id
   return frame;
 }
 

@@ -11,12 +11,12 @@ namespace bki_mapping {
 namespace {
 
 // Of the benchmark's converter for SemanticKITTI.
-constexpr float kMostRange = 50.0f, kOwnCar = 3.0f;
 constexpr std::uint32_t kUnlabelled = 0, kOutlier = 1;
+constexpr float kMostRange = 50.0f, kOwnCar = 3.0f;
 
 }  // namespace
 
-std::set<std::uint32_t> movingOfSemanticKitti() {
+KittiLabels KittiLabels::moving() {
   return {252, 253, 254, 255, 256, 257, 258, 259};
 }
 
@@ -29,16 +29,16 @@ Eigen::Vector3f TruthCloud::relative(const Scan& scan, std::size_t i) const {
 }
 
 void TruthCloud::add(const Scan& scan) {
-  static const std::set<std::uint32_t> moves = movingOfSemanticKitti();
+  static const KittiLabels moves = KittiLabels::moving(), without_class{kUnlabelled, kOutlier};
   setOrigin(scan.origin);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const float range = scan.points[i].norm();
     if (!std::isfinite(range)) ++not_finite;
     if (!(range < kMostRange)) continue;
     const std::uint32_t label = scan.labels[i];
-    const bool own_car = range < kOwnCar && (label == kUnlabelled || label == kOutlier);
+    const bool own_car = range < kOwnCar && without_class.contains(label);
     points.push_back(relative(scan, i));
-    moving.push_back(own_car || moves.count(label) > 0);
+    moving.push_back(own_car || moves.contains(label));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,8 +14,19 @@
 
 namespace bki_mapping {
 
-/// SemanticKITTI's raw labels of moving objects, 252 to 259.
-std::set<std::uint32_t> movingOfSemanticKitti();
+/// A set of SemanticKITTI's raw labels.
+class KittiLabels {
+ public:
+  KittiLabels(std::initializer_list<std::uint32_t> raw) : raw_(raw) {}
+  /// Those of moving objects, 252 to 259.
+  static KittiLabels moving();
+
+  /// @param label as in its files, whose upper 16 bits are an instance, whatever the class table says.
+  bool contains(std::uint32_t label) const { return raw_.count(label & 0xffffu) > 0; }
+
+ private:
+  std::set<std::uint32_t> raw_;
+};
 
 /// A cloud in the map frame of which it is known what moves.
 struct TruthCloud {

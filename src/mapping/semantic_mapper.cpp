@@ -68,11 +68,6 @@ SemanticMap::Classes askingClasses(const ClassTable& classes, bool says_what_mov
   return asking;
 }
 
-bool saysWhatMoves(const ClassTable& classes) {
-  const auto& all = classes.classes();
-  return std::any_of(all.begin(), all.end(), [](const SemanticClass& c) { return c.dynamic; });
-}
-
 UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
   UpdateRules rules;
   rules.hits_before_misses = config.free_space.hits_before_misses;
@@ -169,7 +164,7 @@ void SemanticMapper::setGains() {
   map_.setGainPersistence(config_.free_gain.persistence);
   map_.setRemainingGain(config_.free_gain.remaining, fixedClasses(*classes_));
   // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
-  const bool says_what_moves = saysWhatMoves(*classes_);
+  const bool says_what_moves = classes_->saysWhatMoves();
   map_.setNeighbourhoodRatio(config_.free_gain.neighbourhood, askingClasses(*classes_, says_what_moves),
                              says_what_moves);
   for (const SemanticClass& c : classes_->classes()) {

@@ -35,7 +35,7 @@ MapFile::MapFile(const std::string& path, Access access) {
   const auto mode = access == Access::kRead ? Database::Mode::kRead : Database::Mode::kUpdate;
   state_ = std::make_unique<State>(path, mode, path);
   Database& database = state_->database;
-  checkIdentity(database);
+  const std::int64_t version = checkIdentity(database);
   try {
     database.lock();
   } catch (const MapFileInUse&) {
@@ -45,8 +45,8 @@ MapFile::MapFile(const std::string& path, Access access) {
     throw;
   }
   checkComplete(database);
-  checkSchema(database);
-  state_->readAll();
+  checkSchema(database, version);
+  state_->readAll(version);
 }
 
 MapFile MapFile::create(const std::string& path, const MapInfo& info) {

@@ -8,18 +8,18 @@
 
 namespace bki_mapping {
 
-void MapFile::State::readAll() {
-  std::string table_name;
+void MapFile::State::readAll(std::int64_t version) {
+  TableRow table;
   totals = readTotals(database);
   checkTotals();
   Totals found;
-  const std::uint32_t map_row = readMapRow(database, info, table_name);
+  const std::uint32_t map_row = readMapRow(database, version, info, table);
   found.checksums += map_row;
   std::vector<SemanticClass> classes = readClasses(database, totals.classes, found.checksums);
   found.classes = static_cast<std::int64_t>(classes.size());
   found.drives = static_cast<std::int64_t>(readDrives(database, totals.drives, found.checksums).size());
   try {
-    info.classes = std::make_shared<const ClassTable>(table_name, std::move(classes));
+    info.classes = std::make_shared<const ClassTable>(table.name, std::move(classes), table.label_mask);
     checkInfo(info);
   } catch (const std::invalid_argument& error) {
     throw damaged(database.name(), error.what());

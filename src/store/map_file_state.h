@@ -16,8 +16,8 @@ struct MapFile::State {
   State(const std::string& path, Database::Mode mode, const std::string& name)
       : database(path, mode, name), writable(mode != Database::Mode::kRead) {}
 
-  /// Reads and checks everything except the content of the tiles.
-  void readAll();
+  /// Reads and checks everything except the content of the tiles. @param version of the file.
+  void readAll(std::int64_t version);
   /// Made when first asked for.
   TileCodec& tileCodec();
   /// Makes an open transaction durable. @param next the totals of the file then.

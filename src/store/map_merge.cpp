@@ -125,7 +125,7 @@ MapInfo newestInfo(const Files& files) {
       classes.emplace_back(c.id, c.name, c.color, c.raw, c.any_raw, c.unlabelled, c.dynamic, c.living,
                            c.ground, c.ignored, c.free_gain);
     }
-    return std::tuple(latest, info.parameters, info.classes->name(), classes);
+    return std::tuple(latest, info.parameters, info.classes->name(), classes, info.classes->labelMask());
   };
   return (*std::max_element(files.begin(), files.end(),
                             [&](const auto& a, const auto& b) { return key(a) < key(b); }))

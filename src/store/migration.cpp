@@ -6,33 +6,38 @@
 
 #include "bki_mapping/store/map_file.h"
 #include "core/atomic_file.h"
+#include "store/records.h"
 #include "store/schema.h"
 
 namespace bki_mapping {
 namespace {
 
+/// Adds the column label_mask: all bits of a label are the class, as before.
+void toVersion2(Database& database) {
+  MapInfo info;
+  TableRow table;
+  Totals totals = readTotals(database);
+  totals.checksums -= readMapRow(database, 1, info, table);
+  replaceMapTable(database);
+  totals.checksums += writeMapRow(database, info, table);
+  writeTotals(database, totals);
+}
+
 /// All steps up to kFormatVersion. Whoever adds a version adds the step that leads to it, and a file of the
 /// previous version in test/store/data.
 const std::vector<MigrationStep>& allSteps() {
-  static const std::vector<MigrationStep> steps = {};
+  static const std::vector<MigrationStep> steps = {{1, toVersion2}};
   return steps;
 }
 
-/// Reads all of a file. @param name of the file in errors.
-void checkAll(const std::string& path, const std::string& name) {
-  try {
-    MapFile file(path, MapFile::Access::kRead);
-    for (const int part : file.parts()) {
-      for (const TileEntry& tile : file.tiles(part)) {
-        SemanticMap map = file.info().emptyMap();
-        file.addTileTo(map, {tile.index, part});
-      }
+/// Reads all of a file. @throws MapFileError.
+void checkAll(const std::string& path) {
+  MapFile file(path, MapFile::Access::kRead);
+  for (const int part : file.parts()) {
+    for (const TileEntry& tile : file.tiles(part)) {
+      SemanticMap map = file.info().emptyMap();
+      file.addTileTo(map, {tile.index, part});
     }
-  } catch (const MapFileError& error) {
-    std::string text = error.what();
-    const std::size_t position = text.find(path);
-    if (position != std::string::npos) text.replace(position, path.size(), name);
-    throw MapFileError(text);
   }
 }
 
@@ -60,6 +65,7 @@ std::int64_t migrateMap(const std::string& old_path, const std::string& new_path
   const std::int64_t version = checkIdentity(old);
   old.lock();
   checkComplete(old);
+  checkAll(old_path);  // steps rely on it
   try {
     AtomicFile file(new_path);
     {
@@ -67,7 +73,7 @@ std::int64_t migrateMap(const std::string& old_path, const std::string& new_path
       old.copyTo(copy);
       migrate(copy, version, kFormatVersion, allSteps());
     }
-    checkAll(file.temporaryPath(), old_path);  // a fault of the copy is a fault of the original
+    checkAll(file.temporaryPath());
     file.commit();
   } catch (const MapFileError&) {
     throw;

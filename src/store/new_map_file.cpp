@@ -54,7 +54,8 @@ struct NewMapFile::State {
     auto state = std::make_unique<MapFile::State>(atomic.temporaryPath(), Database::Mode::kNew, path);
     state->database.run("BEGIN");
     createSchema(state->database);
-    state->totals.checksums += writeMapRow(state->database, info);
+    state->totals.checksums +=
+        writeMapRow(state->database, info, {info.classes->name(), info.classes->labelMask()});
     Statement insert = state->database.prepare("INSERT INTO class VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
     for (const SemanticClass& c : info.classes->classes()) {
       state->totals.checksums += writeClassRow(insert, state->totals.classes++, c);

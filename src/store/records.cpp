@@ -38,13 +38,14 @@ std::vector<std::uint32_t> parseRaw(const std::string& text, const std::string& 
 
 // The functions below visit the columns of each table in order, for writing (const rows) and for reading.
 
-template <typename Visit, typename Info, typename Text>
-void visitMap(Visit& visit, Info& info, Text& table_name) {
+template <typename Visit, typename Info, typename Table>
+void visitMap(Visit& visit, std::int64_t version, Info& info, Table& table) {
   visit(info.resolution);
   visit(info.unit_exponent);
   visit(info.prior);
   visit(info.frame);
-  visit(table_name);
+  visit(table.name);
+  if (version > 1) visit(table.label_mask);
   visit(info.parameters);
   visit(info.program);
 }
@@ -146,21 +147,20 @@ std::uint32_t RowReader::finish() const {
   return checksum_.value();
 }
 
-std::uint32_t writeMapRow(Database& database, const MapInfo& info) {
-  Statement insert = database.prepare("INSERT INTO map VALUES (?,?,?,?,?,?,?,?)");
+std::uint32_t writeMapRow(Database& database, const MapInfo& info, const TableRow& table) {
+  Statement insert = database.prepare("INSERT INTO map VALUES (?,?,?,?,?,?,?,?,?)");
   RowWriter row(insert);
-  const std::string table_name = info.classes->name();
-  visitMap(row, info, table_name);
+  visitMap(row, kFormatVersion, info, table);
   const std::uint32_t checksum = row.finish();
   insert.step();
   return checksum;
 }
 
-std::uint32_t readMapRow(Database& database, MapInfo& info, std::string& table_name) {
+std::uint32_t readMapRow(Database& database, std::int64_t version, MapInfo& info, TableRow& table) {
   Statement select = database.prepare("SELECT * FROM map");
   if (!select.step()) throw damaged(database.name(), "the table 'map' is empty");
   RowReader row(select, database.name());
-  visitMap(row, info, table_name);
+  visitMap(row, version, info, table);
   const std::uint32_t checksum = row.finish();
   if (select.step()) throw damaged(database.name(), "the table 'map' has two rows");
   return checksum;

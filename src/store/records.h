@@ -119,9 +119,16 @@ struct Totals {
   }
 };
 
+/// What the row of the map says of the class table.
+struct TableRow {
+  std::string name;
+  std::uint32_t label_mask = ClassTable::kAllBits;  ///< files of version 1 have none
+};
+
 /// Each function reads or writes one row, with the columns in the order of the table. @return the checksum.
-std::uint32_t writeMapRow(Database& database, const MapInfo& info);
-std::uint32_t readMapRow(Database& database, MapInfo& info, std::string& table_name);
+std::uint32_t writeMapRow(Database& database, const MapInfo& info, const TableRow& table);
+/// @param version of the file.
+std::uint32_t readMapRow(Database& database, std::int64_t version, MapInfo& info, TableRow& table);
 std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const SemanticClass& c);
 std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
 void writeTotals(Database& database, const Totals& totals);

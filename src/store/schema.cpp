@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iterator>
 #include <string>
 
 namespace bki_mapping {
@@ -23,7 +24,7 @@ constexpr SchemaEntry kSchema[] = {
      "INTEGER, min_x REAL, min_y REAL, min_z REAL, max_x REAL, max_y REAL, max_z REAL, checksum INTEGER)"},
     {"table", "map",
      "CREATE TABLE map (resolution REAL, unit_exponent INTEGER, prior REAL, frame TEXT, class_table TEXT, "
-     "parameters TEXT, program TEXT, checksum INTEGER)"},
+     "label_mask INTEGER, parameters TEXT, program TEXT, checksum INTEGER)"},
     {"table", "tile",
      "CREATE TABLE tile (part INTEGER, z INTEGER, y INTEGER, x INTEGER, blocks INTEGER, planes INTEGER, "
      "checksum INTEGER, content BLOB)"},
@@ -32,6 +33,16 @@ constexpr SchemaEntry kSchema[] = {
      "CREATE TABLE total (classes INTEGER, drives INTEGER, tiles INTEGER, blocks INTEGER, planes INTEGER, "
      "checksums INTEGER, checksum INTEGER)"},
 };
+
+/// Of version 1, whose other tables are those above.
+constexpr char kMapTable1[] =
+    "CREATE TABLE map (resolution REAL, unit_exponent INTEGER, prior REAL, frame TEXT, class_table TEXT, "
+    "parameters TEXT, program TEXT, checksum INTEGER)";
+
+const SchemaEntry& mapTable() {
+  return *std::find_if(std::begin(kSchema), std::end(kSchema),
+                       [](const SchemaEntry& entry) { return std::strcmp(entry.name, "map") == 0; });
+}
 
 constexpr char kMagic[] = "SQLite format 3";  // ends in a zero byte, in the file, too
 
@@ -82,15 +93,21 @@ void checkComplete(const Database& database) {
   }
 }
 
-void checkSchema(const Database& database) {
+void checkSchema(const Database& database, std::int64_t version) {
   Statement select = database.prepare("SELECT type, name, sql FROM sqlite_master ORDER BY name");
   for (const SchemaEntry& entry : kSchema) {
+    const char* const sql = &entry == &mapTable() && version == 1 ? kMapTable1 : entry.sql;
     if (!select.step() || select.text(0) != entry.type || select.text(1) != entry.name ||
-        select.text(2) != entry.sql) {
+        select.text(2) != sql) {
       throw damaged(database.name(), "its tables are not those of a map");
     }
   }
   if (select.step()) throw damaged(database.name(), "it has tables that do not belong to a map");
+}
+
+void replaceMapTable(Database& database) {
+  database.run("DROP TABLE map");
+  database.run(mapTable().sql);
 }
 
 }  // namespace bki_mapping

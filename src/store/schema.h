@@ -9,7 +9,7 @@ namespace bki_mapping {
 
 /// "BKIM", the application_id in the header of the file.
 constexpr std::int64_t kApplicationId = 0x424b494d;
-constexpr std::int64_t kFormatVersion = 1;
+constexpr std::int64_t kFormatVersion = 2;
 
 /// Marks an empty database as a map file, and creates the tables.
 void createSchema(Database& database);
@@ -19,7 +19,9 @@ void createSchema(Database& database);
 std::int64_t checkIdentity(const Database& database);
 /// Checks that a file has not been cut off at its end.
 void checkComplete(const Database& database);
-/// Checks that the file has the tables of kFormatVersion, and no others.
-void checkSchema(const Database& database);
+/// Checks that the file has the tables of a version, and no others.
+void checkSchema(const Database& database, std::int64_t version);
+/// Replaces the table `map` of a file of an older version by an empty one of kFormatVersion.
+void replaceMapTable(Database& database);
 
 }  // namespace bki_mapping

@@ -241,7 +241,7 @@ int evaluate(const po::variables_map& given) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   const GridGeometry& geometry = mapper.map().geometry();
-  const auto moving = movingOfSemanticKitti();
+  const auto moving = KittiLabels::moving();
   Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
                         SemanticEvaluation(geometry, moving), OccupancyEvaluation(geometry, moving),
                         std::nullopt, cloudEvaluation(given, sequence, mapper.config())};

@@ -88,6 +88,14 @@ class Bags(MadeCity):
         self.assertIn('| write bags as sequences | 1 | 0 | ', (self.output / 'report.md').read_text())
         self.assertIn('| 0 | 0.0 |', (self.output / 'report.md').read_text())
 
+    def test_labels_are_read_as_the_node_reads_them(self):
+        none = 2**32 - 1
+        for dtype, values, expected in (
+                ('<u4', [10, 10 | 300 << 16, none], [10, 10 | 300 << 16, none]), ('>i4', [10, -1, -2**31 | 10], [10, none, 2**31 | 10]),
+                ('i1', [-1, 40], [none, 40]), ('<f4', [39.9, 40.5, -1, 2.0**24, 2.0**24 + 2, math.nan, math.inf], [40, 41, none, 2**24, none, none, none]),
+                ('<f8', [10 + 300 * 65536.0, 2.0**32, -2.0**31 - 1, math.nan], [10 | 300 << 16, none, none, none])):
+            self.assertEqual(bags.labels_of(numpy.array(values, dtype)).tolist(), expected, dtype)
+
     def test_wrong_bags_are_left_out_with_a_sentence(self):
         path = self.folder / 'wrong.bag'
         self.write_bag(path, 'd2', label=9)

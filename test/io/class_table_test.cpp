@@ -141,6 +141,78 @@ TEST(ClassTable, RawNumbersMayBeLarge) {
   for (const std::uint32_t raw : {1u, 4094u, 4097u, 69999u}) EXPECT_FALSE(table.classOfRaw(raw)) << raw;
 }
 
+TEST(LabelMask, LeavesTheBitsOfTheClass) {
+  SemanticClass car, road;
+  car.name = "car";
+  car.raw = {10, 252};
+  road.id = 40;
+  road.name = "road";
+  road.raw = {4000};
+  const ClassTable table("instances", {car, road}, 0xffff);
+  EXPECT_EQ(table.labelMask(), 0xffffu);
+  for (const std::uint32_t instance : {0u, 1u, 300u, 0x7fffu, 0x8001u, 0xffffu}) {
+    EXPECT_EQ(table.classOfRaw(instance << 16 | 10u), 0) << instance;
+    EXPECT_EQ(table.classOfRaw(instance << 16 | 4000u), 40) << instance;
+    EXPECT_FALSE(table.classOfRaw(instance << 16 | 11u)) << instance;
+    EXPECT_EQ(table.classOf(instance << 16 | 40u, LabelValues::kId), 40) << instance;
+    EXPECT_FALSE(table.classOf(instance << 16 | 4000u, LabelValues::kId)) << instance;
+  }
+  EXPECT_FALSE(ClassTable("plain", {car, road}).classOfRaw(1u << 16 | 10u)) << "by default, all bits count";
+  SemanticClass high = car;
+  high.raw = {0x0a0000, 0x280000};
+  road.raw = {0x140000};
+  const ClassTable upper("upper", {high, road}, 0xff0000);
+  EXPECT_EQ(upper.classOfRaw(0xff0affffu), 0);
+  EXPECT_EQ(upper.classOf(40, LabelValues::kId), 40) << "an id is one whatever the mask";
+}
+
+TEST(LabelMask, DoesNotReachPointsWithoutALabel) {
+  SemanticClass none, low;
+  none.name = "none";
+  none.raw = {0, 255};
+  low.id = 1;
+  low.name = "low";
+  low.raw = {0xffff};
+  EXPECT_FALSE(ClassTable("bytes", {none}, 0xff).classOfRaw(kNoLabel)) << "-1 is not 255";
+  EXPECT_FALSE(ClassTable("words", {low}, 0xffff).classOfRaw(kNoLabel));
+  EXPECT_FALSE(ClassTable("words", {low}, 0xffff).classOf(kNoLabel, LabelValues::kId));
+  none.raw = {0, kNoLabel};
+  EXPECT_EQ(ClassTable("listed", {none, low}, 0xffff).classOfRaw(kNoLabel), 0) << "unless it is listed";
+  EXPECT_EQ(loadClassTable("occupancy").classOfRaw(kNoLabel), 0);
+}
+
+TEST(LabelMask, ComesFromTheFile) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "file.yaml";
+  const std::string head = "classes:\n  - {id: 1, name: a, color: [1, 2, 3], raw: [-1, 200]}\n";
+  for (const auto& [text, mask] :
+       {std::pair("", 0xffffffffu), std::pair("label_mask: 0xFFFF\n", 0xffffu),
+        std::pair("label_mask: 255\n", 255u), std::pair("label_mask: 4294967295\n", 0xffffffffu)}) {
+    std::ofstream(file) << text << head;
+    const ClassTable table = loadClassTable(file);
+    EXPECT_EQ(table.labelMask(), mask) << text;
+    EXPECT_EQ(table.classOfRaw(kNoLabel), 1) << text;
+  }
+  for (const char* wrong : {"0", "-1", "4294967296"}) {
+    EXPECT_NAMES(faultOf(std::string("label_mask: ") + wrong + "\n" + head),
+                 std::string("label_mask ") + wrong + " of the table is not in 1 to 4294967295");
+  }
+  for (const char* wrong : {"0xGG", "low", "1.5", "[1]"}) {
+    EXPECT_NAMES(faultOf(std::string("label_mask: ") + wrong + "\n" + head), "bad conversion");
+  }
+  EXPECT_NAMES(faultOf("label_mask: 0x7F\n" + head),
+               "raw label 200 of class 'a' has bits that label_mask 0x7F leaves out");
+  EXPECT_NAMES(faultOf("labelmask: 0x7F\n" + head), "did you mean 'label_mask'?");
+}
+
+// Of the data sets, SemanticKITTI alone has instances in its labels; the other formats keep them elsewhere.
+TEST(LabelMask, OfShippedTables) {
+  ASSERT_EQ(classTableNames().size(), 7u);
+  for (const std::string& name : classTableNames()) {
+    EXPECT_EQ(loadClassTable(name).labelMask(), name == "semantic_kitti" ? 0xffffu : 0xffffffffu) << name;
+  }
+}
+
 TEST(ClassTable, OccupancyTakesEveryLabel) {
   const ClassTable table = loadClassTable("occupancy");
   for (const std::uint32_t raw : {0u, 40u, 252u, 70000u}) EXPECT_EQ(table.classOfRaw(raw), 0);
@@ -184,9 +256,9 @@ TEST(ClassTable, NamesEveryFault) {
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: ~, color: [1, 2, 3]}\n"), "class 2 is empty");
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: 9}\n"),
                "raw of class 'b' must be a list of numbers, or any");
-  for (const char* raw : {"-1", "4294967296"}) {
+  for (const char* raw : {"-2", "4294967296"}) {
     EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [" + raw + "]}\n"),
-                 std::string("raw label ") + raw + " of class 'b' is not in 0 to 4294967295");
+                 std::string("raw label ") + raw + " of class 'b' is not in -1 to 4294967295");
   }
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: b, color: [1, 2, 3], raw: [x]}\n"), "bad conversion");
   for (const char* gain : {".inf", ".nan", "-.inf", "-1", "0"}) {

@@ -79,10 +79,10 @@ TEST_F(SequenceFolder, PosesOfAnotherFileAreInTheMapFrame) {
   EXPECT_TRUE(sequence.read(1).T_map_sensor.isApprox(sequence.pose(1)));
 }
 
-TEST_F(SequenceFolder, UpperHalfOfLabelsIsTheInstance) {
+TEST_F(SequenceFolder, LabelsKeepTheirInstances) {
   const std::uint32_t labels[] = {40u | 7u << 16, 252u};
   replace("labels/000000.label", std::string(reinterpret_cast<const char*>(labels), sizeof(labels)));
-  EXPECT_EQ(Sequence(folder_ / "drive").read(0).labels, (std::vector<std::uint32_t>{40, 252}));
+  EXPECT_EQ(Sequence(folder_ / "drive").read(0).labels, (std::vector<std::uint32_t>{40u | 7u << 16, 252u}));
 }
 
 TEST_F(SequenceFolder, WithoutTimesScansAreATenthApart) {

@@ -64,5 +64,17 @@ TEST(TruthCloud, IsExactFarFromTheOrigin) {
   }
 }
 
+TEST(TruthCloud, TakesLabelsWithInstances) {
+  constexpr std::uint32_t kInstance = 9u << 16;
+  Scan scan;
+  scan.points = {{2, 0, 0}, {10, 0, 0}, {10, 1, 0}, {10, 2, 0}};
+  scan.labels = {kInstance | 1u, kInstance | 252u, kInstance | 10u, 259u};
+  TruthCloud cloud;
+  cloud.add(scan);
+  EXPECT_EQ(cloud.moving, (std::vector<std::uint8_t>{1, 1, 0, 1}));
+  EXPECT_TRUE(KittiLabels::moving().contains(kInstance | 255u));
+  EXPECT_FALSE(KittiLabels::moving().contains(kInstance | 251u));
+}
+
 }  // namespace
 }  // namespace bki_mapping

@@ -1,4 +1,4 @@
-/// @file The map in test/store/data/version_1.bkm, as write_example_map makes it: a bit of everything that a
+/// @file The map in test/store/data/version_N.bkm, as write_example_map makes it: a bit of everything that a
 /// map file can hold, from formulas that any language can repeat.
 #pragma once
 
@@ -12,6 +12,9 @@
 
 namespace bki_mapping {
 
+/// The label_mask of the class table; files of version 1 have none.
+constexpr std::uint32_t kExampleMask = 0xefffffff;
+
 inline MapInfo exampleInfo() {
   std::vector<SemanticClass> classes(3);
   classes[0] = {0, "unlabelled", {0, 0, 0}, {}, true, true, false, false, true, std::nullopt};
@@ -22,7 +25,7 @@ inline MapInfo exampleInfo() {
   info.resolution = 0.25;
   info.prior = 0.001;
   info.frame = "map";
-  info.classes = std::make_shared<ClassTable>("example", classes);
+  info.classes = std::make_shared<ClassTable>("example", classes, kExampleMask);
   info.parameters = "resolution: 0.25\nfree_space:\n  mode: line\n";
   return info;
 }

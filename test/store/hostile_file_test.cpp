@@ -17,7 +17,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
+const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_2.bkm";
 
 class HostileFile : public testing::Test {
  protected:
@@ -65,6 +65,10 @@ TEST_F(HostileFile, HasWrongValues) {
       {"UPDATE map SET frame = 'map' || char(0) || 'b'", "zero byte"},
       {"INSERT INTO map SELECT * FROM map", "two rows"},
       {"DELETE FROM map", "is empty"},
+      {"UPDATE map SET label_mask = 0", "label_mask is 0"},
+      {"UPDATE map SET label_mask = 255", "bits that label_mask 0xFF leaves out"},
+      {"UPDATE map SET label_mask = 4294967296", "out of range"},
+      {"UPDATE map SET label_mask = NULL", "not an integer"},
       {"DELETE FROM class", "class"},
       {"UPDATE class SET id = 40", "40"},
       {"UPDATE class SET id = 255 WHERE id = 40", "255"},

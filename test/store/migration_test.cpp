@@ -36,6 +36,11 @@ TEST(Migration, CopiesAllOfVersion1) {
   EXPECT_TRUE(old.drives() == copy.drives());
   EXPECT_EQ(old.info().parameters, copy.info().parameters);
   EXPECT_EQ(old.info().program, copy.info().program);
+  EXPECT_EQ(old.info().frame, copy.info().frame);
+  EXPECT_EQ(old.info().classes->name(), copy.info().classes->name());
+  EXPECT_EQ(copy.info().classes->labelMask(), ClassTable::kAllBits);
+  EXPECT_NO_THROW(checkSameGrid("old", old.info(), "copy", copy.info()));
+  EXPECT_NE(bytesOf(folder / "new.bkm").find("label_mask INTEGER"), std::string::npos) << "of version 2";
   ASSERT_EQ(old.parts(), copy.parts());
   ASSERT_GT(old.parts().size(), 1u);
   for (const int part : old.parts()) {
@@ -62,6 +67,8 @@ TEST(Migration, RefusesWhatItCannotRead) {
   change(old, kVersionByte, 0);
   EXPECT_NE(fault().find(old + " is damaged"), std::string::npos) << fault();
   change(old, kVersionByte, kFormatVersion);
+  EXPECT_NE(fault().find(old + " is damaged (its tables"), std::string::npos) << fault();
+  change(old, kVersionByte, 1);
   EXPECT_EQ(fault(), "");
   EXPECT_EQ(fault(), output + " exists already; choose another name");
   std::filesystem::remove(output);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The reader that needs SQLite and NumPy alone reads test/store/data/version_1.bkm as test/store/version_1_test.cpp does."""
+"""The reader that needs SQLite and NumPy alone reads test/store/data/version_N.bkm as test/store/versions_test.cpp does."""
 import os
 import shutil
 import struct
@@ -13,12 +13,12 @@ SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
 sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
 import read_map  # noqa: E402
 
-FILE = os.path.join(SOURCE, 'test', 'store', 'data', 'version_1.bkm')
+FILES = [os.path.join(SOURCE, 'test', 'store', 'data', f'version_{version}.bkm') for version in (1, 2)]
 UNITS = 65536  # in 1 of evidence
 
 
-def planes_of(part):
-    return {(*block, label): (evidence * UNITS).astype('<i4') for block, label, evidence in read_map.read_planes(FILE, part)}
+def planes_of(file, part):
+    return {(*block, label): (evidence * UNITS).astype('<i4') for block, label, evidence in read_map.read_planes(file, part)}
 
 
 def checksum_of(planes):
@@ -30,31 +30,33 @@ def checksum_of(planes):
 
 class ReadMap(unittest.TestCase):
     def test_evidence(self):
-        planes = planes_of(0)
-        self.assertEqual(len(planes), 7)
-        self.assertEqual(checksum_of(planes), 0x5f49333b)
-        self.assertEqual(planes[0, 0, 0, 40][0, 0, 3], 2147483647)  # z, y, x
-        self.assertEqual(planes[-1, -1, -1, 255][7, 7, 7], -2147483647)
-        self.assertEqual(planes[1, 0, 0, 0][1, 4, 4], -1)
-        self.assertEqual(planes[7, 7, 7, 253][0, 0, 1], 333336240)
+        for file in FILES:
+            planes = planes_of(file, 0)
+            self.assertEqual(len(planes), 7)
+            self.assertEqual(checksum_of(planes), 0x5f49333b)
+            self.assertEqual(planes[0, 0, 0, 40][0, 0, 3], 2147483647)  # z, y, x
+            self.assertEqual(planes[-1, -1, -1, 255][7, 7, 7], -2147483647)
+            self.assertEqual(planes[1, 0, 0, 0][1, 4, 4], -1)
+            self.assertEqual(planes[7, 7, 7, 253][0, 0, 1], 333336240)
 
     def test_evidence_of_a_drive_alone(self):
-        planes = planes_of(1)
-        self.assertEqual(len(planes), 2)
-        self.assertEqual(checksum_of(planes), 0x9b41d26f)
+        for file in FILES:
+            planes = planes_of(file, 1)
+            self.assertEqual(len(planes), 2)
+            self.assertEqual(checksum_of(planes), 0x9b41d26f)
 
     def test_newer_versions_are_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'map.bkm')
-            shutil.copyfile(FILE, path)
+            shutil.copyfile(FILES[-1], path)
             with open(path, 'r+b') as file:
                 file.seek(63)
-                file.write(b'\2')
-            with self.assertRaisesRegex(ValueError, 'is not a map file of version 1'):
+                file.write(b'\3')
+            with self.assertRaisesRegex(ValueError, 'is not a map file of version 1 or 2'):
                 list(read_map.read_planes(path))
 
     def test_as_a_program(self):
-        lines = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'read_map.py'), FILE], capture_output=True, text=True,
+        lines = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'read_map.py'), FILES[-1]], capture_output=True, text=True,
                                check=True).stdout.splitlines()
         self.assertEqual(len(lines), 7)
         self.assertIn('1 0 0 40 512.0', lines)

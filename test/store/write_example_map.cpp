@@ -1,5 +1,6 @@
-// Writes the map of example_map.h to a file: write_example_map FILE. It made test/store/data/version_1.bkm,
-// and makes the file that goes there beside it when the format has a new version.
+// Writes the map of example_map.h to a file: write_example_map FILE. It made the newest of
+// test/store/data/version_N.bkm, and makes the file that goes there beside it when the format has a new
+// version.
 #include <exception>
 #include <iostream>
 

@@ -16,6 +16,10 @@ namespace bki_mapping {
 /// How the labels of a scan are encoded: raw labels of the data set, or ids of the class table.
 enum class LabelValues { kRaw, kId };
 
+/// The label of a point without one: -1, as signed fields have it, or no number at all. It has no bits for
+/// ClassTable::labelMask(): a table may list it as the raw label 4294967295.
+constexpr std::uint32_t kNoLabel = 0xffffffffu;
+
 /// One class of the table.
 struct SemanticClass {
   ClassId id = 0;                       ///< unique in the table, 0 to 253
@@ -37,12 +41,17 @@ struct SemanticClass {
 /// Maps the labels of clouds to classes. Immutable.
 class ClassTable {
  public:
+  /// A label_mask with which all bits of a label are the class.
+  static constexpr std::uint32_t kAllBits = 0xffffffffu;
+
+  /// @param label_mask which bits of a label are the class; the others may hold an instance.
   /// @throws std::invalid_argument that lists every fault: no class, more than 254 classes, a duplicate id,
   /// name or raw label, an id above 253, more than one unlabelled or catch-all class, a cost that is not
-  /// allowed.
-  ClassTable(std::string name, std::vector<SemanticClass> classes);
+  /// allowed, a mask without bits, a raw label with bits outside the mask.
+  ClassTable(std::string name, std::vector<SemanticClass> classes, std::uint32_t label_mask = kAllBits);
 
   const std::string& name() const { return name_; }
+  std::uint32_t labelMask() const { return label_mask_; }
   const std::vector<SemanticClass>& classes() const { return classes_; }
   std::size_t size() const { return classes_.size(); }
 
@@ -50,16 +59,21 @@ class ClassTable {
   const SemanticClass* find(ClassId id) const;
   /// The name of a class; "" if the table has none, as for kFreeClass.
   const std::string& nameOf(ClassId id) const;
-  /// The class of a raw label; no value if the table neither lists it nor has a catch-all class.
+  /// The class of a raw label, of which the bits of labelMask() count; no value if the table neither lists it
+  /// nor has a catch-all class.
   std::optional<ClassId> classOfRaw(std::uint32_t raw) const;
-  /// The class of a label; no value if the table has none for it.
+  /// The class of a label; no value if the table has none for it. An id may have bits outside of labelMask(),
+  /// too.
   std::optional<ClassId> classOf(std::uint32_t label, LabelValues values) const;
   /// The class of hits whose class is unknown; no value if no class has the flag.
   std::optional<ClassId> unlabelled() const { return unlabelled_; }
+  /// Whether any class has the flag dynamic; otherwise the table does not say what can move.
+  bool saysWhatMoves() const;
 
  private:
   std::string name_;
   std::vector<SemanticClass> classes_;
+  std::uint32_t label_mask_;
   std::array<std::int16_t, 256> index_of_id_;  ///< in classes_; -1 for unused ids
   std::unordered_map<std::uint32_t, ClassId> class_of_raw_;
   std::vector<std::int16_t> class_of_small_raw_;  ///< faster lookup of small raw labels; -1 if not listed

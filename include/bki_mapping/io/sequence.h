@@ -14,7 +14,7 @@ namespace bki_mapping {
 struct SequenceFrame {
   std::vector<Eigen::Vector3f> points;  ///< [m]
   std::vector<float> remissions;
-  std::vector<std::uint32_t> labels;  ///< raw labels (lower 16 bits of the values in the file)
+  std::vector<std::uint32_t> labels;  ///< as in the file; ClassTable knows which bits are the class
   Eigen::Isometry3d T_map_sensor = Eigen::Isometry3d::Identity();
   std::uint64_t stamp = 0;  ///< [ns], after kFirstStamp
 

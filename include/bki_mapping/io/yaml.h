@@ -3,11 +3,15 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping {
+
+/// The names of the tables of config/classes, sorted.
+std::vector<std::string> classTableNames();
 
 /// Reads a class table; docs/classes.md describes the format.
 /// @param name_or_file a table of config/classes (its name without .yaml), or the path of a file.

@@ -102,11 +102,15 @@ def read_cloud(cloud, bag: Bag):
     for column, name in enumerate(['x', 'y', 'z', 'intensity']):
         if name in wanted:
             points[:, column] = values[name]
-    labels = numpy.zeros(len(values), '<u4')
-    if bag.labelled:
-        given = numpy.floor(values[bag.label_field].astype(float) + 0.5)  # as the node rounds
-        labels[:] = numpy.where((given >= 0) & (given < 65535), given, 65535)  # what is no label becomes one that no table has
-    return points, labels
+    return points, labels_of(values[bag.label_field]) if bag.labelled else numpy.zeros(len(values), '<u4')
+
+
+def labels_of(values):
+    """Labels as the node reads them: all 32 bits, of negative numbers in two's complement; -1 for what is no label."""
+    numbers = numpy.floor(values.astype(float) + 0.5)
+    is_single = values.dtype.kind == 'f' and values.dtype.itemsize == 4  # which rounds greater numbers
+    least, greatest = (-2.0**24, 2.0**24) if is_single else (-2.0**31, 2.0**32 - 1)
+    return numpy.where((numbers >= least) & (numbers <= greatest), numbers, -1).astype(numpy.int64).astype('<u4')
 
 
 def matrix_of(transform):

@@ -1,6 +1,6 @@
-// Files of version 1 open for ever. What test/store/data/version_1.bkm holds was computed from the formulas
-// in example_map.h by a program that shares no code with this one; test/store/read_map_test.py compares the
-// same numbers.
+// Files of all versions open for ever. What test/store/data/version_N.bkm holds was computed from the
+// formulas in example_map.h by a program that shares no code with this one; test/store/read_map_test.py
+// compares the same numbers.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -11,12 +11,18 @@
 #include "reference/content.h"
 #include "store/example_map.h"
 #include "store/map_maker.h"
+#include "store/schema.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
 
-const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
+class Version : public testing::TestWithParam<int> {
+ protected:
+  std::string file_ =
+      BKI_MAPPING_SOURCE_DIR "/test/store/data/version_" + std::to_string(GetParam()) + ".bkm";
+};
+INSTANTIATE_TEST_SUITE_P(All, Version, testing::Range(1, static_cast<int>(kFormatVersion) + 1));
 
 SemanticMap readPart(MapFile& file, int part) {
   SemanticMap map = file.info().emptyMap();
@@ -45,8 +51,8 @@ EvidenceUnits unitsAt(const SemanticMap& map, const BlockIndex& block, ClassId i
   return map.find(block)->evidence(id)[voxel];
 }
 
-TEST(Version1, HoldsItsEvidence) {
-  MapFile file(kFile, MapFile::Access::kRead);
+TEST_P(Version, HoldsItsEvidence) {
+  MapFile file(file_, MapFile::Access::kRead);
   const SemanticMap map = readPart(file, 0), part = readPart(file, 1);
   EXPECT_EQ(map.size(), 5u);
   EXPECT_EQ(checksumOf(map), 0x5f49333bu);
@@ -64,8 +70,8 @@ TEST(Version1, HoldsItsEvidence) {
   for (std::size_t v = 0; v < kBlockVoxels; ++v) ASSERT_EQ(marked->occlusion()[v], v % 3 == 0) << v;
 }
 
-TEST(Version1, HoldsWhatTheMapIsAbout) {
-  MapFile file(kFile, MapFile::Access::kRead);
+TEST_P(Version, HoldsWhatTheMapIsAbout) {
+  MapFile file(file_, MapFile::Access::kRead);
   const MapInfo& info = file.info();
   EXPECT_EQ(info.resolution, 0.25);
   EXPECT_EQ(info.prior, 0.001);
@@ -74,6 +80,7 @@ TEST(Version1, HoldsWhatTheMapIsAbout) {
   EXPECT_EQ(info.parameters, "resolution: 0.25\nfree_space:\n  mode: line\n");
   EXPECT_EQ(info.program, "bki_mapping 0.1.0");
   EXPECT_EQ(info.classes->name(), "example");
+  EXPECT_EQ(info.classes->labelMask(), GetParam() == 1 ? ClassTable::kAllBits : kExampleMask);
   ASSERT_EQ(info.classes->size(), 3u);
   const SemanticClass &unlabelled = info.classes->classes()[0], &street = info.classes->classes()[1],
                       &car = info.classes->classes()[2];
@@ -109,20 +116,20 @@ TEST(Version1, HoldsWhatTheMapIsAbout) {
 }
 
 // What write_example_map would write today reads as what it wrote then.
-TEST(Version1, IsWhatTheFormulasSay) {
+TEST_P(Version, IsWhatTheFormulasSay) {
   SemanticMap sum = exampleMap(0);
   sum.add(exampleMap(1));
-  MapFile file(kFile, MapFile::Access::kRead);
+  MapFile file(file_, MapFile::Access::kRead);
   EXPECT_EQ(reference::contentOf(readPart(file, 0)), reference::contentOf(sum));
   EXPECT_EQ(reference::contentOf(readPart(file, 1)), reference::contentOf(exampleMap(1)));
   EXPECT_TRUE(file.drives() == exampleDrives());
   EXPECT_NO_THROW(checkSameGrid("file", file.info(), "formulas", exampleInfo()));
 }
 
-TEST(Version1, IsUpdatedByThisVersion) {
+TEST_P(Version, IsUpdatedByThisVersion) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  std::filesystem::copy_file(kFile, path);
+  std::filesystem::copy_file(file_, path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
   {
     MapFile file(path, MapFile::Access::kUpdate);
@@ -138,17 +145,17 @@ TEST(Version1, IsUpdatedByThisVersion) {
   EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 3);
 }
 
-TEST(Version1, IsRefusedAsANewerVersion) {
+TEST(NewerVersion, IsRefused) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  std::filesystem::copy_file(kFile, path);
+  std::filesystem::copy_file(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm", path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\2');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\3');
   for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
     EXPECT_EQ(
         sentenceOf([&] { MapFile(path, access); }),
         path +
-            " was written by a newer version of bki_mapping (format 2, this one knows formats up to 1); "
+            " was written by a newer version of bki_mapping (format 3, this one knows formats up to 2); "
             "use that version or a later one");
   }
 }
