@@ -7,7 +7,7 @@ bki_mapping_room(ros SOURCES
     distance_section_config.cpp
     input_config.cpp
     kept_map.cpp
-    label_reader.cpp
+    label_field.cpp label_reader.cpp
     live_settings.cpp
     reconfigure_server.cpp
     load_advice.cpp

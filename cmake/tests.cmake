@@ -224,7 +224,7 @@ foreach(name instruction_sets laws)
     ENVIRONMENT "BKI_MAPPING_INSTRUCTION_SET=generic")
 endforeach()
 set_property(TEST instruction_sets_generic_test APPEND PROPERTY ENVIRONMENT "GTEST_FILTER=*GenericIsAlwaysThere")
-bki_mapping_unit_tests(io class_table display_colors grid_export html_export map_picture sequence tiled_map truth_cloud yaml_file
+bki_mapping_unit_tests(io class_table display_colors grid_export html_export label_watch map_picture sequence tiled_map truth_cloud yaml_file
   LINK bki_mapping_simulation nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
 bki_mapping_unit_tests(io cleaned_points map_export pcd_file LINK pcl_io)
 bki_mapping_unit_tests(io octomap_export LINK ${OCTOMAP_LIBRARIES})

@@ -143,12 +143,14 @@ Labels::Labels(py::handle object, const std::string& name) {
     throw std::invalid_argument(name + " must be " + wanted + ", not of shape " + shapeText(array));
   }
   if (array.size() > 0 && !(kind == 'u' && array.itemsize() <= 4)) {
-    const py::object least = array.attr("min")(), most = array.attr("max")(), zero = py::int_(0);
-    constexpr auto kLimit = std::numeric_limits<std::uint32_t>::max();
-    if (least < zero || most > py::int_(kLimit)) {
-      const std::string wrong = py::str(py::handle(least < zero ? least : most));
-      throw std::invalid_argument(name + " must be from 0 to " + std::to_string(kLimit) + ", but " + wrong +
-                                  " is among them");
+    const py::object least = array.attr("min")(), most = array.attr("max")();
+    constexpr auto kLeast = std::numeric_limits<std::int32_t>::min();
+    constexpr auto kMost = std::numeric_limits<std::uint32_t>::max();
+    const bool too_low = least < py::int_(kLeast);
+    if (too_low || most > py::int_(kMost)) {
+      const std::string wrong = py::str(py::handle(too_low ? least : most));
+      throw std::invalid_argument(name + " must be from " + std::to_string(kLeast) + " to " +
+                                  std::to_string(kMost) + ", but " + wrong + " is among them");
     }
   }
   array_ = contiguous<std::uint32_t>(array);

@@ -53,7 +53,8 @@ class Points {
   bool is_float_ = false;
 };
 
-/// Labels as NumPy has them, without a copy if they are contiguous uint32.
+/// Labels as NumPy has them, without a copy if they are contiguous uint32. Negative ones become what they are
+/// in two's complement: -1 is kNoLabel.
 class Labels {
  public:
   /// @param object anything that numpy.asarray makes an array of integers of shape (N,) of.

@@ -11,6 +11,7 @@
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "io/label_watch.h"
 #include "map_bindings.h"
 
 namespace bki_mapping::python {
@@ -29,6 +30,7 @@ struct Mapper {
   std::mutex mutex;
   SemanticMapper mapper;
   std::string frame;
+  LabelWatch labels;
   DriveRecord drive;                ///< of the scans that were integrated here
   std::vector<DriveRecord> drives;  ///< those added from files and other maps
 };
@@ -49,10 +51,12 @@ MapperConfig configOf(py::handle config, py::handle resolution, py::dict paramet
   return result;
 }
 
+void warn(const std::string& sentence) {
+  if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 void warnOf(const MapperConfig& config) {
-  for (const std::string& warning : settingWarnings(config)) {
-    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
-  }
+  for (const std::string& warning : settingWarnings(config)) warn(warning);
 }
 
 SharedClasses classesOf(py::handle classes) {
@@ -143,7 +147,8 @@ ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::
   scan.labels = {classes.data(), classes.size()};
   scan.labels_are_ids = truthOf(labels_are_ids, "labels_are_ids");
   scan.stamp = stamp;
-  return alone(self, [&] {
+  std::string warning;
+  const ScanStats added = alone(self, [&] {
     std::vector<Eigen::Vector3f> relative;
     if (in_map || pose.turned || !given.isFloat()) {
       relative = relativePoints(given, pose, in_map);
@@ -158,8 +163,11 @@ ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::
     }
     const ScanStats stats = self.mapper.integrate(scan);
     self.drive.addScan(stamp, self.mapper.map().geometry(), self.mapper.touchedBlocks());
+    warning = self.labels.report(self.mapper, scan, stats.counts);
     return stats;
   });
+  if (!warning.empty()) warn(warning);
+  return added;
 }
 
 ScanStats integrate(Mapper& self, py::handle origin, py::handle points, py::handle labels, py::handle stamp,
@@ -307,7 +315,9 @@ constexpr char kIntegrateHelp[] =
     "float64 is better. Points that are not finite are skipped, and counted. Contiguous float32 is not "
     "copied if `origin` is a position. Do not change the arrays meanwhile.\n"
     "labels: integers, (N,): labels of the data set, which the class table translates; with "
-    "labels_are_ids=True, ids of the table. Contiguous uint32 is not copied.\n"
+    "labels_are_ids=True, ids of the table; -1 for points without a label. Contiguous uint32 is not copied. "
+    "A "
+    "UserWarning names each label that the table does not list once, and the remedy.\n"
     "stamp: time of the scan [ns]; random free samples depend on it.\n\n"
     "Raises ValueError if shapes or lengths are wrong, ScanRefused if the scan exceeds a limit; the map is "
     "then unchanged.";

@@ -28,7 +28,11 @@ class ColorReader : public LabelReader {
   void append(const std::uint8_t* point, CloudLabels& out) override {
     const std::uint32_t color = colorAt(point);
     const std::uint32_t label = classOf(color);
-    if (label == kNoLabel) out.countUnknown(color);
+    if (color == kNoLabel) {
+      out.unknown.addMissing();
+    } else if (label == kNoLabel) {
+      out.unknown.add(color);
+    }
     out.are_ids = true;
     out.labels.push_back(label);
   }

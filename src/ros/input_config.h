@@ -18,6 +18,10 @@ enum class LabelEncoding {
   kTopK,    ///< fields, or components, with labels, and as many with their scores
 };
 
+inline bool hasColors(LabelEncoding encoding) {
+  return encoding == LabelEncoding::kRgb || encoding == LabelEncoding::kBgr;
+}
+
 enum class ColorMatch { kExact, kNearest };
 enum class ScoreType { kProbability, kLogit };
 

@@ -1,7 +1,7 @@
 #include "ros/label_reader.h"
 
 #include "ros/color_reader.h"
-#include "ros/point_field.h"
+#include "ros/label_field.h"
 #include "ros/score_reader.h"
 
 namespace bki_mapping::ros_interface {
@@ -18,24 +18,14 @@ class NumberReader : public LabelReader {
  public:
   NumberReader(const sensor_msgs::PointCloud2& cloud, const std::string& field, const ClassTable& classes,
                LabelValues values)
-      : field_(cloud, field), classes_(classes), values_(values) {}
+      : field_(FieldReader(cloud, field), classes, values) {}
 
   void append(const std::uint8_t* point, CloudLabels& out) override {
-    const std::uint32_t label = field_.label(point);
-    if (label != last_) {  // saves most look-ups: neighbouring points mostly have the same label
-      last_ = label;
-      known_ = classes_.classOf(label, values_).has_value();
-    }
-    if (!known_) out.countUnknown(label);
-    out.labels.push_back(label);
+    out.labels.push_back(field_.read(point, out.unknown).label);
   }
 
  private:
-  FieldReader field_;
-  const ClassTable& classes_;
-  LabelValues values_;
-  std::uint32_t last_ = kNoLabel;
-  bool known_ = false;
+  LabelField field_;
 };
 
 }  // namespace

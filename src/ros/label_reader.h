@@ -3,12 +3,12 @@
 
 #include <sensor_msgs/PointCloud2.h>
 
-#include <map>
 #include <memory>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
+#include "core/unlisted_labels.h"
 #include "ros/input_config.h"
 #include "ros/point_field.h"
 
@@ -19,13 +19,7 @@ struct CloudLabels {
   std::vector<std::uint32_t> labels;  ///< one per point; kNoLabel for points without a label
   bool are_ids = false;               ///< whether they are class ids; otherwise `label_values` decides
   SoftLabels soft;                    ///< for the encodings scores and top_k; otherwise empty
-  /// Values that are not in the class table, and how often each occurred; at most kMaxUnknown of them.
-  std::map<std::uint32_t, std::size_t> unknown;
-
-  static constexpr std::size_t kMaxUnknown = 64;
-  void countUnknown(std::uint32_t value) {
-    if (unknown.size() < kMaxUnknown || unknown.count(value) > 0) ++unknown[value];
-  }
+  UnlistedLabels unknown;             ///< those that are not in the class table
 };
 
 /// Reads the label of one point at a time.

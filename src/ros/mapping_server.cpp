@@ -95,6 +95,7 @@ void MappingServer::subscribe() {
   warned_of_origin_.assign(readers_.size(), false);
   warned_of_far_points_.assign(readers_.size(), false);
   points_.resize(readers_.size());
+  label_watches_.resize(readers_.size());
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
@@ -195,8 +196,9 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   const std_msgs::Header& header = waiting.cloud->header;
   const auto now = Clock::now();
   ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
-  ledger_.unknownLabels(placed.unknown_labels);
-  points_[waiting.input].add(stats.counts, placed.unknown_labels);
+  ledger_.unlistedLabels(placed.unlisted_labels);
+  points_[waiting.input].add(stats.counts, placed.unlisted_labels);
+  warnOfLabels(waiting.input, placed, stats.counts);
   if (readers_[waiting.input].originDoubtful(*waiting.cloud) && !warned_of_origin_[waiting.input]) {
     warned_of_origin_[waiting.input] = true;
     ROS_WARN(
@@ -232,6 +234,22 @@ void MappingServer::warnOfFarPlace() {
   if (warning.empty()) return;
   warned_of_far_place_ = true;
   ROS_WARN("%s", warning.c_str());
+}
+
+void MappingServer::warnOfLabels(std::size_t input, const PlacedScan& placed, const PointCounts& counts) {
+  const LabelEncoding encoding = readers_[input].input().label_encoding;
+  const auto watched = encoding == LabelEncoding::kRgb   ? LabelWatch::Encoding::kRgb
+                       : encoding == LabelEncoding::kBgr ? LabelWatch::Encoding::kBgr
+                                                         : LabelWatch::Encoding::kNumber;
+  const MapperConfig& config = mapper_->config();
+  LabelWatch& watch = label_watches_[input];
+  Span<const std::uint32_t> labels = placed.scan.labels;
+  if (placed.scan.labels_are_ids) labels = {};  // the reader's, not the cloud's
+  const std::string said = watch.report(mapper_->classes(), config.unknown_labels, counts, labels,
+                                        placed.unlisted_labels, config.label_values, watched);
+  points_[input].label_remedy = watch.remedy();
+  if (said.empty()) return;
+  ROS_WARN("Clouds of %s: %s", cloud_subscribers_[input].getTopic().c_str(), said.c_str());
 }
 
 ScanStats MappingServer::addToMap(const Scan& scan) {

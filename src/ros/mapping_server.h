@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "io/label_watch.h"
 #include "ros/kept_map.h"
 #include "ros/live_settings.h"
 #include "ros/mapping_diagnostics.h"
@@ -74,6 +75,8 @@ class MappingServer {
   void warnOfFarPoints(std::size_t input, std::size_t count);
   /// Warns once that the sensor is too far from the origin for programs that calculate in float32.
   void warnOfFarPlace();
+  /// Warns of labels that the class table does not list, of each once.
+  void warnOfLabels(std::size_t input, const PlacedScan& placed, const PointCounts& counts);
   /// Logs what is wrong with the map file, when that changes.
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
@@ -112,6 +115,7 @@ class MappingServer {
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
   SensorTrajectory trajectory_;
   SentenceThrottle throttle_;
+  std::vector<LabelWatch> label_watches_;                      ///< of each input
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
   bool warned_of_far_place_ = false;
 

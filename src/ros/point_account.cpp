@@ -3,10 +3,10 @@
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 #include "bki_mapping/core/named_parameter.h"
+#include "core/percent.h"
 #include "ros/point_field.h"
 
 namespace bki_mapping::ros_interface {
@@ -18,31 +18,24 @@ using diagnostic_msgs::DiagnosticStatus;
 constexpr double kFew = 0.1, kHardlyAny = 0.001;
 /// Minimum fraction of points that are used or left out for a fault; fewer are no basis for an assessment.
 constexpr double kSignificant = 0.01;
-/// Maximum number of different unknown labels that are counted.
-constexpr std::size_t kMaxUnknown = 64;
-
-/// A fraction as "12 %"; with three decimals near 0 and 100, to distinguish it from these.
-std::string percent(double fraction) {
-  const double rounded =
-      fraction > 0.99 || fraction < 0.01 ? std::round(1e5 * fraction) / 1e3 : std::round(100.0 * fraction);
-  return numberText(rounded) + " %";
-}
+/// Fraction of points left out for their label from which the level is WARN.
+constexpr double kManyUnknown = 0.1;
 
 /// A clause about points of unknown labels, with the remedy.
 std::string unknownLabels(const PointAccount& account, const InputConfig& input, const std::string& classes) {
-  const auto most = std::max_element(account.unknown_labels.begin(), account.unknown_labels.end(),
+  const auto& counts = account.unlisted_labels.counts();
+  const auto most = std::max_element(counts.begin(), counts.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
-  const bool colors =
-      input.label_encoding == LabelEncoding::kRgb || input.label_encoding == LabelEncoding::kBgr;
-  if (most == account.unknown_labels.end() || most->first == kNoLabel) {
+  if (most == counts.end() || most->second < account.unlisted_labels.missing()) {
     return "have no label (their field holds no number, no colour or no positive score); check label_field, "
            "label_encoding and score_fields";
   }
-  char text[16];
-  std::snprintf(text, sizeof text, colors ? "0x%06x" : "%u", most->first);
+  const bool colors = hasColors(input.label_encoding);
+  char color[16];
+  std::snprintf(color, sizeof color, "0x%06x", static_cast<unsigned>(most->first));
   return std::string("have ") + (colors ? "colours" : "labels") + " that class table '" + classes +
-         "' does not list (" + text + " most often); set classes or " +
-         (colors ? "color_match" : "label_values");
+         "' does not list (" + (colors ? color : std::to_string(most->first)) + " most often); " +
+         account.label_remedy;
 }
 
 /// Names a limit, such as "sensor_model/min_range 2 m", or as the input's own.
@@ -98,13 +91,10 @@ const std::vector<PointKind>& pointKinds() {
   return kinds;
 }
 
-void PointAccount::add(const PointCounts& of_scan, const std::map<std::uint32_t, std::size_t>& labels) {
+void PointAccount::add(const PointCounts& of_scan, const UnlistedLabels& labels) {
   ++clouds;
   counts += of_scan;
-  for (const auto& [label, count] : labels) {
-    if (unknown_labels.size() < kMaxUnknown || unknown_labels.count(label) > 0)
-      unknown_labels[label] += count;
-  }
+  unlisted_labels += labels;
 }
 
 Health judgePoints(const PointAccount& account, const std::string& topic, const InputConfig& input,
@@ -112,16 +102,18 @@ Health judgePoints(const PointAccount& account, const std::string& topic, const 
   const PointCounts& counts = account.counts;
   const auto all = static_cast<double>(counts.points), used = static_cast<double>(counts.used);
   std::size_t faults = 0;
-  const PointKind *worst = nullptr, *worst_fault = nullptr;
+  const PointKind *worst = nullptr, *worst_fault = nullptr, *unknown = nullptr;
   const auto more = [&](const PointKind& kind, const PointKind* than) {
     return counts.*kind.in_scan > (than ? counts.*than->in_scan : 0);
   };
   for (const PointKind& kind : pointKinds()) {
     if (more(kind, worst)) worst = &kind;
+    if (kind.in_scan == &PointCounts::unknown_label) unknown = &kind;
     if (kind.may_be_many) continue;
     faults += counts.*kind.in_scan;
     if (more(kind, worst_fault)) worst_fault = &kind;
   }
+  const auto left_out = static_cast<double>(counts.unknown_label);
   const double sound = used + static_cast<double>(faults);
   Health health;
   if (worst_fault && sound >= kSignificant * all && used < kFew * sound) {
@@ -129,14 +121,17 @@ Health judgePoints(const PointAccount& account, const std::string& topic, const 
     worst = worst_fault;
   } else if (worst && used + static_cast<double>(counts.no_returns) < kHardlyAny * all) {
     health.level = DiagnosticStatus::WARN;
+  } else if (left_out > 0.0 && sound >= kSignificant * all && left_out >= kManyUnknown * (used + left_out)) {
+    health.level = DiagnosticStatus::WARN;
+    worst = unknown;
   } else {
     return health;
   }
-  health.message = (used > 0.0 ? "only " + percent(used / all) : std::string("none")) +
+  health.message = (used > 0.0 ? "only " + percentText(used / all) : std::string("none")) +
                    " of the points of the last " +
                    (account.clouds == 1 ? "cloud" : std::to_string(account.clouds) + " clouds") + " of " +
-                   topic + " is used: " + percent(static_cast<double>(counts.*worst->in_scan) / all) + " " +
-                   sentenceOf(*worst, account, input, mapper, classes);
+                   topic + " is used: " + percentText(static_cast<double>(counts.*worst->in_scan) / all) +
+                   " " + sentenceOf(*worst, account, input, mapper, classes);
   return health;
 }
 

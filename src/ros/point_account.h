@@ -4,10 +4,10 @@
 
 #include <bki_mapping/MappingStatus.h>
 
-#include <map>
 #include <string>
 #include <vector>
 
+#include "core/unlisted_labels.h"
 #include "mapping/scan_preprocessor.h"
 #include "ros/health.h"
 #include "ros/input_config.h"
@@ -30,12 +30,14 @@ const std::vector<PointKind>& pointKinds();
 struct PointAccount {
   std::size_t clouds = 0;
   PointCounts counts;
-  std::map<std::uint32_t, std::size_t> unknown_labels;
+  UnlistedLabels unlisted_labels;
+  std::string label_remedy;  ///< of LabelWatch, for unlisted_labels
 
-  void add(const PointCounts& of_scan, const std::map<std::uint32_t, std::size_t>& labels);
+  void add(const PointCounts& of_scan, const UnlistedLabels& labels);
 };
 
 /// Assesses whether integrated clouds contribute to the map.
+/// - Of the points that are used, or left out for their label, at least 10 % are left out: WARN.
 /// - Of the points that are used, or left out for a fault (label, min_range, outside of the map), less than
 /// 10 % are
 ///   used: WARN; less than 0.1 %: ERROR. Applies if these are at least 1 % of all points.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -118,17 +120,29 @@ double FieldReader::operator()(const std::uint8_t* point) const {
 
 std::optional<std::uint32_t> FieldReader::bits(const std::uint8_t* point) const {
   if (sizeOf(datatype_) == 4) return load<std::uint32_t>(point + offset_, swap_);
-  const std::uint32_t number = label(point);
-  return number == kNoLabel ? std::nullopt : std::optional(number);
+  const std::optional<std::int64_t> number = rounded(point);
+  if (!number || *number < 0 || *number > std::numeric_limits<std::uint32_t>::max()) return std::nullopt;
+  return static_cast<std::uint32_t>(*number);
 }
 
-std::uint32_t FieldReader::label(const std::uint8_t* point) const {
-  const double rounded = std::round((*this)(point));
-  return rounded >= 0.0 && rounded < kNoLabel ? static_cast<std::uint32_t>(rounded) : kNoLabel;
+std::optional<std::int64_t> FieldReader::rounded(const std::uint8_t* point) const {
+  const double value = std::round((*this)(point));
+  if (!(std::abs(value) < 0x1p62)) return std::nullopt;
+  return static_cast<std::int64_t>(value);
+}
+
+bool FieldReader::exact(std::int64_t number) const {
+  return datatype_ != PointField::FLOAT32 || std::abs(number) <= 1 << 24;
 }
 
 bool FieldReader::integer() const {
   return datatype_ != PointField::FLOAT32 && datatype_ != PointField::FLOAT64;
+}
+
+std::uint32_t labelOf(std::int64_t number) {
+  const bool fits = number >= std::numeric_limits<std::int32_t>::min() &&
+                    number <= std::numeric_limits<std::uint32_t>::max();
+  return fits ? static_cast<std::uint32_t>(number) : kNoLabel;
 }
 
 std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list) {

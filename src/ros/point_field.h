@@ -8,11 +8,9 @@
 #include <string>
 #include <vector>
 
-namespace bki_mapping::ros_interface {
+#include "bki_mapping/core/class_table.h"
 
-/// The label of a point without one: the field holds no valid number, no colour of the table, or no usable
-/// score.
-constexpr std::uint32_t kNoLabel = 0xffffffffu;
+namespace bki_mapping::ros_interface {
 
 bool hostIsBigEndian();
 
@@ -31,15 +29,21 @@ class FieldReader {
   /// The bits of a FLOAT32, INT32 or UINT32; for other datatypes the rounded value, or nullopt if that does
   /// not fit into 32 bits.
   std::optional<std::uint32_t> bits(const std::uint8_t* point) const;
-  /// The value rounded to a label; kNoLabel if it is not a valid one.
-  std::uint32_t label(const std::uint8_t* point) const;
+  /// The value rounded to an integer; nullopt if it is not finite, or its magnitude is 2^62 or more.
+  std::optional<std::int64_t> rounded(const std::uint8_t* point) const;
   bool integer() const;  ///< whether the datatype is an integer
+  /// Whether the datatype holds this integer and all that are smaller: FLOAT32 does so up to 2^24.
+  bool exact(std::int64_t number) const;
 
  private:
   std::uint8_t datatype_;
   std::size_t offset_;
   bool swap_;
 };
+
+/// A number as a label: of a negative one, the bits of a signed integer. kNoLabel if it has more than 32
+/// bits.
+std::uint32_t labelOf(std::int64_t number);
 
 /// Readers of all components of all fields in a list such as "a,b".
 std::vector<FieldReader> readersOf(const sensor_msgs::PointCloud2& cloud, const std::string& list);

@@ -55,12 +55,6 @@ void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason, cons
   status_.last_drop_reason = kind.name;
 }
 
-void ScanLedger::unknownLabels(const std::map<std::uint32_t, std::size_t>& counts) {
-  for (const auto& [label, count] : counts) {
-    if (unknown_.size() < kMaxUnknown || unknown_.count(label) > 0) unknown_[label] += count;
-  }
-}
-
 std::uint64_t ScanLedger::droppedClouds() const {
   std::uint64_t sum = 0;
   for (const DropKind& kind : dropKinds()) sum += status_.*kind.count;
@@ -75,9 +69,10 @@ MappingStatus ScanLedger::status(Clock::time_point now, std::size_t waiting) {
   status_.latency_p99_ms = static_cast<float>(latency_.quantile(0.99));
   status_.integration_median_ms = static_cast<float>(integration_.median());
   status_.integration_p99_ms = static_cast<float>(integration_.quantile(0.99));
+  status_.points_without_label = unknown_.missing();
   status_.unknown_labels.clear();
   status_.unknown_label_counts.clear();
-  for (const auto& [label, count] : unknown_) {
+  for (const auto& [label, count] : unknown_.counts()) {
     status_.unknown_labels.push_back(label);
     status_.unknown_label_counts.push_back(count);
   }

@@ -4,11 +4,11 @@
 #include <bki_mapping/MappingStatus.h>
 
 #include <array>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "core/unlisted_labels.h"
 #include "ros/rolling_statistics.h"
 
 namespace bki_mapping::ros_interface {
@@ -50,7 +50,7 @@ class ScanLedger {
   /// @param why a sentence with the remedy.
   void dropped(const std_msgs::Header& header, DropReason reason, const std::string& why);
   /// Adds counts of labels that are not in the class table.
-  void unknownLabels(const std::map<std::uint32_t, std::size_t>& counts);
+  void unlistedLabels(const UnlistedLabels& labels) { unknown_ += labels; }
   void timeJumped() { ++status_.time_jumps; }
 
   std::uint64_t droppedClouds() const;
@@ -62,13 +62,10 @@ class ScanLedger {
   std::string summary(std::size_t waiting) const;
 
  private:
-  /// Maximum number of different unknown labels that are counted.
-  static constexpr std::size_t kMaxUnknown = 64;
-
   MappingStatus status_;
   RollingStatistics latency_, integration_;
   RateMeter received_rate_, integrated_rate_;
-  std::map<std::uint32_t, std::uint64_t> unknown_;
+  UnlistedLabels unknown_;
 };
 
 }  // namespace bki_mapping::ros_interface

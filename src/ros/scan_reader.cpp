@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "ros/cloud_conversion.h"
 
@@ -104,7 +105,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   scan.sensor_model = input_.sensor_model;
   scan.no_returns_at_max_range = input_.clear_no_returns;
   placed.T_map_sensor = sensor->T_target_source;
-  placed.unknown_labels = std::move(content.labels.unknown);
+  placed.unlisted_labels = std::move(content.labels.unknown);
   return placed;
 }
 

@@ -3,11 +3,11 @@
 
 #include <sensor_msgs/PointCloud2.h>
 
-#include <map>
 #include <variant>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
+#include "core/unlisted_labels.h"
 #include "ros/input_config.h"
 #include "ros/pose_source.h"
 
@@ -17,8 +17,7 @@ namespace bki_mapping::ros_interface {
 struct PlacedScan {
   Scan scan;
   Eigen::Isometry3d T_map_sensor;  ///< at the cloud's stamp
-  std::map<std::uint32_t, std::size_t>
-      unknown_labels;  ///< labels that are not in the class table, with their counts
+  UnlistedLabels unlisted_labels;
 };
 
 /// Reads the clouds of one input.

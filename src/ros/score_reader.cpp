@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ros/point_field.h"
+#include "ros/label_field.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -23,7 +23,7 @@ class SoftLabelReader : public LabelReader {
     if (type_ == ScoreType::kLogit) exponentiate();
     const Score* best = nullptr;
     if (usable_) best = appendProbabilities(out.soft);
-    if (!best && any_known) out.countUnknown(kNoLabel);
+    if (!best && any_known) out.unknown.addMissing();
     out.labels.push_back(best ? best->id : kNoLabel);
   }
 
@@ -135,11 +135,10 @@ class TopKReader : public SoftLabelReader {
  public:
   TopKReader(const sensor_msgs::PointCloud2& cloud, const InputConfig& input, const ClassTable& classes,
              LabelValues values)
-      : SoftLabelReader(input.score_type),
-        labels_(readersOf(cloud, input.label_field)),
-        scores_(readersOf(cloud, input.score_fields)),
-        classes_(classes),
-        values_(values) {
+      : SoftLabelReader(input.score_type), scores_(readersOf(cloud, input.score_fields)) {
+    for (const FieldReader& field : readersOf(cloud, input.label_field)) {
+      labels_.emplace_back(field, classes, values);
+    }
     if (labels_.empty() || labels_.size() != scores_.size()) {
       throw std::invalid_argument("label_field names " + std::to_string(labels_.size()) +
                                   " labels a point, score_fields " + std::to_string(scores_.size()) +
@@ -151,21 +150,15 @@ class TopKReader : public SoftLabelReader {
   bool collect(const std::uint8_t* point, CloudLabels& out) override {
     bool any_known = false;
     for (std::size_t k = 0; k < labels_.size(); ++k) {
-      const std::uint32_t label = labels_[k].label(point);
-      const auto id = classes_.classOf(label, values_);
-      if (id) {
-        add(*id, scores_[k](point));
-      } else {
-        out.countUnknown(label);
-      }
+      const auto id = labels_[k].read(point, out.unknown).id;
+      if (id) add(*id, scores_[k](point));
       any_known |= id.has_value();
     }
     return any_known;
   }
 
-  std::vector<FieldReader> labels_, scores_;
-  const ClassTable& classes_;
-  LabelValues values_;
+  std::vector<LabelField> labels_;
+  std::vector<FieldReader> scores_;
 };
 
 }  // namespace

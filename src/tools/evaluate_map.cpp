@@ -14,6 +14,7 @@
 #include "evaluation/label_noise.h"
 #include "evaluation/pose_noise.h"
 #include "evaluation/quality_report.h"
+#include "io/label_watch.h"
 #include "io/truth_cloud.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
@@ -253,6 +254,7 @@ int evaluate(const po::variables_map& given) {
     evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
   }
   std::vector<double> times;
+  LabelWatch watch;
   for (std::size_t i = first; i < last; ++i) {
     SequenceFrame frame = sequence.read(i);
     Scan scan = frame.scan();
@@ -263,7 +265,9 @@ int evaluate(const po::variables_map& given) {
     if (predictions) input.labels = predictions->read(i).labels;
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
-    times.push_back(mapper.integrate(input).totalMs());
+    const ScanStats stats = mapper.integrate(input);
+    times.push_back(stats.totalMs());
+    tools::warn(watch.report(mapper, input, stats.counts));
     if (sequence.labelled()) {
       evaluation.add(scan, input.labels, mapper.classes());
     } else {

@@ -12,6 +12,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
 #include "io/cleaned_points.h"
+#include "io/label_watch.h"
 #include "tools/options.h"
 #include "tools/run_report.h"
 
@@ -111,11 +112,13 @@ int mapSequence(const po::variables_map& given) {
   std::vector<tools::ScanReport> scans;
   std::vector<std::size_t> mapped;
   std::size_t refused = 0;
+  LabelWatch labels;
   for (std::size_t i = first; i < last; ++i) {
     try {
       const Scan scan = sequence.read(i).scan();
       scans.push_back({sequence.name(i), mapper.integrate(scan)});
       mapped.push_back(i);
+      tools::warn(labels.report(mapper, scan, scans.back().stats.counts));
       drive.addScan(scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
     } catch (const ScanRefused& refusal) {
       // Report the first refusal and count the others, which mostly have the same reason.

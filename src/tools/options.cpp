@@ -160,7 +160,7 @@ MapperConfig mapperConfig(const po::variables_map& given) {
     throw std::invalid_argument("parameter threads is given by --threads and by --set; keep one");
   }
   setParameters(config, values);
-  for (const std::string& warning : settingWarnings(config)) std::cerr << "warning: " << warning << "\n";
+  for (const std::string& warning : settingWarnings(config)) warn(warning);
   return config;
 }
 
@@ -217,6 +217,10 @@ int run(const std::string& program, const std::function<int()>& body) {
     std::cerr << program << ": " << error.what() << "\n";
     return 1;
   }
+}
+
+void warn(const std::string& sentence) {
+  if (!sentence.empty()) std::cerr << "warning: " << sentence << "\n";
 }
 
 void showProgress(std::size_t done, std::size_t all, const std::string& text) {

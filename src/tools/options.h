@@ -72,6 +72,9 @@ std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, c
 /// Runs a program; an exception becomes one line on standard error and exit status 1.
 int run(const std::string& program, const std::function<int()>& body);
 
+/// Prints a sentence on standard error as a warning; nothing if it is empty.
+void warn(const std::string& sentence);
+
 /// A progress bar on standard error if that is a terminal, nothing otherwise.
 void showProgress(std::size_t done, std::size_t all, const std::string& text);
 

@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import threading
 import unittest
+import warnings
 
 import numpy as np
 
@@ -148,6 +149,31 @@ class Mapping(WithFolder):
         stats = bki.SemanticMapper('semantic_kitti').integrate((0, 0, 0), points, labels)
         self.assertEqual((stats.points, stats.used, stats.not_finite, stats.at_sensor, stats.unknown_label), (10, 6, 2, 1, 1))
         self.assertEqual(bki.SemanticMapper().integrate((0, 0, 0), np.zeros((0, 3)), []).points, 0)
+
+    def test_labels_may_have_instances_and_unknown_ones_are_warned_of_once(self):
+        points, labels = wall()
+        content = []
+        for same in (labels, labels | np.uint32(300 << 16), (labels | np.uint32(0x8001 << 16)).view(np.int32)):
+            mapper = bki.SemanticMapper('semantic_kitti')
+            with warnings.catch_warnings():
+                warnings.simplefilter('error')
+                self.assertEqual(mapper.integrate((0, 0, 0), points, same).used, len(points))
+            content.append(mapper.map.voxels('occupied'))
+        for other in content[1:]:
+            np.testing.assert_array_equal(content[0], other)
+        self.assertEqual(bki.ClassTable('semantic_kitti').label_mask, 0xffff)
+        self.assertEqual(bki.ClassTable('toy').label_mask, 0xffffffff)
+        train_ids = (np.arange(len(points)) % 20).astype(np.uint8)
+        mapper = bki.SemanticMapper('semantic_kitti')
+        with self.assertWarnsRegex(UserWarning, 'does not list, .* all labels seen are ids of the table; set label_values to id'):
+            self.assertLess(mapper.integrate((0, 0, 0), points, train_ids).used, 0.5 * len(points))
+        with warnings.catch_warnings():
+            warnings.simplefilter('error')
+            mapper.integrate((0, 0, 0), points, train_ids)
+        with self.assertWarnsRegex(UserWarning, r'-1 \(\d+ points\)'):
+            none = bki.SemanticMapper('semantic_kitti').integrate((0, 0, 0), points, np.where(points[:, 2] < -0.7, 40, -1).astype(np.int8))
+        self.assertEqual(none.used + none.unknown_label, len(points))
+        self.assertGreater(none.unknown_label, 0)
 
     def test_points_and_labels_are_not_copied(self):
         def memory(key):
@@ -385,7 +411,10 @@ class WrongInput(WithFolder):
                     (TypeError, 'labels must be an array of integers', ((0, 0, 0), points, labels.astype(float))),
                     (TypeError, 'labels must be an array of integers', ((0, 0, 0), points, ['car'] * 5)),
                     (ValueError, r'labels must be an array of integers of shape \(N,\)', ((0, 0, 0), points, labels[:, None])),
-                    (ValueError, 'labels must be from 0 to 4294967295, but -1 is', ((0, 0, 0), points, [0, 1, -1, 3, 4])),
+                    (ValueError, 'labels must be from -2147483648 to 4294967295, but -2147483649 is',
+                     ((0, 0, 0), points, [0, 1, -2**31 - 1, 3, 4])),
+                    (ValueError, 'labels must be from -2147483648 to 4294967295, but 4294967296 is',
+                     ((0, 0, 0), points, [0, 1, 2**32, 3, 4])),
                     (ValueError, 'but 4294967296 is', ((0, 0, 0), points, [0, 1, 2**32, 3, 4])),
                     (ValueError, 'origin has a coordinate that is NaN', ((0, 0, math.nan), points, labels)),
                     (ValueError, 'not finite or too far', ((0, 0, math.inf), points, labels)),

@@ -165,6 +165,66 @@ ClassId idOf(const std::string& name) {
   throw std::invalid_argument(name);
 }
 
+/// The classes of points whose field `label` has these values, -1 without one; and what is not in the table.
+std::pair<std::vector<int>, UnlistedLabels> classesOf(std::uint8_t datatype,
+                                                      const std::vector<double>& values,
+                                                      const ClassTable& table) {
+  CloudMaker maker(std::vector<Eigen::Vector3f>(values.size(), {1, 2, 3}));
+  maker.add("label", datatype, values);
+  const CloudLabels labels = readCloud(maker.message(), InputConfig(), table, LabelValues::kRaw).labels;
+  std::vector<int> found;
+  for (const std::uint32_t label : labels.labels) {
+    const auto id = table.classOfRaw(label);
+    found.push_back(id ? int{*id} : -1);
+  }
+  return {found, labels.unknown};
+}
+
+// SemanticKITTI's own label files as a cloud: an instance in the upper 16 bits.
+TEST(Labels, MayHaveAnInstanceInTheirUpperBits) {
+  const int car = idOf("car"), person = idOf("person");
+  const double kInstance = 65536.0;
+  for (const auto datatype : {PointField::UINT32, PointField::FLOAT64, PointField::INT32}) {
+    const auto [found, unlisted] =
+        classesOf(datatype, {10.0, 10.0 + kInstance, 254.0 + 300.0 * kInstance, 252.0 + 32767.0 * kInstance},
+                  classes());
+    EXPECT_EQ(found, (std::vector<int>{car, car, person, car})) << int{datatype};
+    EXPECT_TRUE(unlisted.empty()) << int{datatype};
+  }
+  // The highest bit makes a signed number negative; in two's complement, the class stays where it was.
+  const auto [found, unlisted] =
+      classesOf(PointField::INT32, {10.0 + 0x8001p0 * kInstance - 0x1p32, -1.0, -2.0}, classes());
+  EXPECT_EQ(found, (std::vector<int>{car, -1, -1}));
+  EXPECT_EQ(unlisted.counts(), (std::map<std::int64_t, std::size_t>{{-2, 1}, {-1, 1}}));
+}
+
+// 65536 * 300 + 11, a bicycle, would be 65536 * 300 + 12 in single precision.
+TEST(Labels, OfSinglePrecisionMayHaveLostTheirClass) {
+  const double kInstance = 65536.0;
+  const auto [found, unlisted] = classesOf(
+      PointField::FLOAT32, {11.0 + 200.0 * kInstance, 11.0 + 300.0 * kInstance, 16777216.0}, classes());
+  EXPECT_EQ(found, (std::vector<int>{static_cast<int>(idOf("bicycle")), -1, idOf("unlabelled")}));
+  EXPECT_EQ(unlisted.counts(), (std::map<std::int64_t, std::size_t>{{12 + 300 * 65536, 1}}));
+  EXPECT_TRUE(unlisted.rounded());
+}
+
+TEST(Labels, MinusOneAndNoNumberAreTwoThings) {
+  for (const auto datatype : {PointField::INT8, PointField::INT16, PointField::INT32, PointField::FLOAT32}) {
+    const auto [found, unlisted] = classesOf(datatype, {40.0, -1.0, -1.0}, classes());
+    EXPECT_EQ(found, (std::vector<int>{idOf("road"), -1, -1})) << int{datatype};
+    EXPECT_EQ(unlisted.counts(), (std::map<std::int64_t, std::size_t>{{-1, 2}})) << int{datatype};
+    EXPECT_EQ(unlisted.missing(), 0u) << int{datatype};
+  }
+  const auto [found, unlisted] = classesOf(PointField::FLOAT32, {NAN, INFINITY, -1.0}, classes());
+  EXPECT_EQ(unlisted.counts(), (std::map<std::int64_t, std::size_t>{{-1, 1}}));
+  EXPECT_EQ(unlisted.missing(), 2u);
+  SemanticClass nothing, any;
+  nothing.name = "nothing";
+  nothing.raw = {kNoLabel};
+  EXPECT_EQ(classesOf(PointField::INT8, {-1.0, 4.0}, ClassTable("t", {nothing}, 0xff)).first,
+            (std::vector<int>{0, -1}));
+}
+
 TEST(Labels, ColoursMeanTheirClasses) {
   InputConfig input;
   input.label_field = "rgb";
@@ -175,7 +235,7 @@ TEST(Labels, ColoursMeanTheirClasses) {
   CloudLabels labels = readCloud(cloud, input, classes(), LabelValues::kRaw).labels;
   EXPECT_TRUE(labels.are_ids);
   EXPECT_EQ(labels.labels, (std::vector<std::uint32_t>{idOf("car"), idOf("road"), kNoLabel}));
-  EXPECT_EQ(labels.unknown, (std::map<std::uint32_t, std::size_t>{{near_car, 1}}));
+  EXPECT_EQ(labels.unknown.counts(), (std::map<std::int64_t, std::size_t>{{near_car, 1}}));
   input.color_match = ColorMatch::kNearest;
   labels = readCloud(cloud, input, classes(), LabelValues::kRaw).labels;
   EXPECT_EQ(labels.labels, (std::vector<std::uint32_t>{idOf("car"), idOf("road"), idOf("car")}));
@@ -212,7 +272,7 @@ TEST(Labels, ScoresBecomeShares) {
   EXPECT_FLOAT_EQ(labels.soft.begin(0)[1].share, 0.25f);
   EXPECT_EQ(labels.soft.end(1) - labels.soft.begin(1), 1);
   EXPECT_EQ(labels.soft.end(2) - labels.soft.begin(2), 0);
-  EXPECT_EQ(labels.unknown.at(kNoLabel), 1u);
+  EXPECT_EQ(labels.unknown.missing(), 1u);
 
   input.score_type = ScoreType::kLogit;
   labels =
@@ -254,7 +314,7 @@ TEST(Labels, TopKNamesTheLikeliest) {
   EXPECT_FLOAT_EQ(labels.soft.begin(0)[1].share, 0.75f);  // ascending by id: car, road
   EXPECT_EQ(labels.soft.end(1) - labels.soft.begin(1), 1);
   EXPECT_FLOAT_EQ(labels.soft.begin(2)->share, 1.0f);
-  EXPECT_EQ(labels.unknown.at(12345), 1u);
+  EXPECT_EQ(labels.unknown.counts().at(12345), 1u);
   input.score_fields = "p1";
   EXPECT_THROW(readCloud(cloud, input, classes(), LabelValues::kRaw), std::invalid_argument);
 }
@@ -309,7 +369,7 @@ TEST(Labels, ANumberThatIsNoColourIsNotWhite) {
   maker.add("label", PointField::FLOAT64, {NAN, -1.0, 1e300});
   const CloudLabels labels = readCloud(maker.message(), input, classes(), LabelValues::kRaw).labels;
   EXPECT_EQ(labels.labels, (std::vector<std::uint32_t>(3, kNoLabel)));
-  EXPECT_EQ(labels.unknown.at(kNoLabel), 3u);
+  EXPECT_EQ(labels.unknown.missing(), 3u);
 }
 
 TEST(NoReturns, InfinityPointsTheWay) {

@@ -13,12 +13,13 @@ import rostest
 from bki_mapping.msg import MappingStatus, OccupancyMap
 from bki_mapping.srv import SaveMap
 from nav_msgs.msg import OccupancyGrid, Path
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import PointCloud2, PointField
 from std_srvs.srv import Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import Listener, Robot, adds_up, make_cloud, wait_until  # noqa: E402
+from harness import Listener, Robot, adds_up, make_cloud, publishers_of, wait_until  # noqa: E402
 
 CAR, ROAD = 10, 40  # raw labels; classes 1 and 9
 HITS = [(4.2, 0.3, 0.4), (4.6, 0.2, 0.1), (0.5, 3.5, -1.5)]  # two in voxel (4, 0, 0), one in (0, 3, -2)
@@ -193,6 +194,30 @@ class MappingTest(unittest.TestCase):
         self.assertEqual(status.labels_not_in_table, before.labels_not_in_table + 1)
         self.assertIn(12345, status.unknown_labels)
         self.assertEqual(self.saved_vertices(), vertices)
+
+    def test_labels_may_have_an_instance_in_their_upper_bits(self):
+        before = self.integrate(HITS, [CAR, CAR, ROAD])
+        vertices = self.saved_vertices()
+        for label_type in (PointField.UINT32, PointField.INT32, PointField.FLOAT64):
+            status = self.integrate(HITS, [CAR | 1 << 16, CAR | 300 << 16, ROAD | 7 << 16], label_type=label_type)
+            self.assertEqual((status.points_unknown_label, status.labels_not_in_table), (before.points_unknown_label, before.labels_not_in_table))
+        self.assertEqual(self.saved_vertices(), vertices)
+
+    def test_unknown_labels_are_warned_of_once_with_the_remedy(self):
+        log = Listener('/rosout', Log)
+        self.addCleanup(log.close)
+        wait_until(lambda: log.subscriber.get_num_connections() >= len(publishers_of('/rosout')), 'all nodes writing to the log')
+        for _ in range(3):
+            status = self.integrate(HITS, [-1, -1, ROAD], label_type=PointField.INT8)
+            self.assertIn(-1, status.unknown_labels)
+        self.integrate(HITS, [float('nan'), float('nan'), ROAD], label_type=PointField.FLOAT32)
+        status = self.integrate(HITS, [float('nan'), float('nan'), ROAD], label_type=PointField.FLOAT32)
+        self.assertGreaterEqual(status.points_without_label, 4)
+        log.wait_for(lambda m: 'none at all (2 points)' in m.msg, 'a warning of points without a label')
+        for words in ('does not list, and are left out of the map: -1 (2 points); list -1 under raw', 'none at all (2 points)'):
+            found = [m.msg for m in log.messages if words in m.msg]
+            self.assertEqual(len(found), 1, found)
+            self.assertIn('67 % of the points of a scan', found[0])
 
     def test_a_late_transform_is_waited_for(self):
         stamp = self.robot.next_stamp()

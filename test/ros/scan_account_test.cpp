@@ -114,16 +114,26 @@ TEST(ScanLedger, CountsEveryKindOfPoint) {
   }
 }
 
+UnlistedLabels unlisted(const std::map<std::int64_t, std::size_t>& counts) {
+  UnlistedLabels labels;
+  for (const auto& [label, points] : counts) labels.add(label, points);
+  return labels;
+}
+
 TEST(ScanLedger, TellsUnknownLabelsApart) {
   ScanLedger ledger;
-  ledger.unknownLabels({{7, 2}, {300, 1}});
-  ledger.unknownLabels({{7, 3}});
+  ledger.unlistedLabels(unlisted({{-1, 4}, {7, 2}, {300, 1}}));
+  ledger.unlistedLabels(unlisted({{7, 3}}));
+  UnlistedLabels none;
+  none.addMissing();
+  ledger.unlistedLabels(none);
   const MappingStatus status = ledger.status(Clock::time_point(), 0);
-  EXPECT_EQ(status.unknown_labels, (std::vector<std::uint32_t>{7, 300}));
-  EXPECT_EQ(status.unknown_label_counts, (std::vector<std::uint64_t>{5, 1}));
-  std::map<std::uint32_t, std::size_t> many;
-  for (std::uint32_t label = 1000; label < 2000; ++label) many[label] = 1;
-  ledger.unknownLabels(many);
+  EXPECT_EQ(status.unknown_labels, (std::vector<std::int64_t>{-1, 7, 300}));
+  EXPECT_EQ(status.unknown_label_counts, (std::vector<std::uint64_t>{4, 5, 1}));
+  EXPECT_EQ(status.points_without_label, 1u);
+  UnlistedLabels many;
+  for (std::int64_t label = 1000; label < 2000; ++label) many.add(label);
+  ledger.unlistedLabels(many);
   EXPECT_EQ(ledger.status(Clock::time_point(), 0).unknown_labels.size(), 64u);
 }
 
@@ -182,7 +192,7 @@ TEST(Diagnostics, JudgeWhatHappened) {
 
 /// The health for 40 clouds of 1000 points: the given numbers are left out by reason, the others are used.
 Health verdict(const std::vector<std::pair<std::size_t PointCounts::*, std::size_t>>& kinds,
-               const std::map<std::uint32_t, std::size_t>& labels = {}, const InputConfig& input = {}) {
+               const UnlistedLabels& labels = {}, const InputConfig& input = {}) {
   PointCounts counts;
   counts.points = counts.used = 1000;
   for (const auto& [kind, count] : kinds) {
@@ -190,6 +200,7 @@ Health verdict(const std::vector<std::pair<std::size_t PointCounts::*, std::size
     counts.used -= count;
   }
   PointAccount account;
+  account.label_remedy = "do this or that";
   for (int i = 0; i < 40; ++i) account.add(counts, labels);
   return judgePoints(account, "/points", input, MapperConfig(), "semantic_kitti");
 }
@@ -203,15 +214,23 @@ TEST(Points, ThatAreOfNoUseAreNamedWithTheRemedy) {
     }
   };
   constexpr auto kWarn = DiagnosticStatus::WARN, kError = DiagnosticStatus::ERROR;
-  expect(verdict({{&C::unknown_label, 1000}}, {{3, 10}, {7777, 990}}), kError,
+  expect(verdict({{&C::unknown_label, 1000}}, unlisted({{3, 10}, {7777, 990}})), kError,
          {"none of the points of the last 40 clouds of /points is used", "100 % have labels",
-          "class table 'semantic_kitti' does not list (7777 most often)", "set classes or label_values"});
-  expect(verdict({{&C::unknown_label, 950}}, {{7777, 950}}), kWarn, {"only 5 %", "95 % have labels"});
-  expect(verdict({{&C::unknown_label, 1000}}, {{kNoLabel, 1000}}), kError, {"have no label", "label_field"});
+          "class table 'semantic_kitti' does not list (7777 most often)", "do this or that"});
+  expect(verdict({{&C::unknown_label, 950}}, unlisted({{7777, 950}})), kWarn,
+         {"only 5 %", "95 % have labels"});
+  UnlistedLabels none;
+  for (int i = 0; i < 1000; ++i) none.addMissing();
+  expect(verdict({{&C::unknown_label, 1000}}, none), kError, {"have no label", "label_field"});
+  // Train ids for raw labels: what is used is wrong, too.
+  expect(verdict({{&C::unknown_label, 730}}, unlisted({{9, 730}})), kWarn,
+         {"only 27 %", "73 % have labels", "(9 most often); do this or that"});
+  expect(verdict({{&C::not_finite, 600}, {&C::unknown_label, 50}}, unlisted({{-1, 50}})), kWarn,
+         {"only 35 %", "5 % have labels", "(-1 most often)"});
   InputConfig colors;
   colors.label_encoding = LabelEncoding::kRgb;
-  expect(verdict({{&C::unknown_label, 1000}}, {{0x0100ff, 1000}}, colors), kError,
-         {"0x0100ff", "color_match"});
+  expect(verdict({{&C::unknown_label, 1000}}, unlisted({{0x0100ff, 1000}}), colors), kError,
+         {"0x0100ff", "do this or that"});
   expect(verdict({{&C::not_finite, 1000}}), kWarn, {"100 % are NaN or infinite", "clear_no_returns"});
   expect(verdict({{&C::at_sensor, 1000}}), kWarn, {"within 1 mm of the sensor"});
   InputConfig ranges;
@@ -228,7 +247,7 @@ TEST(Points, ThatAreOfNoUseAreNamedWithTheRemedy) {
   expect(verdict({{&C::outside_map, 1000}}), kError, {"too far from the map's origin"});
   expect(verdict({{&C::unlabelled, 1000}}), kWarn, {"unlabelled_points"});
   // A fault is reported even if a usual reason has more points.
-  expect(verdict({{&C::not_finite, 600}, {&C::unknown_label, 400}}, {{7777, 400}}), kError,
+  expect(verdict({{&C::not_finite, 600}, {&C::unknown_label, 400}}, unlisted({{7777, 400}})), kError,
          {"40 % have labels"});
 }
 
@@ -247,7 +266,7 @@ TEST(Points, OfHealthySensorsAreNotWarnedOf) {
   expectHealthy(verdict({{&C::at_sensor, 950}}));
   expectHealthy(verdict({{&C::beyond_max, 990}}));  // a short max_range outdoors
   expectHealthy(verdict({{&C::unlabelled, 950}}));  // a user who maps only cars
-  expectHealthy(verdict({{&C::too_near, 500}, {&C::unknown_label, 300}}));
+  expectHealthy(verdict({{&C::too_near, 500}, {&C::unknown_label, 40}}));
   expectHealthy(judgePoints({}, "/points", {}, {}, ""));
 }
 

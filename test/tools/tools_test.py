@@ -75,6 +75,34 @@ class Tools(unittest.TestCase):
         self.assertRegex(fine.stderr, r'scan 000000: the scan would touch about .* blocks .* coarser resolution')
         self.assertIn('4 of 4 scans were refused', fine.stderr)
 
+    def test_labels_that_the_table_lacks_are_warned_of_with_the_remedy(self):
+        table = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'classes', 'semantic_kitti.yaml')
+        with open(table) as file:
+            text = file.read()
+        ids = {int(raw): int(number) for number, raws in re.findall(r'id: (\d+),.*raw: \[([\d, ]+)\]', text) for raw in raws.split(',')}
+        plain = self.path('plain.yaml')
+        with open(plain, 'w') as file:
+            file.write(text.replace('label_mask: 0xFFFF\n', '').replace('name: semantic_kitti\n', 'name: plain\n'))
+        self.labels('train_ids', lambda raw: ids[raw])
+        self.labels('instances', lambda raw: raw | 300 << 16)
+        for labels, classes, remedy in (
+                ('train_ids', 'semantic_kitti', 'all labels seen are ids of the table; set label_values to id'),
+                ('instances', plain, 'the table has the lower 16 bits of all labels seen; set its label_mask to 0xFFFF'),
+                ('labels', 'carla', 'class table semantic_kitti has all labels seen; set classes to it')):
+            for program in ('map_sequence', 'evaluate_map'):
+                result = call(program, '--sequence', self.drive, '--labels', labels, '--classes', classes)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertRegex(result.stderr, r'^warning: \d+ % of the points of a scan have labels that class table')
+                self.assertIn('; ' + remedy + '\n', result.stderr)
+                self.assertLessEqual(result.stderr.count('\n'), 4, result.stderr)
+        good = call('map_sequence', '--sequence', self.drive, '--labels', 'instances', '--output', self.path('instances.ply'))
+        self.assertEqual((good.returncode, good.stderr), (0, ''))
+        self.assertEqual(call('map_sequence', '--sequence', self.drive, '--output', self.path('raw.ply')).returncode, 0)
+        with open(self.path('instances.ply'), 'rb') as instances, open(self.path('raw.ply'), 'rb') as raw:
+            self.assertEqual(instances.read(), raw.read())
+        noisy = self.evaluation(more=['--labels', 'instances'])
+        self.assertEqual(noisy['da'], self.evaluation()['da'], 'instances that move, move')
+
     def test_one_far_point_is_left_out_and_said(self):
         far = self.path('far')
         shutil.copytree(self.drive, far)

@@ -435,6 +435,28 @@ std::vector<CloudKind> labelKinds() {
        "numbers with fractions, and beyond 32 bits",
        {"mapped"},
        labelled(PointField::FLOAT64, {0.5, 1.49, 1.5, -0.4, 1e10, 1e300, 4294967295.4})},
+      {"label/instance",
+       "numbers of classes, with any object in the upper 16 bits",
+       {"mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         replaceField(c, "label", PointField::UINT32, [&] {
+           return static_cast<double>(dice.below(0x10000) << 16 |
+                                      dice.oneOf<std::size_t>({10, 40, 252, 7777}));
+         });
+       }},
+      {"label/instance_float",
+       "the same in single precision, which rounds them",
+       {"mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         replaceField(c, "label", PointField::FLOAT32, [&] {
+           return static_cast<double>(dice.below(0x10000) << 16 |
+                                      dice.oneOf<std::size_t>({10, 11, 252, 259}));
+         });
+       }},
+      {"label/minus_one",
+       "-1 in a byte, as a network writes it for no label",
+       {"mapped"},
+       labelled(PointField::INT8, {-1.0, -1.0, 40.0, -128.0})},
       {"label/missing",
        "no field of labels, colours or scores",
        {"mapped", "bad cloud"},
