@@ -228,7 +228,7 @@ bki_mapping_unit_tests(io class_table display_colors grid_export html_export lab
   LINK bki_mapping_simulation nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
 bki_mapping_unit_tests(io cleaned_points map_export pcd_file LINK pcl_io)
 bki_mapping_unit_tests(io octomap_export LINK ${OCTOMAP_LIBRARIES})
-bki_mapping_unit_tests(simulation city_scene simulation)
+bki_mapping_unit_tests(simulation city_scene simulation without_labels)
 bki_mapping_unit_tests(simulation navigation LINK bki_mapping_query)
 add_executable(plan_path_example examples/plan_path.cpp)
 set_target_properties(plan_path_example PROPERTIES OUTPUT_NAME plan_path)

@@ -55,8 +55,8 @@ void warn(const std::string& sentence) {
   if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) throw py::error_already_set();
 }
 
-void warnOf(const MapperConfig& config) {
-  for (const std::string& warning : settingWarnings(config)) warn(warning);
+void warnOf(const MapperConfig& config, const ClassTable& classes) {
+  for (const std::string& warning : settingWarnings(config, classes)) warn(warning);
 }
 
 SharedClasses classesOf(py::handle classes) {
@@ -75,7 +75,7 @@ std::unique_ptr<Mapper> makeMapper(py::handle classes, py::handle resolution, py
   const std::string id = drive.is_none() ? newId() : py::cast<std::string>(py::str(drive));
   if (id.empty()) throw std::invalid_argument("drive is empty; give an id that no other drive has, or none");
   auto mapper = std::make_unique<Mapper>(settings, classesOf(classes), frame, id);
-  warnOf(settings);
+  warnOf(settings, mapper->mapper.classes());
   return mapper;
 }
 
@@ -238,7 +238,7 @@ void reconfigure(Mapper& self, const py::kwargs& parameters) {
     self.mapper.reconfigure(changed);
     return changed;
   });
-  warnOf(config);
+  warnOf(config, self.mapper.classes());
 }
 
 py::array_t<std::int32_t> clearBox(Mapper& self, py::handle low, py::handle high) {

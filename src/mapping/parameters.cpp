@@ -108,4 +108,17 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
   return warnings;
 }
 
+std::vector<std::string> settingWarnings(const MapperConfig& config, const ClassTable& classes) {
+  std::vector<std::string> warnings = settingWarnings(config);
+  const FreeGainConfig& gain = config.free_gain;
+  const double moving = std::max(gain.dynamic_classes, gain.ofLiving());
+  if (!classes.saysWhatMoves() && moving > gain.static_classes) {
+    warnings.push_back("class table '" + classes.name() +
+                       "' flags no class as dynamic, so free_gain/static " + numberText(gain.static_classes) +
+                       " applies to all, and what has left stays in the map; take the preset occupancy_only, "
+                       "or flag the classes that can move");
+  }
+  return warnings;
+}
+
 }  // namespace bki_mapping

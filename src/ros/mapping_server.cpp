@@ -27,7 +27,12 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   mapper_ = std::make_unique<SemanticMapper>(
       mapper_config, std::make_shared<const ClassTable>(loadClassTable(config_.classes)));
   obstaclesOf(config_.distance_section, mapper_->classes());  // refuses names that the table lacks
-  for (const std::string& warning : settingWarnings(mapper_config)) ROS_WARN("%s", warning.c_str());
+  const ClassTable& table = mapper_->classes();
+  if (!config_.config.empty()) {
+    ROS_INFO("Settings: config %s, for class table '%s'%s", config_.config.c_str(), table.name().c_str(),
+             table.saysWhatMoves() ? "" : ", in which no class can move");
+  }
+  for (const std::string& warning : settingWarnings(mapper_config, table)) ROS_WARN("%s", warning.c_str());
   kept_ = std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace());
 
   poses_ = std::make_unique<PoseSource>(node_);
@@ -91,6 +96,13 @@ void MappingServer::subscribe() {
     ROS_INFO("Mapping %s into frame '%s' with free_space/mode %s, %g m voxels",
              cloud_subscribers_.back().getTopic().c_str(), config_.frame_id.c_str(),
              mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
+    if (input.label_encoding == LabelEncoding::kNumber && input.label_field.empty() &&
+        mapper_->classes().size() > 1) {
+      ROS_WARN(
+          "Clouds of %s are taken without labels (label_field is empty), so all points get label 0 of class "
+          "table '%s'; set classes to occupancy, and take the preset occupancy_only",
+          cloud_subscribers_.back().getTopic().c_str(), mapper_->classes().name().c_str());
+    }
   }
   warned_of_origin_.assign(readers_.size(), false);
   warned_of_far_points_.assign(readers_.size(), false);

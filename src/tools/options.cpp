@@ -160,7 +160,7 @@ MapperConfig mapperConfig(const po::variables_map& given) {
     throw std::invalid_argument("parameter threads is given by --threads and by --set; keep one");
   }
   setParameters(config, values);
-  for (const std::string& warning : settingWarnings(config)) warn(warning);
+  for (const std::string& warning : settingWarnings(config, *classTable(given))) warn(warning);
   return config;
 }
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """mapping.launch as users start it: with every preset, as node and as nodelet, with simulated time that jumps back."""
 import glob
+import math
 import os
 import signal
 import subprocess
@@ -14,10 +15,37 @@ import roslib.packages
 import rospy
 import rostest
 from bki_mapping.msg import OccupancyMap
+from bki_mapping.srv import QueryPoints
+from geometry_msgs.msg import Point
 from rosgraph_msgs.msg import Clock, Log
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from harness import TIMEOUT, Listener, Mapping, wait_until  # noqa: E402
+
+
+def view_of_a_walker(y):
+    """What a lidar 1.7 m above the floor sees of a wall 8 m ahead, and of a person 5 m ahead who is y m to the left: all points,
+    and those of the person above the voxels that may hold the floor as well."""
+    points, person = [], []
+    for row in range(-40, 15):
+        for column in range(-60, 61):
+            elevation, azimuth = math.radians(0.6 * row), math.radians(0.6 * column)
+            x, side, z = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)
+            length = min(8.0 / x, 1.7 / -z if z < 0.0 else math.inf)
+            flat = math.hypot(x, side)  # the person is an upright cylinder
+            along = (5.0 * x + y * side) / flat
+            inside = 0.25 ** 2 - (25.0 + y ** 2 - along ** 2)
+            hit = (along - math.sqrt(inside)) / flat if inside > 0.0 else math.inf
+            of_person = hit < length and hit * z < 0.1
+            length = hit if of_person else length
+            points.append((length * x, length * side, length * z))
+            if of_person and length * z > -1.3:
+                person.append(points[-1])
+    return points, person
+
+
+def query_points(node, points):
+    return rospy.ServiceProxy(node + '/query_points', QueryPoints)([Point(*point) for point in points])
 
 
 class Launch(unittest.TestCase):
@@ -38,6 +66,35 @@ class Launch(unittest.TestCase):
             self.assertGreater(status.blocks, 2, preset)
             self.assertEqual(status.labels_not_in_table, 0, preset)
             self.assertIn('Mapped 1 of 1 clouds; dropped none', mapping.printed(), preset)
+
+    def test_without_labels_a_walker_leaves_nothing(self):
+        """The preset is the one for clouds without labels, and the log says so."""
+        with Mapping('labelled:=false', 'classes:=occupancy') as mapping:
+            self.assertEqual(rospy.get_param('/mapping/config'), 'occupancy_only')
+            walked = []
+            for scan in range(30):
+                points, person = view_of_a_walker(y=0.15 * scan - 2.2)
+                self.assertTrue(mapping.scan(points).integrated_last)
+                if scan < 15:
+                    walked += person
+            self.assertGreater(len(walked), 1000)
+            states = query_points('/mapping', walked).state
+            self.assertEqual(sum(state == 2 for state in states), 0, 'ghosts')
+            wall = [point for point in points if abs(point[0] - 8.0) < 0.01]
+            self.assertGreater(sum(state == 2 for state in query_points('/mapping', wall).state), 0.98 * len(wall))
+        printed = mapping.printed()
+        self.assertIn("Settings: config occupancy_only, for class table 'occupancy', in which no class can move", printed)
+        self.assertNotIn('what has left stays in the map', printed)
+
+    def test_a_preset_that_needs_classes_that_move_is_warned_of(self):
+        with Mapping('labelled:=false', 'classes:=occupancy', 'config:=robot') as mapping:
+            self.assertEqual(rospy.get_param('/mapping/config'), 'robot', 'who names a preset gets it')
+        self.assertIn("class table 'occupancy' flags no class as dynamic, so free_gain/static 0.0005 applies to all, and what has left "
+                      'stays in the map; take the preset occupancy_only', mapping.printed())
+        with Mapping('labelled:=false') as mapping:
+            self.assertEqual(rospy.get_param('/mapping/config'), 'robot')
+        self.assertIn("are taken without labels (label_field is empty), so all points get label 0 of class table 'semantic_kitti'; set "
+                      'classes to occupancy', mapping.printed())
 
     def test_navigation_measures_heights_from_the_ground(self):
         with Mapping('navigation:=true') as mapping:

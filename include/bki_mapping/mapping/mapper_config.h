@@ -53,5 +53,7 @@ void checkChanges(const MapperConfig& before, const MapperConfig& after);
 
 /// One sentence for each setting that is allowed but probably not intended.
 std::vector<std::string> settingWarnings(const MapperConfig& config);
+/// The same, and one for settings that do not suit the class table.
+std::vector<std::string> settingWarnings(const MapperConfig& config, const ClassTable& classes);
 
 }  // namespace bki_mapping
