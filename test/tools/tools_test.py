@@ -528,7 +528,7 @@ class Tools(unittest.TestCase):
             file.write('a: &a {b: *a}\n')
         self.fails('alias', 'map_sequence', '--sequence', self.drive, '--config', cycle)
         self.fails('alias', 'map_sequence', '--sequence', self.drive, '--classes', cycle)
-        self.fails('cannot be read', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
+        self.fails('is neither a file nor one of', 'map_sequence', '--sequence', self.drive, '--config', '/no/file.yaml')
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--output', '/no/such/map.ply')
         self.fails('is not empty', 'simulate_drive', '--output', self.drive)
 
