@@ -3,6 +3,7 @@ include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS
 bki_mapping_room(ros SOURCES
     city_loader.cpp cloud_conversion.cpp
     cloud_frame.cpp
+    clock_offset.cpp
     color_reader.cpp
     distance_section_config.cpp
     input_config.cpp
