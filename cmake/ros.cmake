@@ -43,6 +43,7 @@ bki_mapping_room(ros SOURCES
     sensor_trajectory.cpp
     score_reader.cpp
     server_config.cpp
+    tf_jumps.cpp
   LINK bki_mapping_io bki_mapping_query pcl_common ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
