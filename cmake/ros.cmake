@@ -19,6 +19,7 @@ bki_mapping_room(ros SOURCES
     no_returns.cpp
     point_account.cpp
     point_field.cpp
+    point_times.cpp
     pose_source.cpp
     publishers/cell_markers.cpp
     publishers/distance_section.cpp

@@ -11,6 +11,7 @@
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "core/frame_name.h"
 #include "io/label_watch.h"
 #include "map_bindings.h"
 
@@ -22,8 +23,9 @@ using SharedClasses = std::shared_ptr<const ClassTable>;
 /// A mapper, and which drives are in its map. Its calls release the GIL; those of several threads wait for
 /// each other.
 struct Mapper {
-  Mapper(const MapperConfig& config, SharedClasses classes, std::string map_frame, const std::string& id)
-      : mapper(config, std::move(classes)), frame(std::move(map_frame)) {
+  Mapper(const MapperConfig& config, SharedClasses classes, const std::string& map_frame,
+         const std::string& id)
+      : mapper(config, std::move(classes)), frame(frameName(map_frame)) {
     drive.id = id;
   }
 

@@ -6,6 +6,7 @@
 
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "core/frame_name.h"
 
 namespace bki_mapping {
 
@@ -17,7 +18,7 @@ MapInfo mapInfoOf(const SemanticMapper& mapper, const std::string& frame) {
   MapInfo info;
   info.resolution = mapper.map().geometry().resolution();
   info.prior = mapper.map().prior();
-  info.frame = frame;
+  info.frame = frameName(frame);
   info.classes = mapper.sharedClasses();
   info.parameters = parameterYaml(mapper.config());
   return info;

@@ -8,10 +8,6 @@
 
 namespace bki_mapping::ros_interface {
 
-double pointTime(const FieldReader& time, const std::uint8_t* point) {
-  return time.integer() ? 1e-9 * time(point) : time(point);
-}
-
 CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
                        const ClassTable& classes, LabelValues label_values) {
   checkSizes(cloud);
@@ -40,7 +36,7 @@ CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig&
       }
       content.points.push_back(point);
       labels->append(bytes, content.labels);
-      if (time) content.times.push_back(pointTime(*time, bytes));
+      if (time) content.times.push_back((*time)(bytes));
     }
   }
   if (organised) {

@@ -14,7 +14,7 @@ namespace bki_mapping::ros_interface {
 struct CloudContent {
   std::vector<Eigen::Vector3f> points;  ///< in the cloud's frame [m]; unfiltered
   CloudLabels labels;                   ///< one per point
-  std::vector<double> times;  ///< of each point, relative to the cloud's stamp [s]; empty without time_field
+  std::vector<double> times;            ///< raw, one per point; empty without time_field
   /// Directions of the beams without a return, in the cloud's frame. `points` does not contain them.
   std::vector<Eigen::Vector3f> no_returns;
 };
@@ -24,9 +24,6 @@ struct CloudContent {
 /// data.
 CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
                        const ClassTable& classes, LabelValues label_values);
-
-/// The time of a point relative to the cloud's stamp [s]. @param time reader of time_field.
-double pointTime(const FieldReader& time, const std::uint8_t* point);
 
 /// A cloud with fields x, y, z, intensity (float32) and label (uint32).
 sensor_msgs::PointCloud2 makeCloud(const std::vector<Eigen::Vector3f>& points,

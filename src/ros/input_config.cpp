@@ -1,6 +1,7 @@
 #include "ros/input_config.h"
 
 #include "core/sensor_model_parameters.h"
+#include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {
 
@@ -31,15 +32,25 @@ std::vector<NamedParameter<InputConfig>> inputParameters() {
       choiceParameter("score_type", &C::score_type, {"probability", "logit"}, Changes::kAtStart,
                       "What scores are: probability for numbers in proportion to probabilities, logit for "
                       "their logarithms, as a network has them before its softmax."),
-      textParameter(
+      frameParameter(
           "sensor_frame_id", &C::sensor_frame_id, "a frame of tf, or empty", Changes::kAtStart,
           "Frame at whose origin beams start. Set it for clouds that are in the map frame already, or "
           "merged from several sensors; empty takes the cloud's own frame."),
       textParameter(
           "time_field", &C::time_field, "the name of a field, or empty", Changes::kAtStart,
-          "Field with the time of each point after the cloud's stamp, in s (floating point) or ns "
-          "(integer). Set it to correct for the sensor's motion during a scan; empty takes all points "
-          "at the stamp."),
+          "Field with the time of each point. Set it to correct for the sensor's motion during a scan; "
+          "empty takes all points at the stamp."),
+      choiceParameter(
+          "time_unit", &C::time_unit, {"auto", "s", "ms", "us", "ns"}, Changes::kAtStart,
+          "Unit of time_field. auto takes s for floating-point numbers and ns for integers, unless a "
+          "scan of 0.02 to 1 s proves another one; clouds that leave a doubt are dropped."),
+      choiceParameter(
+          "time_reference", &C::time_reference, {"auto", "scan", "scan_end", "until_stamp", "absolute"},
+          Changes::kAtStart,
+          "What the times of time_field count from: the cloud's stamp (scan; times before it are "
+          "negative), any start of a scan whose last point has the stamp (scan_end), the point itself, "
+          "up to the stamp (until_stamp), or 1970 (absolute). auto takes absolute if the times are near "
+          "the stamp, else scan."),
       truthParameter(
           "clear_no_returns", &C::clear_no_returns, Changes::kAtStart,
           "Clear space up to sensor_model/max_range along beams without a return. These are points "

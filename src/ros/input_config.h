@@ -25,6 +25,18 @@ inline bool hasColors(LabelEncoding encoding) {
 enum class ColorMatch { kExact, kNearest };
 enum class ScoreType { kProbability, kLogit };
 
+/// Unit of the times of points.
+enum class TimeUnit { kAuto, kSeconds, kMilliseconds, kMicroseconds, kNanoseconds };
+
+/// What the times of points count from.
+enum class TimeReference {
+  kAuto,
+  kScan,        ///< the cloud's stamp; negative before it
+  kScanEnd,     ///< any time; the last point has the cloud's stamp
+  kUntilStamp,  ///< the point itself, up to the cloud's stamp
+  kAbsolute,    ///< 1970, as stamps
+};
+
 /// Where clouds come from and what their fields mean.
 struct InputConfig {
   std::string topic = "cloud_in";
@@ -35,6 +47,8 @@ struct InputConfig {
   ScoreType score_type = ScoreType::kProbability;
   std::string sensor_frame_id;  ///< frame at whose origin beams start; "": the cloud's
   std::string time_field;       ///< field with the time of each point; "": all have the cloud's stamp
+  TimeUnit time_unit = TimeUnit::kAuto;
+  TimeReference time_reference = TimeReference::kAuto;
   bool clear_no_returns = false;
   SensorModelConfig sensor_model;
 };

@@ -88,6 +88,7 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("labels not in the class table", now_.labels_not_in_table);
   out.add("last refused change of settings", now_.last_refusal);
   out.add("time jumps", now_.time_jumps);
+  out.add("tf jumps", now_.tf_jumps);
   out.add("blocks", now_.blocks);
   out.add("map [bytes]", now_.map_bytes);
   out.add("map file", now_.map_file_fault);

@@ -104,6 +104,7 @@ void MappingServer::subscribe() {
           cloud_subscribers_.back().getTopic().c_str(), mapper_->classes().name().c_str());
     }
   }
+  said_of_times_.resize(readers_.size());
   warned_of_origin_.assign(readers_.size(), false);
   warned_of_far_points_.assign(readers_.size(), false);
   points_.resize(readers_.size());
@@ -119,6 +120,7 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
   for (const InputConfig& input : inputs) {
     readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
   }
+  said_of_times_.assign(readers_.size(), {});
   wholeMapChanged();
 }
 
@@ -129,6 +131,7 @@ void MappingServer::work() {
     // messages from starving the mapper.
     for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
     checkClock();
+    reportTfJumps();
     processQueue();
     const std::vector<GridIndex> moved = kept_->update(config_, Clock::now());
     if (!moved.empty()) mapChanged(moved);
@@ -162,9 +165,10 @@ void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
 
 void MappingServer::processQueue() {
   const auto now = Clock::now();
-  const auto next = waiting_.takeIf([&](const WaitingCloud& waiting) {
+  const auto next = waiting_.takeIf([&](WaitingCloud& waiting) {
     const std::chrono::duration<double> waited = now - waiting.received;
-    return waited.count() >= config_.tf_timeout || readers_[waiting.input].ready(*waiting.cloud, *poses_);
+    return waited.count() >= config_.tf_timeout ||
+           readers_[waiting.input].ready(*waiting.cloud, *poses_, waiting.times);
   });
   if (!next) return;
   map(*next);
@@ -176,7 +180,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
     return drop(waiting, DropReason::kEmpty, "it has no points; check the sensor");
   }
   try {
-    const auto placed = readers_[waiting.input].read(cloud, *poses_);
+    const auto placed = readers_[waiting.input].read(cloud, *poses_, ros::Time::now());
     if (const auto* missing = std::get_if<MissingPose>(&placed)) {
       return drop(waiting, missing->reason,
                   missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
@@ -219,6 +223,9 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
         cloud_subscribers_[waiting.input].getTopic().c_str(), config_.frame_id.c_str());
   }
   warnOfFarPoints(waiting.input, stats.counts.beyond_max);
+  if (!placed.times.empty()) reportTimes(waiting.input, placed.times);
+  poses_->watchJumps(config_.frame_id, readers_[waiting.input].sensorFrame(*waiting.cloud),
+                     ros::Time().fromNSec(placed.scan.stamp));
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
   warnOfFarPlace();
@@ -262,6 +269,26 @@ void MappingServer::warnOfLabels(std::size_t input, const PlacedScan& placed, co
   points_[input].label_remedy = watch.remedy();
   if (said.empty()) return;
   ROS_WARN("Clouds of %s: %s", cloud_subscribers_[input].getTopic().c_str(), said.c_str());
+}
+
+void MappingServer::reportTimes(std::size_t input, const std::string& reading) {
+  if (!said_of_times_[input].insert(reading).second) return;
+  ROS_INFO("Times of points of %s are read %s; set time_unit and time_reference if they are not",
+           cloud_subscribers_[input].getTopic().c_str(), reading.c_str());
+}
+
+void MappingServer::reportTfJumps() {
+  for (const TfJump& jump : poses_->takeJumps()) {
+    ledger_.tfJumped();
+    const std::string frames =
+        "the transform from '" + shortText(jump.parent) + "' to '" + shortText(jump.child) + "'";
+    if (!throttle_.allow(frames, Clock::now())) continue;
+    ROS_WARN(
+        "tf jumped: %s moved the sensor by %.2f m and turned it by %.1f degrees at once at time %.3f, as "
+        "when a loop closes. The map keeps what was mapped before, so that walls may be doubled; call ~reset, or "
+        "map a recording with the corrected poses",
+        frames.c_str(), jump.distance, jump.angle, jump.stamp.toSec());
+  }
 }
 
 ScanStats MappingServer::addToMap(const Scan& scan) {

@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <memory>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -70,6 +71,10 @@ class MappingServer {
   void integrate(const WaitingCloud& waiting, const PlacedScan& placed);
   void reset();
   void checkClock();
+  /// Counts the jumps of tf, and says how large they are.
+  void reportTfJumps();
+  /// Says once, while the settings stay, how the times of an input's points are read.
+  void reportTimes(std::size_t input, const std::string& reading);
   void onTimeJump(const ros::Time& new_time, const std::string& what);
   /// Warns once per input of points left out because the maximum range of its sensor is unknown.
   void warnOfFarPoints(std::size_t input, std::size_t count);
@@ -116,6 +121,7 @@ class MappingServer {
   SensorTrajectory trajectory_;
   SentenceThrottle throttle_;
   std::vector<LabelWatch> label_watches_;                      ///< of each input
+  std::vector<std::set<std::string>> said_of_times_;           ///< of each input
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
   bool warned_of_far_place_ = false;
 

@@ -34,6 +34,7 @@ class FieldReader {
   bool integer() const;  ///< whether the datatype is an integer
   /// Whether the datatype holds this integer and all that are smaller: FLOAT32 does so up to 2^24.
   bool exact(std::int64_t number) const;
+  bool single() const { return datatype_ == sensor_msgs::PointField::FLOAT32; }
 
  private:
   std::uint8_t datatype_;

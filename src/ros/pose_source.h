@@ -10,9 +10,11 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ros/scan_ledger.h"
 #include "ros/sentence_throttle.h"
+#include "ros/tf_jumps.h"
 
 namespace bki_mapping::ros_interface {
 
@@ -28,8 +30,9 @@ struct MissingPose {
   std::string why;
 };
 
-/// Looks poses up in tf. Unlike tf2_ros::TransformListener, it can restart when time jumps back and keep the
-/// transforms of the new time that arrived before the jump was noticed.
+/// Looks poses up in tf. Frames are asked for by their frameName(); transforms may name them with a slash.
+/// Unlike tf2_ros::TransformListener, it can restart when time jumps back and keep the transforms of the new
+/// time that arrived before the jump was noticed.
 class PoseSource {
  public:
   /// Does not subscribe; transforms come from add().
@@ -37,8 +40,8 @@ class PoseSource {
   /// Subscribes to /tf and /tf_static on the node handle's callback queue.
   explicit PoseSource(ros::NodeHandle node);
 
-  /// Adds a transform. Refuses one that is not finite or whose quaternion is not of norm 1; explain() names
-  /// it.
+  /// Adds a transform. Refuses one between no two frames, that is not finite, or whose quaternion is not of
+  /// norm 1; explain() names it.
   void add(const geometry_msgs::TransformStamped& transform, bool is_static = false);
 
   /// The pose of `source` in `target`, interpolated at `stamp`; the latest one if the stamp is 0.
@@ -47,17 +50,21 @@ class PoseSource {
                                   const ros::Time& stamp) const;
 
   /// Whether find would return a pose.
-  bool canFind(const std::string& target, const std::string& source, const ros::Time& stamp) const {
-    return !source.empty() && buffer_.canTransform(target, source, stamp);
-  }
+  bool canFind(const std::string& target, const std::string& source, const ros::Time& stamp) const;
 
   /// The latest time at which `a` and `b` both have a pose in `target`; 0 if both poses are static.
   /// @return nullopt if one of them has no pose.
   std::optional<ros::Time> latestCommon(const std::string& target, const std::string& a,
                                         const std::string& b) const;
 
-  /// Explains why find() returns nullopt.
-  MissingPose explain(const std::string& target, const std::string& source, const ros::Time& stamp) const;
+  /// Explains why find() returns nullopt. @param now the time on this computer; 0: not known.
+  MissingPose explain(const std::string& target, const std::string& source, const ros::Time& stamp,
+                      const ros::Time& now = {}) const;
+
+  /// Watches the transforms between the frames for jumps. @param stamp at which find() has found the pose.
+  void watchJumps(const std::string& target, const std::string& source, const ros::Time& stamp);
+  /// The jumps since the last call.
+  std::vector<TfJump> takeJumps() { return jumps_.take(); }
 
   /// Forgets the transforms of the old time after a jump back. Keeps static ones and, from the most recently
   /// received one backwards, those up to the first whose stamp is more than TimeWatch::kOutOfOrder ahead of
@@ -81,10 +88,13 @@ class PoseSource {
   std::deque<Refused>::const_iterator findRefused(const std::string& child) const;
   /// A refused transform between the frames, for lack of which find() fails; nullptr if there is none.
   const Refused* refusedBetween(const std::string& target, const std::string& source) const;
+  /// The frame and those above it, up to the root of tf's tree.
+  std::vector<std::string> lineage(const std::string& frame) const;
 
   tf2_ros::Buffer buffer_;
   std::deque<geometry_msgs::TransformStamped> latest_;  ///< of /tf, in order of reception
   std::deque<Refused> refused_;  ///< the last one per child frame, until a newer one is valid
+  TfJumpWatch jumps_;
   SentenceThrottle throttle_;
   ros::Subscriber subscriber_, static_subscriber_;
 };

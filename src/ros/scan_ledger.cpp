@@ -1,5 +1,6 @@
 #include "ros/scan_ledger.h"
 
+#include "core/frame_name.h"
 #include "ros/point_account.h"
 
 namespace bki_mapping::ros_interface {
@@ -32,6 +33,7 @@ void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& sta
                             Clock::time_point now) {
   ++status_.integrated;
   status_.header = header;
+  status_.header.frame_id = frameName(header.frame_id);
   status_.integrated_last = true;
   status_.last_drop.clear();
   status_.last_drop_reason.clear();
@@ -50,6 +52,7 @@ void ScanLedger::dropped(const std_msgs::Header& header, DropReason reason, cons
   const DropKind& kind = dropKinds()[static_cast<std::size_t>(reason)];
   ++(status_.*kind.count);
   status_.header = header;
+  status_.header.frame_id = frameName(header.frame_id);
   status_.integrated_last = false;
   status_.last_drop = why;
   status_.last_drop_reason = kind.name;

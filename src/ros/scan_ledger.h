@@ -52,6 +52,7 @@ class ScanLedger {
   /// Adds counts of labels that are not in the class table.
   void unlistedLabels(const UnlistedLabels& labels) { unknown_ += labels; }
   void timeJumped() { ++status_.time_jumps; }
+  void tfJumped() { ++status_.tf_jumps; }
 
   std::uint64_t droppedClouds() const;
   const RollingStatistics& integration() const { return integration_; }  ///< [ms]

@@ -8,6 +8,8 @@
 #include <deque>
 #include <optional>
 
+#include "ros/point_times.h"
+
 namespace bki_mapping::ros_interface {
 
 /// Which cloud a full queue drops.
@@ -15,8 +17,9 @@ enum class QueuePolicy { kDropOldest, kDropNewest };
 
 struct WaitingCloud {
   sensor_msgs::PointCloud2ConstPtr cloud;
-  std::size_t input = 0;                           ///< index of the server's input that received it
-  std::chrono::steady_clock::time_point received;  ///< time of reception
+  std::size_t input = 0;                                ///< index of the server's input that received it
+  std::chrono::steady_clock::time_point received = {};  ///< time of reception
+  std::optional<TimeValues> times = {};                 ///< what ScanReader::ready has read of the cloud
 };
 
 /// A bounded queue. Clouds leave it in order of reception; one that is not ready does not block later ones.

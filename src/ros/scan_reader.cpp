@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "ros/cloud_conversion.h"
@@ -12,8 +13,10 @@ namespace {
 /// All points of a time slice are transformed by the pose at its middle [s]. In 1 ms a car at 100 km/h moves
 /// 3 cm.
 constexpr double kTimeSlice = 1e-3;
-/// Maximum time between a point and the stamp of its cloud [s]; a field with larger values is not a time.
-constexpr double kLongestScan = 10.0;
+
+std::int64_t sliceOf(double after_stamp) {
+  return static_cast<std::int64_t>(std::floor(after_stamp / kTimeSlice));
+}
 
 ros::Time later(const ros::Time& stamp, double seconds) {
   const double time = stamp.toSec() + seconds;
@@ -25,23 +28,31 @@ void moveToScan(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& ori
   point = (T_map_cloud * point.cast<double>() - origin).cast<float>();
 }
 
-/// Transforms each point by the pose at its time. @return the missing pose, if there is one.
-std::optional<MissingPose> undistort(const CloudContent& content, const ros::Time& stamp,
-                                     const std::string& map_frame, const std::string& frame,
-                                     const PoseSource& poses, Scan& scan) {
+/// The time at which the pose of a slice is looked up: its middle.
+ros::Time timeOfSlice(const ros::Time& stamp, std::int64_t slice) {
+  return later(stamp, (static_cast<double>(slice) + 0.5) * kTimeSlice);
+}
+
+/// Transforms each point by the pose at its time. A point whose time is not finite becomes NaN, so that it is
+/// counted among those. @return the missing pose, if there is one.
+std::optional<MissingPose> undistort(const CloudContent& content, const TimeReading& reading,
+                                     const ros::Time& stamp, const std::string& map_frame,
+                                     const std::string& frame, const PoseSource& poses, const ros::Time& now,
+                                     Scan& scan) {
   std::map<std::int64_t, Eigen::Isometry3d> pose_of_slice;
   scan.points = content.points;
   for (std::size_t i = 0; i < content.times.size(); ++i) {
-    if (!(std::abs(content.times[i]) <= kLongestScan)) {
-      throw std::invalid_argument("a point's time is " + numberText(content.times[i]) +
-                                  " s from the stamp of its cloud; check time_field");
+    const bool needs_time = needsTime(scan.points[i]);
+    if (needs_time && !std::isfinite(content.times[i])) {
+      scan.points[i].setConstant(std::numeric_limits<float>::quiet_NaN());
+      continue;
     }
-    const auto slice = static_cast<std::int64_t>(std::floor(content.times[i] / kTimeSlice));
+    const std::int64_t slice = needs_time ? sliceOf(reading.afterStamp(content.times[i], stamp)) : 0;
     auto pose = pose_of_slice.find(slice);
     if (pose == pose_of_slice.end()) {
-      const ros::Time time = later(stamp, (static_cast<double>(slice) + 0.5) * kTimeSlice);
+      const ros::Time time = needs_time ? timeOfSlice(stamp, slice) : stamp;
       const auto found = poses.find(map_frame, frame, time);
-      if (!found) return poses.explain(map_frame, frame, time);
+      if (!found) return poses.explain(map_frame, frame, time, now);
       pose = pose_of_slice.emplace(slice, found->T_target_source).first;
     }
     moveToScan(pose->second, scan.origin, scan.points[i]);
@@ -49,53 +60,84 @@ std::optional<MissingPose> undistort(const CloudContent& content, const ros::Tim
   return std::nullopt;
 }
 
+/// @throws std::invalid_argument if hardly any return is as near as a sensor can see.
+void checkMetres(const Scan& scan, const SensorModelConfig& sensor) {
+  constexpr float kAtSensor = 1e-3f;
+  constexpr double kHardlyAny = 0.01;
+  const double farthest = std::max(SensorModelConfig::kFarthest, sensor.max_range);
+  std::vector<float> ranges;
+  for (const Eigen::Vector3f& point : scan.points) {
+    const float range = point.norm();
+    if (std::isfinite(range) && range > kAtSensor) ranges.push_back(range);
+  }
+  const auto near = std::count_if(ranges.begin(), ranges.end(),
+                                  [&](float range) { return static_cast<double>(range) <= farthest; });
+  if (ranges.empty() || static_cast<double>(near) >= kHardlyAny * static_cast<double>(ranges.size())) return;
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  throw std::invalid_argument("its points are " + numberText(std::round(static_cast<double>(*middle))) +
+                              " m from the sensor (median), and hardly one is nearer than " +
+                              numberText(farthest) +
+                              " m; publish clouds in metres, not millimetres, correct tf, or set "
+                              "sensor_model/max_range to what the sensor sees");
+}
+
 }  // namespace
 
-bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses) const {
-  const std_msgs::Header& header = cloud.header;
-  const auto known = [&](const std::string& frame, const ros::Time& stamp) {
-    return poses.canFind(map_frame_, frame, stamp);
-  };
+bool ScanReader::ready(const sensor_msgs::PointCloud2& cloud, const PoseSource& poses,
+                       std::optional<TimeValues>& times) const {
+  const std::string frame = frameName(cloud.header.frame_id);
   const auto stamp = timeOf(cloud, poses);
-  if (!stamp || !known(header.frame_id, *stamp) || !known(sensorFrame(cloud), *stamp)) return false;
+  if (!stamp || !poses.canFind(map_frame_, frame, *stamp) ||
+      !poses.canFind(map_frame_, sensorFrame(cloud), *stamp)) {
+    return false;
+  }
   if (input_.time_field.empty() || cloud.width == 0 || cloud.height == 0) return true;
   try {
-    checkSizes(cloud);
-    const FieldReader time(cloud, input_.time_field);
-    const std::uint8_t* last = cloud.data.data() + std::size_t{cloud.height - 1} * cloud.row_step +
-                               std::size_t{cloud.width - 1} * cloud.point_step;
-    const double end = pointTime(time, last) + kTimeSlice;
-    return !(end > 0.0 && end < kLongestScan) || known(header.frame_id, later(*stamp, end));
+    if (!times) times = timeValues(cloud, input_.time_field);
+    if (!times->any) return true;
+    const TimeReading reading = readingOf(*times, input_, *stamp);
+    const auto known = [&](double raw) {
+      const std::int64_t slice = sliceOf(reading.afterStamp(raw, *stamp));
+      return poses.canFind(map_frame_, frame, timeOfSlice(*stamp, slice));
+    };
+    return known(times->low) && known(times->high);
   } catch (const std::invalid_argument&) {
     return true;  // read() throws the same with the message
   }
 }
 
 std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointCloud2& cloud,
-                                                       const PoseSource& poses) const {
-  const std_msgs::Header& header = cloud.header;
-  const std::string sensor_frame = sensorFrame(cloud);
-  const ros::Time stamp = timeOf(cloud, poses).value_or(header.stamp);
+                                                       const PoseSource& poses, const ros::Time& now) const {
+  const std::string cloud_frame = frameName(cloud.header.frame_id), sensor_frame = sensorFrame(cloud);
+  const ros::Time stamp = timeOf(cloud, poses).value_or(cloud.header.stamp);
   const auto sensor = poses.find(map_frame_, sensor_frame, stamp);
-  if (!sensor) return poses.explain(map_frame_, sensor_frame, stamp);
-  const auto frame = poses.find(map_frame_, header.frame_id, stamp);
-  if (!frame) return poses.explain(map_frame_, header.frame_id, stamp);
+  if (!sensor) return poses.explain(map_frame_, sensor_frame, stamp, now);
+  const auto frame = poses.find(map_frame_, cloud_frame, stamp);
+  if (!frame) return poses.explain(map_frame_, cloud_frame, stamp, now);
 
   CloudContent content = readCloud(cloud, input_, classes_, label_values_);
   PlacedScan placed;
   Scan& scan = placed.scan;
-  if (sensor_frame == header.frame_id && content.times.empty()) {
+  if (sensor_frame == cloud_frame && content.times.empty()) {
     scan = scanFromSensorFrame(sensor->T_target_source, content.points, {}, 0);
   } else {
     scan.origin = sensor->T_target_source.translation();
     if (content.times.empty()) {
       scan.points = content.points;
       for (Eigen::Vector3f& point : scan.points) moveToScan(frame->T_target_source, scan.origin, point);
-    } else if (const auto missing =
-                   undistort(content, sensor->stamp, map_frame_, header.frame_id, poses, scan)) {
-      return *missing;
+    } else {
+      const TimeValues times = timeValues(cloud, input_.time_field);
+      const TimeReading reading = readingOf(times, input_, sensor->stamp);
+      const auto missing =
+          undistort(content, reading, sensor->stamp, map_frame_, cloud_frame, poses, now, scan);
+      if (missing) return *missing;
+      const bool automatic =
+          input_.time_unit == TimeUnit::kAuto || input_.time_reference == TimeReference::kAuto;
+      if (automatic && times.any) placed.times = reading.text();
     }
   }
+  checkMetres(scan, input_.sensor_model);
   const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
   for (const Eigen::Vector3f& direction : content.no_returns) scan.no_returns.push_back(rotation * direction);
   scan.stamp = sensor->stamp.toNSec();  // of the cloud; of the latest pose if the cloud has none

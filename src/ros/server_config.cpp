@@ -7,6 +7,7 @@
 
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -78,8 +79,8 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
   const NumberRange height = NumberRange::any().slider(-1e6, 1e6);
   const NumberRange length = NumberRange::atLeast(0.0).slider(0.0, 1e4);
   std::vector<NamedParameter<C>> parameters = {
-      textParameter("frame_id", &C::frame_id, "a frame of tf", Changes::kAtStart,
-                    "Name of the map frame. Set it to a frame that does not move with the robot."),
+      frameParameter("frame_id", &C::frame_id, "a frame of tf", Changes::kAtStart,
+                     "Name of the map frame. Set it to a frame that does not move with the robot."),
       textParameter("classes", &C::classes, "a name of config/classes, or a YAML file", Changes::kAtStart,
                     "Class table: the names, colours and flags of the labels. Set it to the table of the "
                     "network that labels the points."),
@@ -223,6 +224,9 @@ void setParameters(const std::map<std::string, std::string>& values, ServerConfi
   }
   Both both = {server, mapper};
   setNamedParameters(parameters, both, values);
+  if (both.server.frame_id.empty()) {
+    throw std::invalid_argument("parameter frame_id must name the map frame");
+  }
   if (both.server.occupancy_min_z > both.server.occupancy_max_z) {
     throw std::invalid_argument("parameter occupancy_min_z must not be above occupancy_max_z");
   }

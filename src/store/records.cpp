@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/frame_name.h"
 #include "store/schema.h"
 
 namespace bki_mapping {
@@ -163,6 +164,7 @@ std::uint32_t readMapRow(Database& database, std::int64_t version, MapInfo& info
   visitMap(row, version, info, table);
   const std::uint32_t checksum = row.finish();
   if (select.step()) throw damaged(database.name(), "the table 'map' has two rows");
+  info.frame = frameName(info.frame);
   return checksum;
 }
 

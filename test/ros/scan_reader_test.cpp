@@ -1,4 +1,5 @@
 // Scans from clouds and tf: origin of the beams, times of points, labels in every encoding.
+#include <console_bridge/console.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -252,10 +253,202 @@ TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
   maker.add("t", PointField::FLOAT64, {0.0, 0.5, 1.5});
   EXPECT_EQ(reason(maker.message()), DropReason::kTransformLate);
   CloudMaker nonsense = cloud(points);
-  nonsense.add("t", PointField::FLOAT64, {0.0, 0.5, NAN});
-  EXPECT_THROW(read(nonsense.message()), std::invalid_argument);
+  nonsense.add("t", PointField::FLOAT64, {0.0, 0.1, NAN});
+  EXPECT_TRUE(ready(nonsense.message()));
+  const Scan partly = placed(nonsense.message()).scan;
+  EXPECT_NEAR(partly.points[1].x(), 20.5, 0.011);
+  EXPECT_FALSE(partly.points[2].allFinite()) << "counted as such a point";
   input_.time_field = "no such field";
   EXPECT_THROW(read(maker.message()), std::invalid_argument);
+}
+
+TEST_F(Reader, APointHasThePoseOfItsTimeWhateverThisCountsFrom) {
+  // The sensor moves forwards at 10 m/s. A wall at x = 20 is seen for 0.1 s.
+  const double stamp = 1.7e9;
+  for (double t = -1.0; t < 1.05; t += 0.1) pose("sensor", stamp + t, {10.0 * t, 0, 0});
+  constexpr std::size_t kPoints = 500;
+  const auto wall = [&](double first) {  // the time of the first point after the stamp [s]
+    std::vector<Eigen::Vector3f> points;
+    for (std::size_t n = 0; n < kPoints; ++n) {
+      points.emplace_back(static_cast<float>(20.0 - 10.0 * (first + 0.1 * static_cast<double>(n) / kPoints)),
+                          1.0f, 0.0f);
+    }
+    return points;
+  };
+  struct Case {
+    double first;  ///< true time of the first point after the stamp [s]
+    std::uint8_t datatype;
+    double zero, scale;  ///< raw = zero + scale * (seconds after the stamp)
+    TimeReference reference;
+  };
+  constexpr auto kAuto = TimeReference::kAuto;
+  for (const Case& c : std::vector<Case>{{0.0, PointField::FLOAT64, stamp, 1.0, kAuto},
+                                         {-0.1, PointField::FLOAT64, stamp, 1.0, kAuto},
+                                         {-0.05, PointField::FLOAT64, 1e9 * stamp, 1e9, kAuto},
+                                         {-0.1, PointField::FLOAT32, 0.0, 1.0, kAuto},
+                                         {0.0, PointField::UINT32, 0.0, 1e6, kAuto},
+                                         {-0.1, PointField::INT32, 0.0, 1e9, kAuto},
+                                         {-0.1, PointField::FLOAT32, 0.0, -1.0, TimeReference::kUntilStamp},
+                                         {-0.1, PointField::UINT32, 3e9, 1e6, TimeReference::kScanEnd}}) {
+    std::vector<double> times;
+    for (std::size_t n = 0; n < kPoints; ++n) {
+      times.push_back(c.zero + c.scale * (c.first + 0.1 * static_cast<double>(n) / kPoints));
+    }
+    CloudMaker maker = cloud(wall(c.first));
+    maker.add("t", c.datatype, times);
+    maker.stamp = stamp;
+    input_.time_field = "t";
+    input_.time_reference = c.reference;
+    EXPECT_TRUE(ready(maker.message()));
+    const PlacedScan scan = placed(maker.message());
+    for (const auto& point : scan.scan.points)
+      ASSERT_NEAR(point.x(), 20.0, 0.011) << c.first << ", " << c.scale;
+    EXPECT_NE(scan.times, "");
+  }
+}
+
+TEST_F(Reader, ACloudIsReadyWhenItsLastPoseIsThere) {
+  for (const bool first_is_last : {false, true}) {
+    poses_.restart(ros::Time(0.1));
+    CloudMaker maker = cloud({{20, 0, 0}, {20, 1, 0}, {20, 2, 0}, {0, 0, 0}});
+    maker.add("t", PointField::FLOAT64,
+              first_is_last ? std::vector<double>{0.1, 0.05, -0.1, 9.0}
+                            : std::vector<double>{-0.1, 0.05, 0.1, 9.0});
+    input_.time_field = "t";
+    for (const auto& [time, there] :
+         std::vector<std::pair<double, bool>>{{99.95, false}, {100.05, false}, {100.2, true}}) {
+      pose("sensor", time, {0, 0, 0});
+      EXPECT_FALSE(ready(maker.message())) << "the first points are older";
+      EXPECT_FALSE(there && std::holds_alternative<PlacedScan>(read(maker.message())));
+    }
+    poses_.restart(ros::Time(0.1));
+    pose("sensor", 99.8, {0, 0, 0});
+    for (const auto& [time, there] :
+         std::vector<std::pair<double, bool>>{{99.95, false}, {100.05, false}, {100.2, true}}) {
+      pose("sensor", time, {0, 0, 0});
+      EXPECT_EQ(ready(maker.message()), there) << time;
+      EXPECT_EQ(std::holds_alternative<PlacedScan>(read(maker.message())), there) << time;
+    }
+  }
+}
+
+/// Counts the lines that tf2 prints by itself.
+class Tf2Lines : public console_bridge::OutputHandler {
+ public:
+  Tf2Lines() { console_bridge::useOutputHandler(this); }
+  ~Tf2Lines() override { console_bridge::restorePreviousOutputHandler(); }
+  void log(const std::string&, console_bridge::LogLevel, const char*, int) override { ++count; }
+  int count = 0;
+};
+
+TEST_F(Reader, FramesMayBeginWithOneSlash) {
+  Tf2Lines lines;
+  pose("/base", 99.0, {1, 0, 0}, 0.0, "/map");
+  pose("base", 101.0, {3, 0, 0}, 0.0, "map");
+  poses_.add(transform("/base", "sensor", 0.0, 10.0, 1.0), true);
+  for (const char* frame : {"sensor", "/sensor"}) {
+    for (const char* sensor : {"", "base", "/base"}) {
+      for (const char* map : {"map", "/map"}) {
+        CloudMaker maker = cloud({{1, 0, 0}});
+        maker.frame = frame;
+        input_.sensor_frame_id = sensor;
+        const ScanReader reader(input_, map, *classes(), LabelValues::kRaw);
+        EXPECT_TRUE(reader.ready(maker.message(), poses_)) << frame << sensor << map;
+        const auto scan = std::get<PlacedScan>(reader.read(maker.message(), poses_)).scan;
+        EXPECT_NEAR(scan.origin.x(), *sensor ? 2.0 : 12.0, 1e-9);
+        EXPECT_NEAR(scan.origin.x() + static_cast<double>(scan.points[0].x()), 13.0, 1e-5);
+      }
+    }
+  }
+  CloudMaker maker = cloud({{1, 0, 0}});
+  maker.frame = "/map";
+  EXPECT_TRUE(
+      ScanReader(InputConfig(), "map", *classes(), LabelValues::kRaw).originDoubtful(maker.message()));
+  EXPECT_EQ(lines.count, 0);
+}
+
+TEST_F(Reader, OneBadFrameMakesTf2PrintNothing) {
+  Tf2Lines lines;
+  pose("sensor", 100.0, {0, 0, 0});
+  for (const char* frame : {"", "/", "//sensor", "/nowhere", "nowhere"}) {
+    CloudMaker maker = cloud({{1, 0, 0}});
+    maker.frame = frame;
+    for (int n = 0; n < 98; ++n) EXPECT_FALSE(ready(maker.message()));
+    const auto missing = std::get<MissingPose>(read(maker.message()));
+    EXPECT_EQ(missing.reason, DropReason::kUnknownFrame) << missing.why;
+    EXPECT_GT(missing.why.size(), 20u);
+  }
+  for (const auto& [parent, child] : std::vector<std::pair<std::string, std::string>>{
+           {"map", "map"}, {"/map", "map"}, {"", "a"}, {"map", ""}, {"/", "b"}}) {
+    for (int n = 0; n < 10; ++n) poses_.add(transform(parent, child, 100.0 + n, 0.0, 1.0));
+  }
+  EXPECT_EQ(lines.count, 0);
+}
+
+TEST_F(Reader, AWrongClockIsNamed) {
+  const double now = 1.7e9;
+  for (double t = -5.0; t < 0.05; t += 0.1) pose("sensor", now + t, {0, 0, 0});
+  const auto why = [&](double stamp, double computer) {
+    CloudMaker maker = cloud({{1, 0, 0}});
+    maker.stamp = stamp;
+    const ScanReader reader(input_, "map", *classes(), LabelValues::kRaw);
+    return std::get<MissingPose>(reader.read(maker.message(), poses_, ros::Time(computer))).why;
+  };
+  const auto expect = [](const std::string& text, const std::vector<std::string>& words) {
+    for (const auto& word : words) EXPECT_NE(text.find(word), std::string::npos) << word << ": " << text;
+  };
+  expect(why(now + 0.5, now), {"500 ms older than the cloud", "raise tf_timeout"});
+  expect(why(now + 37.2, now), {"37.2 s ahead of the latest", "'sensor' to 'map'", "TAI"});
+  EXPECT_EQ(why(now + 37.2, now).find("tf_timeout"), std::string::npos);
+  expect(why(now - 37.0, now), {"37 s behind", "TAI"});
+  expect(why(300.0, now), {"53.9 years behind", "since the sensor's start"});
+  expect(why(now + 60.0, now + 60.1), {"older than the cloud", "has stopped"});
+  expect(why(now - 7.0, now), {"do not reach back", "7 s newer"});
+}
+
+TEST_F(Reader, JumpsOnTheWayToTheMapAreNoticed) {
+  poses_.add(transform("base", "sensor", 0.0, 1.0, 1.0), true);
+  const auto drive = [&](double from, double correction) {
+    for (int n = 0; n < 10; ++n) {
+      const double t = from + 0.1 * n;
+      pose("odom", t, {correction, 0, 0});
+      pose("base", t, {10.0 * t, 0, 0}, 0.0, "odom");
+      pose("wheel", t, {0, 0, 0}, n % 2 == 0 ? 0.0 : 3.0, "base");
+    }
+  };
+  drive(100.0, 0.0);  // before the first scan
+  poses_.watchJumps("map", "sensor", ros::Time(100.5));
+  drive(101.0, 3.0);
+  const auto jumps = poses_.takeJumps();
+  ASSERT_EQ(jumps.size(), 1u);
+  EXPECT_EQ(jumps[0].parent, "map");
+  EXPECT_EQ(jumps[0].child, "odom");
+  EXPECT_NEAR(jumps[0].distance, 3.0, 1e-6);
+  drive(102.0, 3.0);
+  poses_.restart(ros::Time(20.0));
+  drive(20.0, -7.0);
+  poses_.watchJumps("map", "sensor", ros::Time(20.5));
+  drive(21.0, -7.0);
+  EXPECT_TRUE(poses_.takeJumps().empty());
+}
+
+TEST_F(Reader, ACloudInMillimetresIsRefused) {
+  pose("sensor", 100.0, {5000, 0, 0});
+  EXPECT_NO_THROW(read(cloud({{5, 0, 0}, {0, 50, 0}, {1, 2, 3}}).message()));
+  const auto millimetres = cloud({{5000, 0, 0}, {0, 50000, 0}, {1000, 2000, 3000}, {0, 0, 0}}).message();
+  try {
+    read(millimetres);
+    ADD_FAILURE() << "read";
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_NE(std::string(fault.what()).find("5000 m from the sensor (median)"), std::string::npos)
+        << fault.what();
+  }
+  input_.sensor_model.max_range = 100000.0;
+  EXPECT_NO_THROW(read(millimetres)) << "an airborne sensor";
+  input_.sensor_model.max_range = 60.0;
+  EXPECT_THROW(read(millimetres), std::invalid_argument) << "each beam would clear 60 m";
+  EXPECT_NO_THROW(read(cloud({{0, 0, 0}, {NAN, NAN, NAN}}).message())) << "a sensor that sees nothing";
+  EXPECT_NO_THROW(read(cloud({{500, 0, 0}, {600, 0, 0}, {10, 0, 0}}).message()));
 }
 
 TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {

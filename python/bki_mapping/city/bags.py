@@ -12,6 +12,11 @@ from bki_mapping.city.description import Bag, CityError
 NUMBERS = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}  # of sensor_msgs/PointField
 
 
+def _frame_name(text):
+    """The name of a frame without one leading slash, as tf2 requires it."""
+    return text[1:] if text.startswith('/') else text
+
+
 def extract(bag: Bag, folder):
     """Writes the sequence into a folder. Clouds without a transform at their time are left out. Returns the number of clouds
     written and of those left out. Raises CityError about the bag, ImportError without ROS."""
@@ -36,7 +41,8 @@ def extract(bag: Bag, folder):
                     (frames.set_transform_static if topic == '/tf_static' else frames.set_transform)(each, 'bag')
             for _, cloud, _ in opened.read_messages([bag.cloud_topic]):
                 try:
-                    found = frames.lookup_transform_core(bag.frame, cloud.header.frame_id, cloud.header.stamp).transform
+                    found = frames.lookup_transform_core(_frame_name(bag.frame), _frame_name(cloud.header.frame_id),
+                                                         cloud.header.stamp).transform
                 except tf2_ros.TransformException as error:
                     missing, reason = missing + 1, reason or ' '.join(str(error).split())
                     continue

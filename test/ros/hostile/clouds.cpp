@@ -323,15 +323,23 @@ std::vector<CloudKind> valueKinds() {
        scattered({1e-45, -1e-45, 1e-38, -1e-38, 1e-40})},
       {"value/huge",
        "coordinates of 1e15 to 3e38 m",
-       {"mapped"},
+       {"mapped", "bad cloud"},
        scattered({1e15, -1e15, 1e19, -1e20, 1e38, -1e38, 3.4e38})},
       {"value/far",
        "a few points at 1e6 to 1e9 m",
-       {"mapped"},
+       {"mapped", "bad cloud"},
        [](PointCloud2& c, Dice& dice) {
          for (int i = 0; i < 3; ++i) {
            const std::size_t p = dice.below(std::max<std::size_t>(pointsOf(c), 1));
            put(c, dice.oneOf(kCoordinates), p, 0, dice.oneOf<double>({1e6, -1e6, 1e7, -1e7, 1e8, 1e9}));
+         }
+       }},
+      {"value/millimetres",
+       "a cloud in millimetres",
+       {"bad cloud", "mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         for (const std::string& axis : kCoordinates) {
+           setAll(c, axis, 1, [&] { return dice.between(-15000.0, 15000.0); });
          }
        }},
       {"value/at_sensor",
@@ -516,7 +524,7 @@ std::vector<CloudKind> timeKinds() {
   return {
       {"time/odd",
        "times of points that are NaN, infinite or years",
-       {"mapped", "bad cloud"},
+       {"mapped", "bad cloud", "transform late", "too old"},
        [](PointCloud2& c, Dice& dice) { setAll(c, "seconds", 1, [&] { return dice.oneOf(kOddTimes); }); }},
       {"time/odd_last",
        "such a time, of the last point only",
@@ -526,9 +534,44 @@ std::vector<CloudKind> timeKinds() {
        }},
       {"time/long",
        "times up to 10 s before and after the cloud's",
-       {"mapped", "transform late", "too old"},
+       {"mapped", "bad cloud", "transform late", "too old"},
        [](PointCloud2& c, Dice& dice) {
          setAll(c, "seconds", 1, [&] { return dice.between(-10.0, 10.0); });
+       }},
+      {"time/absolute",
+       "times since 1970, in s, ms, us or ns",
+       {"mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         const double unit = dice.oneOf<double>({1.0, 1e3, 1e6, 1e9});
+         setAll(c, "seconds", 1, [&] { return unit * (c.header.stamp.toSec() + dice.between(0.0, 0.1)); });
+       }},
+      {"time/absolute_single",
+       "such times in single precision, and of another clock",
+       {"mapped", "bad cloud"},
+       [](PointCloud2& c, Dice& dice) {
+         const bool single = dice.oneIn(2);
+         const double start = single ? 1.7e9 : c.header.stamp.toSec() + 37.0;
+         replaceField(c, "seconds", single ? PointField::FLOAT32 : PointField::FLOAT64,
+                      [&] { return start + dice.between(0.0, 0.1); });
+       }},
+      {"time/microseconds",
+       "times in us as whole numbers",
+       {"mapped", "bad cloud", "transform late", "too old"},
+       [](PointCloud2& c, Dice& dice) {
+         for (const char* name : {"ns", "seconds"}) {
+           replaceField(c, name, PointField::UINT32, [&] { return std::floor(dice.between(0.0, 1e5)); });
+         }
+       }},
+      {"time/falling",
+       "times that fall from point to point",
+       {"mapped", "bad cloud"},
+       [](PointCloud2& c, Dice&) {
+         const auto points = static_cast<double>(pointsOf(c));
+         for (std::size_t p = 0; p < pointsOf(c); ++p) {
+           const double time = 0.1 * (1.0 - static_cast<double>(p) / points);
+           put(c, "seconds", p, 0, time);
+           put(c, "ns", p, 0, 1e9 * time);
+         }
        }},
       {"time/datatype",
        "times of another datatype",
@@ -556,6 +599,13 @@ std::vector<CloudKind> headerKinds() {
          c.header.stamp.sec = dice.oneOf<std::uint32_t>(
              {c.header.stamp.sec + 1, c.header.stamp.sec + 50, kMax - 1, kMax, 1u << 31, (1u << 31) - 1});
        }},
+      {"header/stamp_other_clock",
+       "stamps of TAI, of GPS, or of another time zone",
+       {"transform late", "too old"},
+       [](PointCloud2& c, Dice& dice) {
+         c.header.stamp.sec =
+             static_cast<std::uint32_t>(c.header.stamp.sec + dice.oneOf<int>({37, 18, 7200, -37, -18}));
+       }},
       {"header/stamp_past",
        "stamps of 20 s and more ago",
        {"too old"},
@@ -572,7 +622,8 @@ std::vector<CloudKind> headerKinds() {
        }},
       {"header/frame_empty", "no frame", {"unknown frame"}, framed("")},
       {"header/frame_unknown", "a frame that tf has never heard of", {"unknown frame"}, framed("nowhere")},
-      {"header/frame_slash", "a frame that begins with a slash", {"unknown frame"}, framed("/honest_sensor")},
+      {"header/frame_slash", "a frame that begins with a slash", {"mapped"}, framed("/honest_sensor")},
+      {"header/frame_slashes", "a frame that begins with two", {"unknown frame"}, framed("//honest_sensor")},
       {"header/frame_long", "a frame's name of 1 MB", {"unknown frame"}, framed(std::string(1000000, 'f'))},
       {"header/frame_not_utf8",
        "a frame's name that is not UTF-8, with zeros and line ends",

@@ -35,16 +35,16 @@ std::vector<TransformKind> valueKinds() {
       one("tf/translation_infinite", "an infinite translation", {"bad transform"},
           [](TransformStamped& t, Dice& dice) { t.transform.translation.x = dice.oneIn(2) ? kInf : -kInf; }),
       one("tf/translation_huge", "translations of 1e12 to 1e308 m, of the cloud's frame",
-          {"bad transform", "mapped"},
+          {"bad transform", "mapped", "bad cloud"},
           [](TransformStamped& t, Dice& dice) {
             t.transform.translation.z = dice.oneOf<double>({1e12, -1e12, 1e18, 1e300, -1e308});
           }),
-      one("tf/translation_far", "translations of 1 km to 1e6 m", {"mapped"},
+      one("tf/translation_far", "translations of 1 km to 1e6 m", {"mapped", "bad cloud"},
           [](TransformStamped& t, Dice& dice) {
             t.transform.translation.x = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
             t.transform.translation.y = dice.oneOf<double>({1e3, -1e4, 1e5, -1e6});
           }),
-      one("tf/translation_utm", "a translation in UTM coordinates", {"mapped", "bad transform"},
+      one("tf/translation_utm", "a translation in UTM coordinates", {"mapped", "bad transform", "bad cloud"},
           [](TransformStamped& t, Dice& dice) {
             t.transform.translation.x = dice.between(166e3, 834e3);
             t.transform.translation.y = dice.between(0.0, 10e6);
@@ -66,11 +66,11 @@ std::vector<TransformKind> valueKinds() {
 
 std::vector<TransformKind> treeKinds() {
   return {
-      one("tf/self", "a frame that is its own parent", {"unknown frame"},
+      one("tf/self", "a frame that is its own parent", {"bad transform"},
           [](TransformStamped& t, Dice&) { t.header.frame_id = t.child_frame_id; }),
       one("tf/child_empty", "no child frame", {"unknown frame"},
           [](TransformStamped& t, Dice&) { t.child_frame_id.clear(); }),
-      one("tf/parent_empty", "no parent frame", {"unknown frame"},
+      one("tf/parent_empty", "no parent frame", {"bad transform"},
           [](TransformStamped& t, Dice&) { t.header.frame_id.clear(); }),
       one("tf/slash", "frames that begin with slashes", {"mapped"},
           [](TransformStamped& t, Dice&) {
@@ -202,6 +202,18 @@ std::vector<TransformKind> timeKinds() {
          Messages messages;
          for (int n = 0; n < 20; ++n) {
            messages.push_back({false, {honestTransform("map", frame, shifted(stamp, -0.5 * n))}});
+         }
+         return messages;
+       }},
+      {"tf/jump",
+       "poses that jump by 3 m to 1 km between two clouds",
+       {"mapped"},
+       [](const std::string& frame, const ros::Time& stamp, Dice& dice) {
+         Messages messages;
+         const double jump = dice.oneOf<double>({3.0, 100.0, 1000.0});
+         for (int n = 0; n < 10; ++n) {
+           messages.push_back(
+               {false, {honestTransform("map", frame, shifted(stamp, 0.1 * (n - 9)), n < 5 ? 0.0 : jump)}});
          }
          return messages;
        }},
