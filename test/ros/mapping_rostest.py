@@ -181,6 +181,38 @@ class MappingTest(unittest.TestCase):
         self.assertTrue(adds_up(status), status)
         self.assertEqual(self.saved_vertices('occupied,free'), vertices)
 
+    def test_one_leading_slash_is_no_other_frame(self):
+        expected = None
+        for frame in ('sensor', '/sensor'):
+            self.reset_map()
+            status = self.integrate(HITS, [CAR, CAR, ROAD], frame=frame)
+            self.assertEqual(status.header.frame_id, 'sensor')
+            expected = expected or self.saved_vertices('occupied,free')
+            self.assertEqual(self.saved_vertices('occupied,free'), expected)
+
+    def test_a_cloud_of_another_clock_or_in_millimetres_is_dropped_with_the_reason(self):
+        before = self.integrate(HITS, [CAR, CAR, ROAD])
+        stamp = rospy.Time(self.robot.seconds + 37)  # TAI
+        self.robot.clouds.publish(make_cloud(HITS, [CAR] * 3, stamp))
+        status = self.deal_with(stamp)
+        self.assertEqual(status.dropped_transform_late, before.dropped_transform_late + 1)
+        self.assertIn('37 s ahead', status.last_drop)
+        self.assertIn('TAI', status.last_drop)
+        status = self.deal_with(self.robot.scan([(4200.0, 300.0, 400.0), (9000.0, 0.0, 0.0)], [CAR] * 2))
+        self.assertFalse(status.integrated_last)
+        self.assertEqual(status.dropped_bad_cloud, before.dropped_bad_cloud + 1)
+        self.assertIn('millimetres', status.last_drop)
+
+    def test_jumps_of_tf_are_counted(self):
+        for _ in range(3):  # after any jump of an earlier test
+            before = self.integrate(HITS, [CAR, CAR, ROAD])
+        for x in (0.0, 0.0, 0.0, 30.0, 30.0, 30.0):
+            status = self.integrate(HITS, [CAR, CAR, ROAD], position=(x, 0.0, 0.0))
+        self.assertEqual(status.tf_jumps, before.tf_jumps + 1)
+        for x in (20.0, 10.0, 0.0):  # a motion
+            status = self.integrate(HITS, [CAR, CAR, ROAD], position=(x, 0.0, 0.0))
+        self.assertEqual(status.tf_jumps, before.tf_jumps + 1)
+
     def test_bad_points_are_left_out_and_counted(self):
         before = self.integrate(HITS, [CAR, CAR, ROAD])
         vertices = self.saved_vertices()

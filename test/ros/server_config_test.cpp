@@ -27,6 +27,29 @@ std::string textOf(const fs::path& file) {
   return text.str();
 }
 
+TEST(ServerConfig, FramesLoseOneLeadingSlash) {
+  ServerConfig server;
+  MapperConfig mapper;
+  setParameters({{"frame_id", "/odom"},
+                 {"sensor_frame_id", "/lidar"},
+                 {"inputs/rear/sensor_frame_id", "/rear"},
+                 {"inputs/front/topic", "/front"}},
+                server, mapper);
+  EXPECT_EQ(server.frame_id, "odom");
+  const std::vector<InputConfig> inputs = allInputs(server, mapper);
+  ASSERT_EQ(inputs.size(), 2u);
+  EXPECT_EQ(inputs[0].sensor_frame_id, "lidar");
+  EXPECT_EQ(inputs[1].sensor_frame_id, "rear");
+  for (const char* name : {"frame_id", "sensor_frame_id", "inputs/rear/sensor_frame_id"}) {
+    EXPECT_THROW(setParameters({{name, "//odom"}}, server, mapper), std::invalid_argument) << name;
+  }
+  for (const char* nothing : {"", "/"}) {
+    EXPECT_THROW(setParameters({{"frame_id", nothing}}, server, mapper), std::invalid_argument);
+    EXPECT_NO_THROW(setParameters({{"sensor_frame_id", nothing}}, server, mapper));
+  }
+  EXPECT_EQ(server.frame_id, "odom") << "as it was";
+}
+
 TEST(ServerConfig, SetsBothKindsAndRefusesBothKinds) {
   ServerConfig server;
   MapperConfig mapper;
