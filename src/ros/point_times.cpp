@@ -66,11 +66,9 @@ bool holdsDates(const TimeValues& values, const Unit& unit) {
   return !values.single || kHalfUlp * std::abs(values.high) * unit.seconds <= kNoMatter;
 }
 
-/// The unit in which the times are around the stamp. Near the start of simulated time, times within half of
-/// the stamp count as near it, so that offsets from 0 on do not.
+/// The unit in which all times are at most `near` from the stamp, and at most `longest` from each other [s].
 std::optional<Unit> absoluteUnit(const TimeValues& values, const std::vector<Unit>& units, double stamp,
-                                 double longest) {
-  const double near = std::min(kLongestScan, 0.5 * stamp);
+                                 double near, double longest) {
   for (const Unit& unit : units) {
     const double low = unit.seconds * values.low, high = unit.seconds * values.high;
     const bool fits =
@@ -97,9 +95,7 @@ std::string noTimes(const TimeValues& values, const InputConfig& input, const ro
   }
   return timesText(values, input) +
          " do not look like times of a scan at the stamp of the cloud; set time_unit and time_reference "
-         "(time_reference to scan_end if they count on a clock of their own), or time_field to another field "
-         "or "
-         "empty";
+         "(scan_end if they count on a clock of their own), or time_field to another field or empty";
 }
 
 /// The unit of times that count from or to the stamp, so that the longest is `largest` raw.
@@ -196,15 +192,18 @@ TimeReading readingOf(const TimeValues& values, const InputConfig& input, const 
   const bool automatic = input.time_reference == TimeReference::kAuto;
   const double low = values.low, high = values.high;
   if (automatic || reading.reference == TimeReference::kAbsolute) {
-    const double longest = automatic ? kLongestTurn : kLongestScan;
-    const auto unit = absoluteUnit(values, units, stamp.toSec(), longest);
+    // Near the start of simulated time, offsets from 0 on are no further from the stamp than the stamp
+    // itself.
+    const double near = automatic ? std::min(kLongestScan, 0.5 * stamp.toSec()) : kLongestScan;
+    const auto unit =
+        absoluteUnit(values, units, stamp.toSec(), near, automatic ? kLongestTurn : kLongestScan);
     const Unit& usual = factsOf(values.integer ? TimeUnit::kNanoseconds : TimeUnit::kSeconds);
     const double largest = std::max(std::abs(low), std::abs(high));
     if (automatic && unit && unit->unit == usual.unit && unit->seconds * largest <= kLongestTurn) {
       throw std::invalid_argument(
           timesText(values, input) +
-          " may count from the start of simulated time or from the stamp, which is as "
-          "early; set time_reference");
+          " may count from the start of simulated time or from the stamp, which is as early; set "
+          "time_reference");
     }
     if (unit) return {unit->unit, TimeReference::kAbsolute, high};
     if (!automatic) throw std::invalid_argument(noTimes(values, input, stamp));

@@ -33,24 +33,28 @@ ros::Time timeOfSlice(const ros::Time& stamp, std::int64_t slice) {
   return later(stamp, (static_cast<double>(slice) + 0.5) * kTimeSlice);
 }
 
-/// Transforms each point by the pose at its time. A point whose time is not finite becomes NaN, so that it is
-/// counted among those. @return the missing pose, if there is one.
+/// Transforms each point by the pose at its time. Points that need no time take that of the cloud, so that
+/// those at the sensor stay there. A point whose time is not finite becomes NaN, so that it is counted among
+/// those. @return the missing pose, if there is one.
 std::optional<MissingPose> undistort(const CloudContent& content, const TimeReading& reading,
-                                     const ros::Time& stamp, const std::string& map_frame,
+                                     const StampedPose& of_cloud, const std::string& map_frame,
                                      const std::string& frame, const PoseSource& poses, const ros::Time& now,
                                      Scan& scan) {
   std::map<std::int64_t, Eigen::Isometry3d> pose_of_slice;
   scan.points = content.points;
   for (std::size_t i = 0; i < content.times.size(); ++i) {
-    const bool needs_time = needsTime(scan.points[i]);
-    if (needs_time && !std::isfinite(content.times[i])) {
+    if (!needsTime(scan.points[i])) {
+      moveToScan(of_cloud.T_target_source, scan.origin, scan.points[i]);
+      continue;
+    }
+    if (!std::isfinite(content.times[i])) {
       scan.points[i].setConstant(std::numeric_limits<float>::quiet_NaN());
       continue;
     }
-    const std::int64_t slice = needs_time ? sliceOf(reading.afterStamp(content.times[i], stamp)) : 0;
+    const std::int64_t slice = sliceOf(reading.afterStamp(content.times[i], of_cloud.stamp));
     auto pose = pose_of_slice.find(slice);
     if (pose == pose_of_slice.end()) {
-      const ros::Time time = needs_time ? timeOfSlice(stamp, slice) : stamp;
+      const ros::Time time = timeOfSlice(of_cloud.stamp, slice);
       const auto found = poses.find(map_frame, frame, time);
       if (!found) return poses.explain(map_frame, frame, time, now);
       pose = pose_of_slice.emplace(slice, found->T_target_source).first;
@@ -129,8 +133,8 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
     } else {
       const TimeValues times = timeValues(cloud, input_.time_field);
       const TimeReading reading = readingOf(times, input_, sensor->stamp);
-      const auto missing =
-          undistort(content, reading, sensor->stamp, map_frame_, cloud_frame, poses, now, scan);
+      const auto missing = undistort(content, reading, {frame->T_target_source, sensor->stamp}, map_frame_,
+                                     cloud_frame, poses, now, scan);
       if (missing) return *missing;
       const bool automatic =
           input_.time_unit == TimeUnit::kAuto || input_.time_reference == TimeReference::kAuto;

@@ -310,7 +310,8 @@ TEST_F(DriverLayouts, HesaiBefore2023) {
                                   {"ring", PointField::UINT16, 32},
                                   {"label", PointField::UINT16, 34}});
   input_.time_field = "timestamp";
-  expectHall(read(absolute(fields, 48, 1.0, false, hits).cloud, kStamp), hits);
+  const PlacedScan scan = read(absolute(fields, 48, 1.0, false, hits).cloud, kStamp);
+  expectHall(scan, hits);
 }
 
 TEST_F(DriverLayouts, Livox) {
