@@ -176,7 +176,7 @@ class DriverLayouts : public testing::Test {
       }
     }
     EXPECT_EQ(found, hits);
-    EXPECT_TRUE(placed.unknown_labels.empty() || !labelled);
+    EXPECT_TRUE(placed.unlisted_labels.empty() || !labelled);
   }
 
   InputConfig input_;
@@ -407,7 +407,7 @@ TEST_F(DriverLayouts, CarlaSemanticLidar) {
   input_.label_field = "ObjTag";
   const PlacedScan scan = read(layout.cloud, 12.0, "carla");
   expectHall(scan, hits.size(), false);
-  EXPECT_TRUE(scan.unknown_labels.empty());
+  EXPECT_TRUE(scan.unlisted_labels.empty());
   for (std::size_t n = 0; n < hits.size(); ++n) ASSERT_EQ(scan.scan.labels[n], hits[n].label == 40 ? 7u : 1u);
 }
 
