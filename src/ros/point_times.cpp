@@ -108,10 +108,7 @@ Unit offsetUnit(const TimeValues& values, const InputConfig& input, double large
     if (longest <= kNoMatter || longest > kLongestTurn || unit.unit == usual.unit) continue;
     if (values.integer && unit.unit == TimeUnit::kSeconds) continue;
     if (values.spread && unit.seconds * (values.high - values.low) >= kShortestScan) return unit;
-    if (usual_fits && !values.integer) continue;  // several scans in one cloud
-    if (!usual_fits) break;
-    throw std::invalid_argument(timesText(values, input) + " may be in " + unit.name + " or in " +
-                                usual.name + ", and are too few or too close to tell; set time_unit");
+    break;  // too few or too close to prove another unit than the usual one
   }
   if (!usual_fits) throw std::invalid_argument(noTimes(values, input, stamp));
   return usual;

@@ -216,7 +216,7 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
             "the latest of " + transforms + " is " + numberText(std::round(1e3 * ahead)) +
                 " ms older than the cloud; raise tf_timeout, or make the localisation publish sooner"};
   }
-  if (stamp > latest && !now.isZero() && std::abs((now - stamp).toSec()) <= kSlowest) {
+  if (stamp > latest && !now.isZero() && std::abs(now.toSec() - stamp.toSec()) <= kSlowest) {
     return {
         DropReason::kTransformLate,
         transforms + " are " + durationText(ahead) +

@@ -106,6 +106,13 @@ TEST(TfJumps, PausesAndJumpsOfTimeAreNone) {
   EXPECT_TRUE(watch.take().empty()) << "not on the way to the map";
 }
 
+TEST(TfJumps, StampsAtTheEndOfTimeDoNoHarm) {
+  TfJumpWatch watch;
+  watch.watch("base", Eigen::Vector3d::Zero());
+  for (const double time : {0.0, 1.0, 2.0, 4294966290.0, 4294966295.0}) watch.add(stamped(time, at(0.0)));
+  EXPECT_TRUE(watch.take().empty());
+}
+
 TEST(TfJumps, FramesWithoutEndDoNotFillTheMemory) {
   TfJumpWatch watch;
   std::size_t kept = 0;
