@@ -281,6 +281,7 @@ void addStats(py::module& m) {
   count("unknown_label", &C::unknown_label,
         "Points dropped because the class table does not list their label.");
   count("unlabelled", &C::unlabelled, "Points of the unlabelled class that were dropped.");
+  count("no_direction", &C::no_direction, "Beams without a return whose direction is not known.");
   count("no_returns", &C::no_returns, "Beams without a return.");
   stats.def_readonly("hits", &S::hits, "Hits after down-sampling.")
       .def_readonly("free_count", &S::free_count, "Free samples after down-sampling, or beams.")

@@ -13,9 +13,6 @@
 namespace bki_mapping {
 namespace {
 
-/// Points closer than this are not hits: some drivers report missing returns at the sensor [m].
-constexpr float kSensorRadius = 1e-3f;
-
 /// Looks up the classes of labels; remembers the last one, since neighbouring points often share a label.
 class ClassFinder {
  public:
@@ -105,10 +102,11 @@ bool areShares(const ClassShare* begin, const ClassShare* end) {
 }  // namespace
 
 PointCounts& PointCounts::operator+=(const PointCounts& other) {
-  for (const auto count : {&PointCounts::points, &PointCounts::used, &PointCounts::not_finite,
-                           &PointCounts::at_sensor, &PointCounts::too_near, &PointCounts::beyond_max,
-                           &PointCounts::outside_map, &PointCounts::unknown_label, &PointCounts::unlabelled,
-                           &PointCounts::no_returns, &PointCounts::labels_not_in_table}) {
+  for (const auto count :
+       {&PointCounts::points, &PointCounts::used, &PointCounts::not_finite, &PointCounts::at_sensor,
+        &PointCounts::too_near, &PointCounts::beyond_max, &PointCounts::outside_map,
+        &PointCounts::unknown_label, &PointCounts::unlabelled, &PointCounts::no_direction,
+        &PointCounts::no_returns, &PointCounts::labels_not_in_table}) {
     this->*count += other.*count;
   }
   return *this;
@@ -153,6 +151,10 @@ void ScanPreprocessor::addNoReturns(const ScanView& scan, Downsampler::Input& cu
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     const float length = direction.norm();
     ++processed_.counts.points;
+    if (direction.isZero(0.0f)) {
+      ++processed_.counts.no_direction;
+      continue;
+    }
     if (!direction.allFinite() || !(length > 0.0f) || !sensor.knowsRange()) {
       ++processed_.counts.not_finite;
       continue;

@@ -13,6 +13,9 @@
 
 namespace bki_mapping {
 
+/// Points closer than this are not hits: some drivers report missing returns at the sensor [m].
+constexpr float kSensorRadius = 1e-3f;
+
 /// A scan after filtering and down-sampling.
 struct PreprocessedScan {
   LabelledPoints hits;  ///< empty where neither beams nor soft labels need their order

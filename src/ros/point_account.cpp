@@ -51,8 +51,13 @@ std::string sentenceOf(const PointKind& kind, const PointAccount& account, const
   if (count == &PointCounts::not_finite) {
     return "are NaN or infinite; check the sensor, or set clear_no_returns if it sees open space";
   }
+  if (count == &PointCounts::no_direction) {
+    return "are beams without a return whose direction is not known; publish organised clouds of the whole "
+           "sensor, and set sensor_frame_id to the frame where beams start";
+  }
   if (count == &PointCounts::at_sensor) {
-    return "are within 1 mm of the sensor, where drivers put beams without a return; check the sensor";
+    return "are within 1 mm of the sensor, where drivers put beams without a return; check the sensor, or "
+           "set clear_no_returns if it sees open space";
   }
   if (count == &PointCounts::too_near) {
     return "are nearer than " + limit("min_range", sensor.min_range, mapper.sensor_model.min_range) +
@@ -80,6 +85,7 @@ const std::vector<PointKind>& pointKinds() {
   using C = PointCounts;
   using S = MappingStatus;
   static const std::vector<PointKind> kinds = {
+      {"without a direction", &C::no_direction, &S::points_no_direction, true},
       {"NaN or infinite", &C::not_finite, &S::points_not_finite, true},
       {"at the sensor", &C::at_sensor, &S::points_at_sensor, true},
       {"nearer than min_range", &C::too_near, &S::points_too_near, false},

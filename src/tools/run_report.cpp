@@ -53,7 +53,8 @@ Json scanJson(const ScanReport& scan) {
             {"beyond_max_range", c.beyond_max},
             {"outside_map", c.outside_map},
             {"unknown_label", c.unknown_label},
-            {"unlabelled", c.unlabelled}}},
+            {"unlabelled", c.unlabelled},
+            {"no_direction", c.no_direction}}},
           {"labels_not_in_table", c.labels_not_in_table},
           {"hits", s.hits},
           {"free_samples_or_beams", s.free_count},
@@ -86,7 +87,8 @@ std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig
                            : "beyond " + reach + " (set sensor_model/max_range if the sensor sees farther)"},
       {sum.outside_map, "outside of the map"},
       {sum.unknown_label, "with labels that the class table does not list (see --classes and label_values)"},
-      {sum.unlabelled, "unlabelled"}};
+      {sum.unlabelled, "unlabelled"},
+      {sum.no_direction, "without a direction"}};
   std::string text;
   for (const auto& [count, reason] : reasons) {
     if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + reason;

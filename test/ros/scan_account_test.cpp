@@ -104,7 +104,7 @@ TEST(ScanLedger, CountsEveryKindOfPoint) {
   // Covers all reasons: one that is not in the table would be missing from the sum.
   EXPECT_EQ(counts.points, counts.used + counts.not_finite + counts.at_sensor + counts.too_near +
                                counts.beyond_max + counts.outside_map + counts.unknown_label +
-                               counts.unlabelled + counts.no_returns);
+                               counts.unlabelled + counts.no_direction + counts.no_returns);
   ScanLedger ledger;
   for (int i = 0; i < 2; ++i) ledger.integrated({}, stats, 0.0, {});
   const MappingStatus status = ledger.status({}, 0);
@@ -232,7 +232,8 @@ TEST(Points, ThatAreOfNoUseAreNamedWithTheRemedy) {
   expect(verdict({{&C::unknown_label, 1000}}, unlisted({{0x0100ff, 1000}}), colors), kError,
          {"0x0100ff", "do this or that"});
   expect(verdict({{&C::not_finite, 1000}}), kWarn, {"100 % are NaN or infinite", "clear_no_returns"});
-  expect(verdict({{&C::at_sensor, 1000}}), kWarn, {"within 1 mm of the sensor"});
+  expect(verdict({{&C::at_sensor, 1000}}), kWarn, {"within 1 mm of the sensor", "clear_no_returns"});
+  expect(verdict({{&C::no_direction, 1000}}), kWarn, {"direction is not known", "organised clouds"});
   InputConfig ranges;
   ranges.sensor_model = {2.0, 5.0};
   MapperConfig mapper;
@@ -258,10 +259,11 @@ TEST(Points, OfHealthySensorsAreNotWarnedOf) {
     EXPECT_EQ(health.message, "");
   };
   expectHealthy(verdict({}));
-  expectHealthy(verdict({{&C::not_finite, 600}}));                       // an organised cloud outdoors
-  expectHealthy(verdict({{&C::not_finite, 990}}));                       // a drone that sees a mast
-  expectHealthy(verdict({{&C::no_returns, 1000}}));                      // only sky, which is cleared
-  expectHealthy(verdict({{&C::no_returns, 997}, {&C::not_finite, 3}}));  // plus columns without any return
+  expectHealthy(verdict({{&C::not_finite, 600}}));                         // an organised cloud outdoors
+  expectHealthy(verdict({{&C::not_finite, 990}}));                         // a drone that sees a mast
+  expectHealthy(verdict({{&C::no_returns, 1000}}));                        // only sky, which is cleared
+  expectHealthy(verdict({{&C::no_returns, 997}, {&C::no_direction, 3}}));  // plus columns without any return
+  expectHealthy(verdict({{&C::no_direction, 600}}));                       // rings that see only sky
   expectHealthy(verdict({{&C::no_returns, 999}, {&C::unknown_label, 1}}));
   expectHealthy(verdict({{&C::at_sensor, 950}}));
   expectHealthy(verdict({{&C::beyond_max, 990}}));  // a short max_range outdoors

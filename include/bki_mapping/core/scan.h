@@ -75,7 +75,8 @@ struct Scan {
   /// The probabilities of the classes for each hit. Empty if there are only hard labels; otherwise `labels`
   /// holds ids.
   SoftLabels soft;
-  /// Directions of beams without a return, in the axes of the map frame; of any length > 0.
+  /// Directions of beams without a return, in the axes of the map frame; of any length > 0, or
+  /// 0 if the direction is not known: such beams are only counted.
   std::vector<Eigen::Vector3f> no_returns;
   /// Whether points at max_range (within kAtMaxRange) mean that the beam had no return: some drivers report
   /// it so.

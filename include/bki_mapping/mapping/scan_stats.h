@@ -17,6 +17,7 @@ struct PointCounts {
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
   std::size_t unknown_label = 0;  ///< not in the class table, with unknown_labels `ignore`
   std::size_t unlabelled = 0;     ///< of the unlabelled class, with unlabelled_points `ignore`
+  std::size_t no_direction = 0;   ///< beams without a return whose direction is not known
   std::size_t no_returns = 0;     ///< beams without a return, which clear up to the sensor's range
   /// Points whose label is not in the class table; they are also counted above.
   std::size_t labels_not_in_table = 0;
