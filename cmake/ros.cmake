@@ -1,6 +1,7 @@
 # The ROS shell: nodelet, node and the programs that speak ROS.
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
+    beam_grid.cpp
     city_loader.cpp cloud_conversion.cpp
     cloud_frame.cpp
     clock_offset.cpp
@@ -39,6 +40,7 @@ bki_mapping_room(ros SOURCES
     queries/space.cpp
     query_services.cpp
     recent_map.cpp
+    ring_axis.cpp
     scan_ledger.cpp
     scan_reader.cpp
     sensor_trajectory.cpp

@@ -4,12 +4,10 @@
 #include <memory>
 #include <optional>
 
-#include "ros/no_returns.h"
-
 namespace bki_mapping::ros_interface {
 
 CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
-                       const ClassTable& classes, LabelValues label_values) {
+                       const ClassTable& classes, LabelValues label_values, const Eigen::Vector3f& sensor) {
   checkSizes(cloud);
   const FieldReader x(cloud, "x"), y(cloud, "y"), z(cloud, "z");
   const std::unique_ptr<LabelReader> labels = makeLabelReader(cloud, input, classes, label_values);
@@ -17,31 +15,41 @@ CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig&
   if (!input.time_field.empty()) time.emplace(cloud, input.time_field);
   CloudContent content;
   const std::size_t count = std::size_t{cloud.width} * cloud.height;
-  const bool organised = input.clear_no_returns && cloud.height > 1;
-  std::vector<Eigen::Vector3f> all;
+  const bool organised = input.clear_no_returns && cloud.height > 1 && cloud.width > 1;
+  std::vector<Eigen::Vector3f> grid;
+  std::vector<double> grid_times;
   content.points.reserve(count);
   content.labels.labels.reserve(count);
-  if (organised) all.reserve(count);
+  if (organised) grid.reserve(count);
   for (std::size_t row = 0; row < cloud.height; ++row) {
     for (std::size_t column = 0; column < cloud.width; ++column) {
       const std::uint8_t* bytes = cloud.data.data() + row * cloud.row_step + column * cloud.point_step;
       const Eigen::Vector3f point(static_cast<float>(x(bytes)), static_cast<float>(y(bytes)),
                                   static_cast<float>(z(bytes)));
-      if (organised) all.push_back(point);
-      if (input.clear_no_returns && !point.allFinite()) {
-        const Eigen::Vector3f direction = directionOf(point);
-        const bool known = !point.hasNaN() && !direction.isZero();
-        if (known) content.no_returns.push_back(direction);
-        if (known || (organised && point.hasNaN())) continue;
+      if (organised) grid.push_back(point);
+      if (organised && time) grid_times.push_back((*time)(bytes));
+      const Answer answer = input.clear_no_returns ? answerOf(point, sensor) : Answer::kReturn;
+      if (answer == Answer::kReturn) {
+        content.points.push_back(point);
+        labels->append(bytes, content.labels);
+        if (time) content.times.push_back((*time)(bytes));
+      } else if (answer == Answer::kDirection) {
+        content.no_returns.push_back(directionOf(point));
+        if (time) content.no_return_times.push_back((*time)(bytes));
+      } else if (!organised) {
+        content.no_returns.push_back(Eigen::Vector3f::Zero());
+        if (time) content.no_return_times.push_back(0.0);
+        content.no_direction = NoDirection::kUnorganised;
       }
-      content.points.push_back(point);
-      labels->append(bytes, content.labels);
-      if (time) content.times.push_back((*time)(bytes));
     }
   }
   if (organised) {
-    const auto holes = directionsOfHoles(all, cloud.width);
-    content.no_returns.insert(content.no_returns.end(), holes.begin(), holes.end());
+    const Holes holes = directionsOfHoles(grid, cloud.width, sensor);
+    content.no_direction = holes.unknown;
+    content.no_returns.insert(content.no_returns.end(), holes.directions.begin(), holes.directions.end());
+    for (const std::size_t place : holes.same_firing) {
+      if (time) content.no_return_times.push_back(grid_times[place]);
+    }
   }
   return content;
 }

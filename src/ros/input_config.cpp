@@ -54,8 +54,9 @@ std::vector<NamedParameter<InputConfig>> inputParameters() {
       truthParameter(
           "clear_no_returns", &C::clear_no_returns, Changes::kAtStart,
           "Clear space up to sensor_model/max_range along beams without a return. These are points "
-          "with an infinite coordinate, points at max_range itself and, in organised clouds, points "
-          "that are NaN. Set true to map open space."),
+          "with exactly one infinite coordinate, points at max_range itself and, in organised clouds of "
+          "spinning lidars, points that are NaN, infinite or 0, 0, 0, where the returns around them tell "
+          "their direction. Set true to map open space."),
   };
 }
 

@@ -226,6 +226,9 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   if (!placed.times.empty()) reportTimes(waiting.input, placed.times);
   poses_->watchJumps(config_.frame_id, readers_[waiting.input].sensorFrame(*waiting.cloud),
                      ros::Time().fromNSec(placed.scan.stamp));
+  if (placed.no_direction) {
+    explainNoDirection(waiting.input, *placed.no_direction, stats.counts.no_direction);
+  }
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
   warnOfFarPlace();
@@ -285,9 +288,21 @@ void MappingServer::reportTfJumps() {
     if (!throttle_.allow(frames, Clock::now())) continue;
     ROS_WARN(
         "tf jumped: %s moved the sensor by %.2f m and turned it by %.1f degrees at once at time %.3f, as "
-        "when a loop closes. The map keeps what was mapped before, so that walls may be doubled; call ~reset, or "
+        "when a loop closes. The map keeps what was mapped before, so that walls may be doubled; call "
+        "~reset, or "
         "map a recording with the corrected poses",
         frames.c_str(), jump.distance, jump.angle, jump.stamp.toSec());
+  }
+}
+
+void MappingServer::explainNoDirection(std::size_t input, NoDirection reason, std::size_t count) {
+  if (count == 0 || !explained_.emplace(input, reason).second) return;
+  const std::string sentence = std::to_string(count) + " beams without a return in a cloud of " +
+                               cloud_subscribers_[input].getTopic() + " clear nothing: " + explain(reason);
+  if (reason == NoDirection::kFewReturns) {
+    ROS_INFO("%s", sentence.c_str());
+  } else {
+    ROS_WARN("%s", sentence.c_str());
   }
 }
 

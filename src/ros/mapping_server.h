@@ -14,6 +14,7 @@
 #include <memory>
 #include <set>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -82,6 +83,8 @@ class MappingServer {
   void warnOfFarPlace();
   /// Warns of labels that the class table does not list, of each once.
   void warnOfLabels(std::size_t input, const PlacedScan& placed, const PointCounts& counts);
+  /// Says once per input and reason why beams without a return are not used.
+  void explainNoDirection(std::size_t input, NoDirection reason, std::size_t count);
   /// Logs what is wrong with the map file, when that changes.
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
@@ -124,6 +127,7 @@ class MappingServer {
   std::vector<std::set<std::string>> said_of_times_;           ///< of each input
   std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
   bool warned_of_far_place_ = false;
+  std::set<std::pair<std::size_t, NoDirection>> explained_;  ///< inputs and reasons
 
   std::unique_ptr<PoseSource> poses_;
   std::vector<ros::Subscriber> cloud_subscribers_;

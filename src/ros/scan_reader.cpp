@@ -33,33 +33,74 @@ ros::Time timeOfSlice(const ros::Time& stamp, std::int64_t slice) {
   return later(stamp, (static_cast<double>(slice) + 0.5) * kTimeSlice);
 }
 
-/// Transforms each point by the pose at its time. Points that need no time take that of the cloud, so that
-/// those at the sensor stay there. A point whose time is not finite becomes NaN, so that it is counted among
-/// those. @return the missing pose, if there is one.
-std::optional<MissingPose> undistort(const CloudContent& content, const TimeReading& reading,
-                                     const StampedPose& of_cloud, const std::string& map_frame,
-                                     const std::string& frame, const PoseSource& poses, const ros::Time& now,
-                                     Scan& scan) {
-  std::map<std::int64_t, Eigen::Isometry3d> pose_of_slice;
+/// The poses of a cloud's frame during a scan.
+class PosesOfScan {
+ public:
+  /// @param of_cloud the pose at the cloud's stamp.
+  PosesOfScan(const PoseSource& poses, const std::string& map_frame, const std::string& frame,
+              const StampedPose& of_cloud, const TimeReading& reading, const ros::Time& now)
+      : poses_(poses),
+        map_frame_(map_frame),
+        frame_(frame),
+        of_cloud_(of_cloud),
+        reading_(reading),
+        now_(now) {}
+
+  const Eigen::Isometry3d& ofCloud() const { return of_cloud_.T_target_source; }
+  /// The pose at a raw time; that of the cloud if the time is none of a scan. @return nullptr if the pose is
+  /// missing, which `missing` explains.
+  const Eigen::Isometry3d* at(double raw) {
+    const double seconds = reading_.afterStamp(raw, of_cloud_.stamp);
+    if (!(std::abs(seconds) <= kLongestScan)) return &of_cloud_.T_target_source;
+    const std::int64_t slice = sliceOf(seconds);
+    auto pose = of_slice_.find(slice);
+    if (pose == of_slice_.end()) {
+      const ros::Time time = timeOfSlice(of_cloud_.stamp, slice);
+      const auto found = poses_.find(map_frame_, frame_, time);
+      if (!found) {
+        missing = poses_.explain(map_frame_, frame_, time, now_);
+        return nullptr;
+      }
+      pose = of_slice_.emplace(slice, found->T_target_source).first;
+    }
+    return &pose->second;
+  }
+
+  std::optional<MissingPose> missing;
+
+ private:
+  const PoseSource& poses_;
+  const std::string& map_frame_;
+  const std::string& frame_;
+  StampedPose of_cloud_;
+  TimeReading reading_;
+  ros::Time now_;
+  std::map<std::int64_t, Eigen::Isometry3d> of_slice_;
+};
+
+/// Transforms each point, and each direction, by the pose at its time. Points that need no time take that of
+/// the cloud, so that those at the sensor stay there. A point whose time is not finite becomes NaN, so that
+/// it is counted among those. @return the missing pose, if there is one.
+std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& poses, Scan& scan) {
   scan.points = content.points;
   for (std::size_t i = 0; i < content.times.size(); ++i) {
-    if (!needsTime(scan.points[i])) {
-      moveToScan(of_cloud.T_target_source, scan.origin, scan.points[i]);
-      continue;
+    Eigen::Vector3f& point = scan.points[i];
+    if (!needsTime(point)) {
+      moveToScan(poses.ofCloud(), scan.origin, point);
+    } else if (!std::isfinite(content.times[i])) {
+      point.setConstant(std::numeric_limits<float>::quiet_NaN());
+    } else if (const Eigen::Isometry3d* const pose = poses.at(content.times[i])) {
+      moveToScan(*pose, scan.origin, point);
+    } else {
+      return poses.missing;
     }
-    if (!std::isfinite(content.times[i])) {
-      scan.points[i].setConstant(std::numeric_limits<float>::quiet_NaN());
-      continue;
-    }
-    const std::int64_t slice = sliceOf(reading.afterStamp(content.times[i], of_cloud.stamp));
-    auto pose = pose_of_slice.find(slice);
-    if (pose == pose_of_slice.end()) {
-      const ros::Time time = timeOfSlice(of_cloud.stamp, slice);
-      const auto found = poses.find(map_frame, frame, time);
-      if (!found) return poses.explain(map_frame, frame, time, now);
-      pose = pose_of_slice.emplace(slice, found->T_target_source).first;
-    }
-    moveToScan(pose->second, scan.origin, scan.points[i]);
+  }
+  scan.no_returns = content.no_returns;
+  for (std::size_t i = 0; i < content.no_return_times.size(); ++i) {
+    if (scan.no_returns[i].isZero()) continue;
+    const Eigen::Isometry3d* const pose = poses.at(content.no_return_times[i]);
+    if (!pose) return poses.missing;
+    scan.no_returns[i] = pose->linear().cast<float>() * scan.no_returns[i];
   }
   return std::nullopt;
 }
@@ -120,30 +161,35 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   const auto frame = poses.find(map_frame_, cloud_frame, stamp);
   if (!frame) return poses.explain(map_frame_, cloud_frame, stamp, now);
 
-  CloudContent content = readCloud(cloud, input_, classes_, label_values_);
+  const bool one_frame = sensor_frame == cloud_frame;
+  const Eigen::Vector3d beams_start =
+      one_frame ? Eigen::Vector3d::Zero()
+                : Eigen::Vector3d(frame->T_target_source.inverse() * sensor->T_target_source.translation());
+  CloudContent content = readCloud(cloud, input_, classes_, label_values_, beams_start.cast<float>());
   PlacedScan placed;
   Scan& scan = placed.scan;
-  if (sensor_frame == cloud_frame && content.times.empty()) {
-    scan = scanFromSensorFrame(sensor->T_target_source, content.points, {}, 0);
-  } else {
+  if (!input_.time_field.empty()) {
     scan.origin = sensor->T_target_source.translation();
-    if (content.times.empty()) {
+    const TimeValues times = timeValues(cloud, input_.time_field);
+    const TimeReading reading = readingOf(times, input_, sensor->stamp);
+    PosesOfScan poses_of_scan(poses, map_frame_, cloud_frame, {frame->T_target_source, sensor->stamp},
+                              reading, now);
+    if (const auto missing = undistort(content, poses_of_scan, scan)) return *missing;
+    const bool automatic =
+        input_.time_unit == TimeUnit::kAuto || input_.time_reference == TimeReference::kAuto;
+    if (automatic && times.any) placed.times = reading.text();
+  } else {
+    if (one_frame) {
+      scan = scanFromSensorFrame(sensor->T_target_source, content.points, {}, 0);
+    } else {
+      scan.origin = sensor->T_target_source.translation();
       scan.points = content.points;
       for (Eigen::Vector3f& point : scan.points) moveToScan(frame->T_target_source, scan.origin, point);
-    } else {
-      const TimeValues times = timeValues(cloud, input_.time_field);
-      const TimeReading reading = readingOf(times, input_, sensor->stamp);
-      const auto missing = undistort(content, reading, {frame->T_target_source, sensor->stamp}, map_frame_,
-                                     cloud_frame, poses, now, scan);
-      if (missing) return *missing;
-      const bool automatic =
-          input_.time_unit == TimeUnit::kAuto || input_.time_reference == TimeReference::kAuto;
-      if (automatic && times.any) placed.times = reading.text();
     }
+    const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
+    for (const Eigen::Vector3f& way : content.no_returns) scan.no_returns.push_back(rotation * way);
   }
   checkMetres(scan, input_.sensor_model);
-  const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
-  for (const Eigen::Vector3f& direction : content.no_returns) scan.no_returns.push_back(rotation * direction);
   scan.stamp = sensor->stamp.toNSec();  // of the cloud; of the latest pose if the cloud has none
   scan.labels = std::move(content.labels.labels);
   scan.labels_are_ids = content.labels.are_ids;
@@ -152,6 +198,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   scan.no_returns_at_max_range = input_.clear_no_returns;
   placed.T_map_sensor = sensor->T_target_source;
   placed.unlisted_labels = std::move(content.labels.unknown);
+  placed.no_direction = content.no_direction;
   return placed;
 }
 

@@ -12,6 +12,7 @@
 #include "core/frame_name.h"
 #include "core/unlisted_labels.h"
 #include "ros/input_config.h"
+#include "ros/no_returns.h"
 #include "ros/point_times.h"
 #include "ros/pose_source.h"
 
@@ -23,6 +24,7 @@ struct PlacedScan {
   Eigen::Isometry3d T_map_sensor;  ///< at the cloud's stamp
   std::string times;               ///< how the times of points were read by `auto` settings; "": not so
   UnlistedLabels unlisted_labels;
+  std::optional<NoDirection> no_direction;  ///< why directions of beams without a return are not known
 };
 
 /// Reads the clouds of one input.

@@ -48,7 +48,9 @@ void TfJumpWatch::add(const geometry_msgs::TransformStamped& transform) {
 void TfJumpWatch::judge(const std::string& child, const Edge& edge) {
   const std::deque<Sample>& samples = edge.samples;
   if (samples.size() < 4) return;  // a step before, the step, and one after it
-  const auto duration = [&](std::size_t n) { return samples[n].stamp.toSec() - samples[n - 1].stamp.toSec(); };
+  const auto duration = [&](std::size_t n) {
+    return samples[n].stamp.toSec() - samples[n - 1].stamp.toSec();
+  };
   const auto velocity = [&](std::size_t n) -> Velocity {  // of the step to sample n
     const Eigen::Isometry3d &before = samples[n - 1].T_parent_child, &after = samples[n].T_parent_child;
     const Eigen::AngleAxisd turn(after.linear() * before.linear().transpose());

@@ -9,7 +9,6 @@
 #include "bki_mapping/io/yaml.h"
 #include "cloud_maker.h"
 #include "ros/cloud_conversion.h"
-#include "ros/no_returns.h"
 #include "ros/pose_conversion.h"
 
 namespace bki_mapping::ros_interface {
@@ -370,42 +369,6 @@ TEST(Labels, ANumberThatIsNoColourIsNotWhite) {
   const CloudLabels labels = readCloud(maker.message(), input, classes(), LabelValues::kRaw).labels;
   EXPECT_EQ(labels.labels, (std::vector<std::uint32_t>(3, kNoLabel)));
   EXPECT_EQ(labels.unknown.missing(), 3u);
-}
-
-TEST(NoReturns, InfinityPointsTheWay) {
-  sensor_msgs::PointCloud2 cloud = cloudOf({"label"}, {{40}, {40}, {40}});
-  const float inf = INFINITY;
-  const float points[3][3] = {{inf, 0, 0}, {-inf, inf, 1}, {NAN, 0, 0}};
-  for (int i = 0; i < 3; ++i) std::memcpy(cloud.data.data() + 16 * i, points[i], 12);
-  InputConfig input;
-  EXPECT_EQ(readCloud(cloud, input, classes(), LabelValues::kRaw).points.size(), 3u);
-  input.clear_no_returns = true;
-  const CloudContent content = readCloud(cloud, input, classes(), LabelValues::kRaw);
-  EXPECT_EQ(content.no_returns, (std::vector<Eigen::Vector3f>{{1, 0, 0}, {-1, 1, 0}}));
-  EXPECT_EQ(content.points.size(),
-            1u);  // without rows, the direction of NaN is unknown; the mapper counts it
-  EXPECT_EQ(content.labels.labels.size(), 1u);
-}
-
-TEST(NoReturns, HolesOfOrganisedCloudsPointWhereTheirRowAndColumnDo) {
-  // 3 rows at elevations -0.2, 0, 0.2 and 4 columns, 90 degrees apart; arbitrary ranges.
-  std::vector<Eigen::Vector3f> points, truth;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      const float e = 0.2f * static_cast<float>(row - 1), a = 1.5707963f * static_cast<float>(column) - 3.0f;
-      const Eigen::Vector3f direction(std::cos(a) * std::cos(e), std::sin(a) * std::cos(e), std::sin(e));
-      points.push_back(direction * static_cast<float>(1 + row + column));
-      if ((row + column) % 3 != 0) continue;
-      points.back().setConstant(NAN);
-      truth.push_back(direction);
-    }
-  }
-  const auto directions = directionsOfHoles(points, 4);
-  ASSERT_EQ(directions.size(), truth.size());
-  for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_TRUE(directions[i].isApprox(truth[i], 1e-5f));
-  // The azimuth of a column without returns is unknown.
-  EXPECT_TRUE(directionsOfHoles(std::vector<Eigen::Vector3f>(4, Eigen::Vector3f::Constant(NAN)), 2).empty());
-  EXPECT_TRUE(directionsOfHoles({}, 0).empty());
 }
 
 TEST(Pose, SurvivesTheTripThroughAMessage) {

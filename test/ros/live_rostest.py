@@ -250,6 +250,21 @@ class Live(MapperTest):
         self.assertEqual([states[8 * i] for i in range(1, 8)], 7 * [OccupancyMap.FREE], 'a point at max_range')
         self.assertEqual(states[64 * 4], OccupancyMap.OCCUPIED)
 
+    def test_beams_that_point_nowhere_are_counted_and_explained_once(self):
+        inf, nan, before = float('inf'), float('nan'), self.status.find(lambda m: True).points_no_direction
+        for _ in range(2):
+            stamp = self.stamp_for(self.open)
+            self.robot.publish_pose(stamp, position=(0.5, 0.5, 0.5))
+            nowhere = [(inf, -inf, inf), (nan, nan, nan), (0.0, 0.0, 0.0)]
+            self.open.clouds.publish(make_cloud(nowhere + [(0.0, 0.0, 4.0)], [CAR] * 4, stamp))
+            status = self.deal_with(stamp)
+        self.assertEqual(status.points_no_direction, before + 6)
+        self.assertTrue(adds_up(status), status)
+        said = self.log.wait_for(lambda m: 'beams without a return' in m.msg and 'clear nothing' in m.msg, 'a warning')
+        self.assertIn('3 beams without a return in a cloud of /open_cloud', said.msg)
+        self.assertIn('publish organised clouds', said.msg)
+        self.assertEqual(1, sum('clear nothing' in m.msg for m in self.log.messages))
+
     def test_a_cloud_in_the_map_frame_is_warned_of_once(self):
         for _ in range(2):
             self.integrate([(4.5, 0.5, 0.5)], [CAR], frame='map')

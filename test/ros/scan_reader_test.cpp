@@ -14,6 +14,7 @@
 #include "cloud_maker.h"
 #include "ros/pose_conversion.h"
 #include "ros/scan_reader.h"
+#include "spinning_lidar.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -449,6 +450,39 @@ TEST_F(Reader, ACloudInMillimetresIsRefused) {
   EXPECT_THROW(read(millimetres), std::invalid_argument) << "each beam would clear 60 m";
   EXPECT_NO_THROW(read(cloud({{0, 0, 0}, {NAN, NAN, NAN}}).message())) << "a sensor that sees nothing";
   EXPECT_NO_THROW(read(cloud({{500, 0, 0}, {600, 0, 0}, {10, 0, 0}}).message()));
+}
+
+TEST_F(Reader, HolesTurnWithTheSensorLikeTheirFiring) {
+  pose("sensor", 99.0, {0, 0, 0}, -1.0);  // turns at 1 rad/s: by eight beams in a scan
+  pose("sensor", 101.0, {0, 0, 0}, 1.0);
+  const SpinningLidar lidar;
+  const OrganisedCloud sweep_of_lidar = sweep(lidar, BoxScene::street());
+  const auto timeOf = [&](std::size_t i) {
+    return 0.1 * static_cast<double>(i % sweep_of_lidar.width) / static_cast<double>(sweep_of_lidar.width);
+  };
+  const std::vector<std::size_t> holes = sweep_of_lidar.holes();
+  for (const double time_of_holes : {0.0, 1e30}) {  // what drivers write for points that are none
+    std::vector<double> times;
+    for (std::size_t i = 0; i < sweep_of_lidar.points.size(); ++i) times.push_back(timeOf(i));
+    for (const std::size_t i : holes) times[i] = time_of_holes;
+    sensor_msgs::PointCloud2 message =
+        cloud(sweep_of_lidar.points).add("t", PointField::FLOAT64, times).message();
+    message.width = static_cast<std::uint32_t>(sweep_of_lidar.width);
+    message.height = static_cast<std::uint32_t>(sweep_of_lidar.points.size() / sweep_of_lidar.width);
+    message.row_step = message.width * message.point_step;
+    input_.time_field = "t";
+    input_.clear_no_returns = true;
+    const PlacedScan read_scan = placed(message);
+    ASSERT_EQ(read_scan.scan.no_returns.size(), holes.size());
+    EXPECT_FALSE(read_scan.no_direction);
+    for (std::size_t i = 0; i < holes.size(); ++i) {
+      const auto yaw = static_cast<float>(timeOf(holes[i]));
+      const Eigen::Vector3f expected =
+          Eigen::AngleAxisf(yaw, Eigen::Vector3f::UnitZ()) * sweep_of_lidar.truth[holes[i]];
+      const Eigen::Vector3f& found = read_scan.scan.no_returns[i];
+      ASSERT_LT((found - expected).norm(), lidar.spacing()) << i;
+    }
+  }
 }
 
 TEST_F(Reader, CloudsOfOnePointAndOfTwoMillion) {

@@ -407,6 +407,32 @@ std::vector<CloudKind> valueKinds() {
            }
          }
        }},
+      {"value/infinite_ways",
+       "infinity times the direction of a point, in all coordinates",
+       {"mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         for (std::size_t p = 0; p < pointsOf(c); ++p) {
+           if (dice.oneIn(3)) continue;
+           for (const std::string& axis : kCoordinates) put(c, axis, p, 0, dice.between(-1.0, 1.0) * kInf);
+         }
+       }},
+      {"value/rings",
+       "a spinning lidar's rings as rows or columns, with beams without a return",
+       {"mapped"},
+       [](PointCloud2& c, Dice& dice) {
+         const bool columns = dice.oneIn(2);
+         const double tilt = dice.between(-1.0, 1.0), none = dice.oneOf<double>({kNan, 0.0, kInf});
+         const std::uint32_t most = 1 + static_cast<std::uint32_t>(dice.below(10));
+         for (std::size_t p = 0; p < pointsOf(c); ++p) {
+           const auto row = static_cast<double>(p / c.width), column = static_cast<double>(p % c.width);
+           const double e = 0.02 * (columns ? column : row) - 0.3, a = 0.1 * (columns ? row : column);
+           const double x = std::cos(a) * std::cos(e), z = std::sin(e), range = dice.between(0.0, 9.0);
+           const bool hole = dice.below(10) < most;
+           put(c, "x", p, 0, (hole ? none : range) * (x * std::cos(tilt) - z * std::sin(tilt)));
+           put(c, "y", p, 0, (hole ? none : range) * std::sin(a) * std::cos(e));
+           put(c, "z", p, 0, (hole ? none : range) * (x * std::sin(tilt) + z * std::cos(tilt)));
+         }
+       }},
   };
 }
 
