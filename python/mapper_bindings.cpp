@@ -14,6 +14,7 @@
 #include "core/frame_name.h"
 #include "io/label_watch.h"
 #include "map_bindings.h"
+#include "store/drive_overlap.h"
 
 namespace bki_mapping::python {
 namespace {
@@ -191,15 +192,10 @@ SharedMap snapshot(Mapper& self) {
   });
 }
 
-/// Adds a map, unless one of its drives is there already.
+/// Adds a map, unless its scans are there already.
 void addStored(Mapper& self, const StoredMap& added) {
-  for (const DriveRecord& drive : added.drives) {
-    const auto same = [&](const DriveRecord& known) { return known.id == drive.id; };
-    if (std::any_of(self.drives.begin(), self.drives.end(), same) ||
-        (self.drive.scans > 0 && same(self.drive))) {
-      throw std::invalid_argument("drive '" + drive.id + "' is in the map already");
-    }
-  }
+  checkNotAdded("the map", self.drives, added.drives);
+  if (self.drive.scans > 0) checkNotAdded("the map", {self.drive}, added.drives);
   self.mapper.addMap(added.map);
   self.drives.insert(self.drives.end(), added.drives.begin(), added.drives.end());
 }

@@ -29,7 +29,7 @@ MergeInput inputOf(py::handle input) {
 }
 
 py::dict merge(const py::iterable& inputs, py::handle output, bool keep_drives,
-               const std::vector<std::string>& without) {
+               const std::vector<std::string>& without, bool allow_overlap) {
   if (py::isinstance<py::str>(inputs)) throw py::type_error("inputs must be a list of map files, not one");
   MergeOptions options;
   for (const py::handle input : inputs) options.inputs.push_back(inputOf(input));
@@ -39,6 +39,7 @@ py::dict merge(const py::iterable& inputs, py::handle output, bool keep_drives,
   }
   options.keep_drives = keep_drives;
   options.without = without;
+  options.allow_overlap = allow_overlap;
   MergeReport report;
   {
     const py::gil_scoped_release release;
@@ -150,14 +151,16 @@ PYBIND11_MODULE(_core, m) {
   addSequence(m);
   addCity(m);
   m.def("merge", &merge, py::arg("inputs"), py::arg("output"), py::arg("keep_drives") = false,
-        py::arg("without") = std::vector<std::string>(),
+        py::arg("without") = std::vector<std::string>(), py::arg("allow_overlap") = false,
         "Merge map files into another one: the sum of the drives that are in any of them, each counted "
         "once.\n\n"
         "inputs: paths; or (path, translation, yaw) for a map that is turned by yaw [degrees], then moved by "
         "translation [m]; by whole voxels and multiples of 90 degrees this is exact.\n"
         "output: file to write (.bkm); may be one of the inputs.\n"
         "keep_drives: store each drive apart as well.\n"
-        "without: ids of drives to be left out.\n\n"
+        "without: ids of drives to be left out.\n"
+        "allow_overlap: also add drives that share scans by their ids, such as '04/000000-000009' and "
+        "'04/000000-000004'; these scans count twice.\n\n"
         "Returns a dict with drives, repeated, resampled, tiles, blocks and saturated. Raises ValueError if "
         "grids, classes or frames differ, MapFileError if a file cannot be read or written, or a drive "
         "cannot be counted once.");

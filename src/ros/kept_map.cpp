@@ -12,6 +12,7 @@
 
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "store/drive_overlap.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -269,13 +270,7 @@ void KeptMap::addMap(StoredMap map, bool replace) {
   }
   unsaved_ = true;
   if (keeper_) return keeper_->addMap(std::move(map.map), map.drives);
-  for (const DriveRecord& known : drives_) {
-    for (const DriveRecord& added : map.drives) {
-      if (known.id == added.id) {
-        throw std::invalid_argument("drive '" + added.id + "' is in the map already");
-      }
-    }
-  }
+  checkNotAdded("the map", drives_, map.drives);
   mapper_.addMap(std::move(map.map));
   drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
 }

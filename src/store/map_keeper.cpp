@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "bki_mapping/map/semantic_map.h"
+#include "store/drive_overlap.h"
 #include "store/tile_store.h"
 
 namespace bki_mapping {
@@ -63,8 +64,9 @@ struct MapKeeper::State {
         path(file.path()),
         drive(first_drive),
         edge(Region::kEdge * of.map().geometry().blockSize()) {
-    for (const DriveRecord& known : file.drives()) drives.insert(known.id);
-    if (!drives.insert(drive.id).second) {
+    drives = file.drives();
+    const auto is_same = [&](const DriveRecord& known) { return known.id == drive.id; };
+    if (std::any_of(drives.begin(), drives.end(), is_same)) {
       throw std::invalid_argument("the map in " + path + " already holds drive '" + drive.id +
                                   "'; give the new drive another id");
     }
@@ -231,8 +233,8 @@ struct MapKeeper::State {
   SemanticMapper& mapper;
   std::string path;
   DriveRecord drive;
-  double edge;                   ///< of a tile [m]
-  std::set<std::string> drives;  ///< ids of all drives in the map
+  double edge;                      ///< of a tile [m]
+  std::vector<DriveRecord> drives;  ///< the other drives in the map
   std::unique_ptr<TileStore> store;
   std::deque<TileStore::Arrival> arrivals;
   std::map<GridIndex, Tile> here;           ///< the tiles that are in memory, or have been requested
@@ -323,19 +325,15 @@ void MapKeeper::reset(const DriveRecord& drive) {
   s.moved.clear();
   s.mapper.reset();
   s.drive = drive;
-  s.drives = {drive.id};
+  s.drives.clear();
   s.reach = kEverything;
 }
 
 void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives) {
   State& s = *state_;
   s.mapper.map().checkAddable(other);
-  for (const DriveRecord& drive : drives) {
-    if (s.drives.count(drive.id) > 0) {
-      throw std::invalid_argument("the map in " + s.path + " already holds drive '" + drive.id +
-                                  "', which would count twice");
-    }
-  }
+  checkNotAdded("the map in " + s.path, s.drives, drives);
+  checkNotAdded("the map in " + s.path, {s.drive}, drives);
   for (const GridIndex& tile : other.regions()) {
     SemanticMap part = other.takeRegion(tile);
     if (s.here.count(tile) > 0) {
@@ -347,7 +345,7 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
     }
   }
   for (const DriveRecord& drive : drives) {
-    s.drives.insert(drive.id);
+    s.drives.push_back(drive);
     s.store->putDrive(drive);
   }
   s.must_sweep = true;

@@ -10,6 +10,7 @@
 
 #include "bki_mapping/store/map_file.h"
 #include "store/drive_cover.h"
+#include "store/drive_overlap.h"
 #include "store/summand.h"
 
 namespace bki_mapping {
@@ -95,6 +96,39 @@ void checkSameDrives(const Records& records) {
       throw notTheSame(id, first_file->file.path(), file->file.path(),
                        "it has " + std::to_string(first.scans) + " scans in the one and " +
                            std::to_string(record.scans) + " in the other, or other stamps");
+    }
+  }
+}
+
+/// Drives in one file have been added knowingly.
+bool areInOneFile(const Records::mapped_type& a, const Records::mapped_type& b) {
+  return std::any_of(a.begin(), a.end(), [&](const auto& of_a) {
+    return std::any_of(b.begin(), b.end(), [&](const auto& of_b) { return of_a.first == of_b.first; });
+  });
+}
+
+/// Checks that drives in different files share no scans. @param wanted the ids of the drives that count.
+void checkNoSharedScans(const Records& records, const DriveSet& wanted) {
+  std::map<std::string, std::vector<std::pair<ScanRange, const Records::value_type*>>> sequences;
+  for (const Records::value_type& record : records) {
+    const auto scans = scansOf(record.first);
+    if (scans && wanted.count(record.first) > 0) sequences[scans->sequence].emplace_back(*scans, &record);
+  }
+  for (auto& [sequence, drives] : sequences) {
+    std::sort(drives.begin(), drives.end(),
+              [](const auto& a, const auto& b) { return a.first.first < b.first.first; });
+    for (auto a = drives.begin(); a != drives.end(); ++a) {
+      for (auto b = a + 1; b != drives.end() && b->first.first <= a->first.last; ++b) {
+        const auto& [id, found] = *a->second;
+        const auto& [other_id, other_found] = *b->second;
+        const auto shared = sharedScans(found.front().second, other_found.front().second);
+        if (!shared || areInOneFile(found, other_found)) continue;
+        throw MapFileError("by their ids, drive '" + id + "' in " + found.front().first->file.path() +
+                           " and drive '" + other_id + "' in " + other_found.front().first->file.path() +
+                           " share " + textOf(*shared) +
+                           ", which would count twice; leave one of the drives out (--without), or, if they "
+                           "are different scans, go on with --allow-overlap");
+      }
     }
   }
 }
@@ -280,6 +314,7 @@ MergeReport mergeMaps(const MergeOptions& options) {
   std::set_difference(all.begin(), all.end(), without.begin(), without.end(),
                       std::inserter(wanted, wanted.end()));
   checkSameDrives(records);
+  if (!options.allow_overlap) checkNoSharedScans(records, wanted);
   const std::vector<Group> groups = choose(groupsOf(files), wanted, without, options.keep_drives);
 
   MergeReport report;

@@ -8,6 +8,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_merge.h"
+#include "core/counted.h"
 #include "tools/options.h"
 
 namespace {
@@ -24,6 +25,8 @@ po::options_description options() {
       "keep-drives", po::bool_switch(), "also store each drive separately, so that it can be taken out")(
       "without", po::value<Words>()->value_name("DRIVE")->composing(),
       "leave a drive out, by its id; repeatable")(
+      "allow-overlap", po::bool_switch(),
+      "also add drives that share scans by their ids, which count twice then")(
       "tiles", po::value<std::string>()->value_name("X0,Y0,X1,Y1"),
       "write only the tiles whose indices x and y are between these, which are included; a tile is a cube of "
       "64 voxels")(
@@ -93,6 +96,7 @@ MergeOptions mergeOptions(const po::variables_map& given) {
   }
   options.keep_drives = given["keep-drives"].as<bool>();
   options.without = words(given, "without");
+  options.allow_overlap = given["allow-overlap"].as<bool>();
   if (given.count("tiles")) options.columns = parseColumns(given["tiles"].as<std::string>());
   for (const std::string& text : words(given, "transform")) {
     const auto [path, placement] = parsePlacement(text);
@@ -107,10 +111,6 @@ MergeOptions mergeOptions(const po::variables_map& given) {
     if (!found) throw std::invalid_argument("--transform names " + path + ", which is none of the maps");
   }
   return options;
-}
-
-std::string counted(std::uint64_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
 int mergeFiles(const po::variables_map& given) {

@@ -339,7 +339,7 @@ class Files(WithFolder):
         self.assertEqual(evidence_of(a.map), expected)
         self.assertEqual(sorted(drive.id for drive in a.map.drives), ['a', 'b'])
         for again in (lambda: a.add(b.map), lambda: b.load(self.path('b.bkm')), lambda: a.load(self.path('a.bkm'))):
-            with self.assertRaisesRegex(ValueError, "drive '[ab]' is in the map already"):
+            with self.assertRaisesRegex(ValueError, "the map already holds drive '[ab]'"):
                 again()
         self.assertEqual(evidence_of(a.map), expected)
 

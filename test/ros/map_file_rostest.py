@@ -134,7 +134,7 @@ class MapFile(unittest.TestCase):
         self.assertEqual(self.saved(mapper, self.path('loaded.bkm')), content(self.first_half))
         answer = mapper.call('load_map', LoadMap, self.first_half, True)
         self.assertFalse(answer.success)
-        self.assertIn('is in the map already', answer.message)
+        self.assertIn('which would count twice', answer.message)
         mapper.map(PLACES[len(PLACES) // 2:])
         self.assertEqual(self.saved(mapper, self.path('loaded.bkm')), content(self.whole))
         for path, what in ((self.path('none.bkm'), 'none.bkm'), ('relative.bkm', 'absolute'), (self.folder, 'regular file')):

@@ -13,6 +13,7 @@
 
 #include "bki_mapping/map/voxel_state.h"
 #include "reference/content.h"
+#include "store/drive_overlap.h"
 #include "store/grid_transform.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
@@ -214,6 +215,76 @@ TEST_F(MapMerge, CountsADriveOnce) {
   EXPECT_EQ(merge({b, ab, a}, folder_ / "c").repeated, (std::vector<std::string>{"a", "b"}));
   EXPECT_TRUE(bytesOf(folder_ / "c") == once);
   expectHolds(folder_ / "c", "ab");
+}
+
+TEST(DriveOverlap, IdsNameScans) {
+  const auto text = [](const std::string& id) {
+    const auto scans = scansOf(id);
+    return scans ? textOf(*scans) : "none";
+  };
+  EXPECT_EQ(text("04/000000-000009"), "scans 000000 to 000009 of 04");
+  EXPECT_EQ(text("a/04/3-3"), "scan 000003 of a/04");
+  EXPECT_EQ(text("friday#000020+20"), "scans 000020 to 000039 of friday");
+  EXPECT_EQ(text("no#1/000000-000001"), "scans 000000 to 000001 of no#1");
+  for (const char* other :
+       {"", "04", "04/", "04/7", "04/9-3", "04/a-b", "04/1-2x", "04/-1-2", "04/1-", "d#3+0",
+        "d#18446744073709551615+2", "d#99999999999999999999+1", "0ff5d2bc-7c04-4c4e-9b71-2a5c8d3e1f00"}) {
+    EXPECT_EQ(text(other), "none") << other;
+  }
+}
+
+/// Parts of drives, with ids and times as map_sequence gives them at 10 scans a second.
+class PartsOfDrives : public MapMerge {
+ protected:
+  std::string part(const std::string& name, const std::string& sequence, int first, int last,
+                   double start = 1.0) {
+    DriveRecord drive = driveOf(id(sequence, first, last));
+    drive.scans = static_cast<std::uint64_t>(last - first + 1);
+    drive.first_stamp = static_cast<std::uint64_t>(1e9 * (start + 0.1 * first));
+    drive.last_stamp = static_cast<std::uint64_t>(1e9 * (start + 0.1 * last));
+    saveMap(folder_ / name, infoOf(), {drive}, mapOf(name[0]));
+    return folder_ / name;
+  }
+  static std::string id(const std::string& sequence, int first, int last) {
+    return sequence + "/00000" + std::to_string(first) + "-00000" + std::to_string(last);
+  }
+  void mergeAnyway(const std::vector<std::string>& inputs, const std::string& output) {
+    MergeOptions options;
+    for (const std::string& input : inputs) options.inputs.push_back({input, std::nullopt});
+    options.output = output;
+    options.allow_overlap = true;
+    mergeMaps(options);
+  }
+};
+
+TEST_F(PartsOfDrives, ScansAreNotCountedTwice) {
+  const std::string a = part("a", "04", 0, 9), b = part("b", "04", 0, 4);
+  EXPECT_EQ(refusal({a, b}),
+            "by their ids, drive '04/000000-000004' in " + b + " and drive '04/000000-000009' in " + a +
+                " share scans 000000 to 000004 of 04, which would count twice; leave one of the drives out "
+                "(--without), or, if they are different scans, go on with --allow-overlap");
+  EXPECT_NE(refusal({b, a}, true).find("share scans 000000 to 000004"), std::string::npos);
+  EXPECT_NE(refusal({a, part("c", "04", 9, 9)}).find("share scan 000009 of 04"), std::string::npos);
+  EXPECT_NE(refusal({part("d", "04", 0, 1), part("e", "04", 3, 5), part("f", "04", 5, 8)})
+                .find("share scan 000005 of 04"),
+            std::string::npos);
+  const std::string both = folder_ / "both";
+  mergeAnyway({a, b}, both);
+  expectHolds(both, "ab");
+  merge({both}, folder_ / "again");  // allowed once
+  merge({both, a, b}, folder_ / "again");
+  expectHolds(folder_ / "again", "ab");
+}
+
+TEST_F(PartsOfDrives, OtherPartsAreAdded) {
+  const std::string a = part("a", "04", 0, 4), b = part("b", "04", 5, 9), c = part("c", "04", 0, 9),
+                    d = part("d", "05", 0, 9), later = part("e", "04", 0, 9, 1000.0);
+  merge({b, a, d}, folder_ / "sum");
+  expectHolds(folder_ / "sum", "abd");
+  merge({a, later}, folder_ / "sum");  // another recording in a folder of the same name
+  expectHolds(folder_ / "sum", "ae");
+  merge({a, b, c}, folder_ / "sum", false, {id("04", 0, 9)});
+  expectHolds(folder_ / "sum", "ab");
 }
 
 TEST_F(MapMerge, RefusesToCountADriveTwice) {

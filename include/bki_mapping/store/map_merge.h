@@ -39,6 +39,8 @@ struct MergeOptions {
   std::string output;                ///< may be one of the inputs
   bool keep_drives = false;          ///< also stores each drive separately, as far as the inputs allow
   std::vector<std::string> without;  ///< ids of the drives to leave out
+  /// Also adds drives that share scans by their ids, such as 04/000000-000009 and 04/000000-000004.
+  bool allow_overlap = false;
   /// Only these tiles of the result; all of them without a value. The result lists all drives even so.
   std::optional<TileColumns> columns;
   /// Called with the number of tiles done, and of all.
@@ -61,7 +63,8 @@ struct MergeReport {
 /// Placements by whole voxels and multiples of 90 degrees are exact. With others, each voxel takes the
 /// evidence of the voxel that contains its centre, so that some evidence is doubled or lost.
 /// @throws MapFileError if a file cannot be read or written, or if a drive differs between two inputs, cannot
-/// be counted once, or cannot be left out; std::invalid_argument if grids, classes or frames differ, a
+/// be counted once, or cannot be left out, or if drives of different inputs share scans by their ids;
+/// std::invalid_argument if grids, classes or frames differ, a
 /// placement is not finite or moves blocks beyond GridGeometry::kMaxCoordinate, or no input contains a drive
 /// that is to be left out.
 MergeReport mergeMaps(const MergeOptions& options);
