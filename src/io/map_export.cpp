@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "bki_mapping/io/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
 #include "io/voxel_pcl.h"
@@ -71,6 +72,10 @@ std::string endingOf(const std::string& path) {
   return std::filesystem::path(path).extension().string();
 }
 
+bool holdsPoints(const std::string& path) {
+  return endingOf(path) == ".ply" || endingOf(path) == ".pcd";
+}
+
 }  // namespace
 
 VoxelStates parseStates(const std::string& list) {
@@ -104,16 +109,17 @@ Eigen::Vector3d pcdOrigin(const SemanticMap& map) {
   return floatOrigin(placeOf(map.geometry(), sortedBlocks(map)), map.geometry().resolution());
 }
 
-void checkExportName(const std::string& path) {
-  const std::string ending = endingOf(path);
-  if (ending != ".ply" && ending != ".pcd") {
-    throw std::invalid_argument("map file '" + path + "' must end in .ply or .pcd");
+void checkMapName(const std::string& path) {
+  if (!isMapFileName(path) && !holdsPoints(path)) {
+    throw std::invalid_argument(
+        "map file '" + path +
+        "' must end in .bkm, which holds all of a map, or in .ply or .pcd, which hold its voxels as points");
   }
 }
 
 void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
                const VoxelStates& states) {
-  checkExportName(path);
+  if (!holdsPoints(path)) throw std::invalid_argument("point file '" + path + "' must end in .ply or .pcd");
   AtomicFile file(path);
   file.write(bytesOf(endingOf(path), map, classes, states));
   file.commit();

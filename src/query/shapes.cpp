@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "bki_mapping/core/named_parameter.h"
 #include "query/voxel_rows.h"
 
 namespace bki_mapping {
@@ -26,14 +27,15 @@ void check(const GridGeometry& geometry, const Eigen::Vector3d& low, const Eigen
   }
   const double voxels = ((high - low).array() / geometry.resolution() + 1.0).prod();
   if (voxels > kMostShapeVoxels) {
-    refuse(" spans " + std::to_string(voxels) + " voxels; split it, 100 million are the most");
+    refuse(" spans " + numberText(std::round(voxels)) + " voxels; split it, 100 million are the most");
   }
 }
 
+/// @param size what messages call the sizes. @param name called as name() for what they call the shape.
 template <typename Name>
-void checkSizes(const Eigen::Vector3d& half_extents, Name&& name) {
-  if ((half_extents.array() > 0.0).all() && half_extents.allFinite()) return;
-  throw std::invalid_argument(name() + " has a half extent that is not a number > 0; give metres > 0");
+void checkSizes(const Eigen::Vector3d& sizes, const char* size, Name&& name) {
+  if ((sizes.array() > 0.0).all() && sizes.allFinite()) return;
+  throw std::invalid_argument(name() + " has a " + size + " that is not a number > 0; give metres > 0");
 }
 
 std::string theBox() {
@@ -113,7 +115,7 @@ void read(const StateMap& states, const Eigen::AlignedBox3d& box, ContentReader&
 template <typename Name>
 void read(const StateMap& states, const Sphere& sphere, ContentReader& reader, Name&& name) {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(sphere.radius);
-  checkSizes(reach, name);
+  checkSizes(reach, "radius", name);
   check(states.geometry(), sphere.centre - reach, sphere.centre + reach, name);
   const double resolution = states.geometry().resolution();
   forEachRow(sphere.centre / resolution, sphere.radius / resolution,
@@ -166,7 +168,7 @@ SpaceContent contentOf(const StateMap& states, const Sphere& sphere) {
 }
 
 SpaceContent contentOf(const StateMap& states, const OrientedBox& box) {
-  checkSizes(box.half_extents, theBox);
+  checkSizes(box.half_extents, "half extent", theBox);
   return contentOfOne(states, box, theBox);
 }
 
@@ -184,7 +186,7 @@ void contentsOf(const StateMap& states, Span<const Sphere> spheres, Span<SpaceCo
 
 void contentsAlong(const StateMap& states, const OrientedBox& box,
                    Span<const Eigen::Isometry3d> T_map_vehicle, Span<SpaceContent> contents) {
-  checkSizes(box.half_extents, theBox);
+  checkSizes(box.half_extents, "half extent", theBox);
   const auto there = [&](std::size_t n) {
     return OrientedBox{T_map_vehicle[n] * box.T_map_box, box.half_extents};
   };

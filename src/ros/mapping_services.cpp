@@ -4,6 +4,7 @@
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/io/tiled_map.h"
+#include "core/counted.h"
 #include "ros/mapping_server.h"
 #include "ros/queued_call.h"
 #include "ros/service_answer.h"
@@ -91,16 +92,13 @@ bool MappingServer::onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQu
   try {
     if (a.hasNaN() || b.hasNaN())
       throw std::invalid_argument("a corner of the box is not a number; correct it");
-    if ((a.array() > b.array()).any()) {
-      throw std::invalid_argument("a coordinate of min is above that of max; exchange them");
-    }
-    const std::vector<GridIndex> changed = kept_->clearBox({a, b});
+    const std::vector<GridIndex> changed = kept_->clearBox({a.cwiseMin(b), a.cwiseMax(b)});
     mapChanged(changed);
-    ROS_INFO("clear_bbx: cleared in %lu blocks", changed.size());
+    ROS_INFO("clear_bbx: cleared in %s", counted(changed.size(), "block").c_str());
     return true;
   } catch (const std::exception& fault) {
-    ROS_ERROR("clear_bbx: %s", fault.what());
-    return false;
+    // roscpp logs it, and sends it to the caller.
+    throw std::runtime_error(std::string("clear_bbx: ") + fault.what());
   }
 }
 
@@ -131,6 +129,7 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
       saveMapFile(request.path);
       return "wrote " + request.path;
     }
+    checkMapName(request.path);
     const std::string include = request.include.empty() ? "occupied" : request.include;
     const VoxelStates states = parseStates(include);
     const std::shared_ptr<const MapSnapshot> snapshot = askForSnapshot();
@@ -155,8 +154,8 @@ bool MappingServer::onLoadMap(LoadMap::Request& request, LoadMap::Response& resp
     checkFits(file, needed.info);
     auto stored =
         std::make_shared<StoredMap>(readMap(file, static_cast<std::size_t>(1e6 * needed.memory_limit)));
-    const std::string what = std::to_string(stored->map.size()) + " blocks of " +
-                             std::to_string(stored->drives.size()) + " drives from " + request.path;
+    const std::string what = counted(stored->map.size(), "block") + " of " +
+                             counted(stored->drives.size(), "drive") + " from " + request.path;
     QueuedCall<bool>::ask(queue_, [&] {
       kept_->addMap(std::move(*stored), !request.add);
       if (!request.add) trajectory_.clear();

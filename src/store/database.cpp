@@ -27,6 +27,12 @@ constexpr int kLargestValue = 300'000'000;  ///< larger than the largest tile [b
 constexpr std::size_t kLongestQuote = 300;
 constexpr char kBusy[] = " is open in another place; close it there, or work on a copy of the file";
 
+constexpr char kOtherName[] = "give the name of a .bkm file";
+
+bool endsAsAMap(const std::string& path) {
+  return std::filesystem::path(path).extension() == ".bkm";
+}
+
 /// Whether memory is available although SQLite reports a shortage, as it also does for impossible lengths.
 bool canAllocate(std::size_t bytes) {
   void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -48,7 +54,7 @@ bool canAllocate(std::size_t bytes) {
     case SQLITE_INTERRUPT:
       throw damaged(path, "its pages contain each other");
     case SQLITE_NOTADB:
-      throw MapFileError(path + " is not a map of bki_mapping; give the name of a .bkm file");
+      throw notAMap(path);
     case SQLITE_CANTOPEN:
       throw MapFileError(path + " cannot be opened: " + reason + "; check name and rights");
     case SQLITE_FULL:
@@ -109,6 +115,12 @@ MapFileDamaged damaged(const std::string& path, const std::string& what) {
   return MapFileDamaged(path + " is damaged (" + quoted + "); use another copy of it");
 }
 
+MapFileError notAMap(const std::string& path) {
+  const std::string is = path + " is not a map of bki_mapping";
+  return MapFileError(endsAsAMap(path) ? is + ", although its name ends in .bkm; use another copy of it"
+                                       : is + "; " + kOtherName);
+}
+
 void Database::Close::operator()(sqlite3* database) const {
   sqlite3_close_v2(database);
 }
@@ -117,7 +129,11 @@ Database::Database(const std::string& path, Mode mode, const std::string& name)
     : name_(name), mode_(mode), work_(std::make_unique<Work>()) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
-    throw MapFileError(name_ + " is not a regular file; give the name of a .bkm file");
+    throw MapFileError(name_ + " is not a regular file; " + kOtherName);
+  }
+  if (mode != Mode::kNew && S_ISREG(status.st_mode) && status.st_size == 0) {
+    throw MapFileError(name_ + " is empty; " +
+                       (endsAsAMap(name_) ? "use another copy of it, or make the map again" : kOtherName));
   }
   sqlite3* opened = nullptr;
   // An absolute path has no special meaning to SQLite; "file:x" and ":memory:" do.

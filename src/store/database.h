@@ -111,5 +111,7 @@ class Database {
 
 /// "PATH is damaged (WHAT); use another copy of it"
 MapFileDamaged damaged(const std::string& path, const std::string& what);
+/// The error for a file of another format.
+MapFileError notAMap(const std::string& path);
 
 }  // namespace bki_mapping

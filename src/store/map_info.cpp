@@ -1,15 +1,28 @@
 #include "bki_mapping/store/map_file.h"
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
+
+#include "bki_mapping/core/named_parameter.h"
 
 namespace bki_mapping {
 namespace {
 
-template <typename T>
-std::string textOf(const T& value) {
+std::string textOf(const std::string& value, const std::string&) {
+  return value;
+}
+std::string textOf(int value, int) {
+  return std::to_string(value);
+}
+std::string textOf(std::size_t value, std::size_t) {
+  return std::to_string(value);
+}
+/// With all digits only where two values differ in no others.
+std::string textOf(double value, double other) {
+  if (numberText(value) != numberText(other)) return numberText(value);
   std::ostringstream text;
-  text.precision(17);
+  text.precision(std::numeric_limits<double>::max_digits10);
   text << value;
   return text.str();
 }
@@ -18,8 +31,9 @@ template <typename T>
 void checkSame(const std::string& what, const std::string& name, const T& value,
                const std::string& other_name, const T& other) {
   if (value == other) return;
-  throw std::invalid_argument(what + " of " + name + " is " + textOf(value) + " and that of " + other_name +
-                              " is " + textOf(other) + "; maps can only be added if they agree");
+  throw std::invalid_argument(what + " of " + name + " is " + textOf(value, other) + " and that of " +
+                              other_name + " is " + textOf(other, value) +
+                              "; maps can only be added if they agree");
 }
 
 /// The names of classes by id, since the order in the table does not matter.

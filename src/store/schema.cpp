@@ -68,7 +68,7 @@ std::int64_t checkIdentity(const Database& database) {
   const Database::Header header = database.header();
   if (std::memcmp(header.data(), kMagic, sizeof kMagic) != 0 ||
       bigEndian(header, kApplication, 4) != kApplicationId) {
-    throw MapFileError(database.name() + " is not a map of bki_mapping; give the name of a .bkm file");
+    throw notAMap(database.name());
   }
   const std::int64_t version = bigEndian(header, kUserVersion, 4);
   if (version > kFormatVersion) {

@@ -4,6 +4,7 @@
 
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_file.h"
+#include "core/counted.h"
 #include "tools/options.h"
 
 namespace {
@@ -27,7 +28,8 @@ int clearFile(const po::variables_map& given) {
   if (!isMapFileName(output))
     throw std::invalid_argument("the cleared map, " + output + ", must end in .bkm");
   const ClearedFile cleared = clearBoxOfFile(path, tools::parseBox(given["box"].as<std::string>()), output);
-  std::cout << output << ": cleared in " << cleared.blocks << " blocks of " << cleared.tiles << " tiles\n";
+  std::cout << output << ": cleared in " << counted(cleared.blocks, "block") << " of "
+            << counted(cleared.tiles, "tile") << "\n";
   return 0;
 }
 

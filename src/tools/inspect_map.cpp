@@ -8,10 +8,12 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/mapper_file.h"
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "io/map_picture.h"
 #include "io/map_statistics.h"
 #include "tools/options.h"
@@ -40,6 +42,16 @@ Json boxJson(const Eigen::AlignedBox3d& box) {
   return {{"min", {low.x(), low.y(), low.z()}}, {"max", {high.x(), high.y(), high.z()}}};
 }
 
+/// The drives by their first scans, since ids may be random; those without scans come last.
+std::vector<DriveRecord> drivesByTime(MapFile& file) {
+  std::vector<DriveRecord> drives = file.drives();
+  std::sort(drives.begin(), drives.end(), [&](const DriveRecord& a, const DriveRecord& b) {
+    if ((a.scans == 0) != (b.scans == 0)) return b.scans == 0;
+    return std::tie(a.first_stamp, a.id) < std::tie(b.first_stamp, b.id);
+  });
+  return drives;
+}
+
 Json driveJson(const DriveRecord& drive) {
   return {{"id", drive.id},
           {"name", drive.name},
@@ -61,7 +73,7 @@ Json statisticsJson(MapFile& file, const MapStatistics& found) {
     const auto count = found.occupied_by_class.find(c.id);
     by_class[c.name] = count == found.occupied_by_class.end() ? 0 : count->second;
   }
-  for (const DriveRecord& drive : file.drives()) drives.push_back(driveJson(drive));
+  for (const DriveRecord& drive : drivesByTime(file)) drives.push_back(driveJson(drive));
   const Json per_voxel = found.known() > 0 ? Json(bytesPerVoxel(file, found)) : Json();
   return {{"file", file.path()},
           {"program", info.program},
@@ -88,7 +100,7 @@ std::string timeText(std::uint64_t stamp) {
 }
 
 void printDrive(std::ostream& out, const DriveRecord& drive) {
-  out << "  " << drive.id << ": " << drive.scans << " scans";
+  out << "  " << drive.id << ": " << counted(drive.scans, "scan");
   if (drive.scans > 0) {
     out << ", from " << timeText(drive.first_stamp) << ", "
         << 1e-9 * static_cast<double>(drive.last_stamp - drive.first_stamp) << " s";
@@ -112,7 +124,7 @@ void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
     out << " m\n";
   }
   out << "voxels: " << found.occupied << " occupied, " << found.free << " free, " << found.occluded
-      << " occluded; " << found.blocks << " blocks in " << found.tiles << " tiles\n"
+      << " occluded; " << counted(found.blocks, "block") << " in " << counted(found.tiles, "tile") << "\n"
       << "size: " << static_cast<double>(file.size().bytes) / 1e6 << " MB in the file, "
       << static_cast<double>(found.memory_bytes) / 1e6 << " MB in memory";
   if (found.known() > 0) {
@@ -120,7 +132,7 @@ void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
         << " bytes of the file for each known voxel" << std::setprecision(1);
   }
   out << "\ndrives:\n";
-  for (const DriveRecord& drive : file.drives()) printDrive(out, drive);
+  for (const DriveRecord& drive : drivesByTime(file)) printDrive(out, drive);
   out << "occupied voxels by class:\n";
   for (const auto& [id, count] : found.occupied_by_class) {
     const SemanticClass* known = info.classes->find(id);

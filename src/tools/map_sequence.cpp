@@ -11,6 +11,7 @@
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "io/cleaned_points.h"
 #include "io/label_watch.h"
 #include "tools/options.h"
@@ -89,9 +90,7 @@ int mapSequence(const po::variables_map& given) {
     return 0;
   }
   const auto states = parseStates(given["include"].as<std::string>());
-  if (given.count("output") && !isMapFileName(given["output"].as<std::string>())) {
-    checkExportName(given["output"].as<std::string>());
-  }
+  if (given.count("output")) checkMapName(given["output"].as<std::string>());
   if (given.count("points")) checkPointFileName(given["points"].as<std::string>());
   for (const char* file : {"output", "points", "report"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
@@ -148,7 +147,8 @@ int mapSequence(const po::variables_map& given) {
     writeTextFile(given["report"].as<std::string>(), tools::reportJson(mapper, scans));
   std::cout << tools::summaryText(mapper, scans);
   if (refused > 0) {
-    std::cerr << "map_sequence: " << refused << " of " << last - first << " scans were refused\n";
+    std::cerr << "map_sequence: " << refused << " of " << counted(last - first, "scan")
+              << (refused == 1 ? " was" : " were") << " refused\n";
   }
   return refused > 0 ? 1 : 0;
 }

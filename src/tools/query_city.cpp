@@ -8,6 +8,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/tiled_map.h"
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "core/stopwatch.h"
 #include "io/map_picture.h"
 #include "io/map_statistics.h"
@@ -34,7 +35,9 @@ po::options_description options() {
       "count the voxels in a box: two opposite corners, in the map frame [m]; inf and -inf are allowed")(
       "section", po::value<double>()->value_name("Z"),
       "of the box, only the layer of voxels at this height [m]")(
-      "top", text("FILE.png"), "draw the box as seen from above; with --section, the section");
+      "top", text("FILE.png"), "draw the box as seen from above; with --section, the section")(
+      "cost", po::bool_switch(),
+      "also say, on standard error, how many tiles and files were read, and how long all took");
   tools::addMemoryLimit(options);
   return options;
 }
@@ -105,7 +108,8 @@ void askBox(TiledMap& map, const po::variables_map& given) {
   if (!bounds.isEmpty()) printBounds("known:", bounds);
   for (const auto& [name, count] :
        {std::make_pair("occupied", found.occupied), {"free", found.free}, {"occluded", found.occluded}}) {
-    std::cout << name << ": " << count << " voxels, " << volume * static_cast<double>(count) << " m3\n";
+    std::cout << name << ": " << counted(count, "voxel") << ", " << volume * static_cast<double>(count)
+              << " m3\n";
   }
   for (const auto& [id, count] : found.occupied_by_class) {
     std::cout << "  " << stored.info.classes->nameOf(id) << ": " << count << "\n";
@@ -127,8 +131,9 @@ void describe(TiledMap& map) {
   }
   if (MapFile* const file = map.file()) bytes = file->size().bytes;
   const MapInfo& info = map.info();
-  std::cout << map.path() << ": " << map.tileCount() << " tiles in " << map.fileCount() << " files, "
-            << std::fixed << std::setprecision(1) << static_cast<double>(bytes) / 1e6 << " MB\n"
+  std::cout << map.path() << ": " << counted(map.tileCount(), "tile") << " in "
+            << counted(map.fileCount(), "file") << ", " << std::fixed << std::setprecision(1)
+            << static_cast<double>(bytes) / 1e6 << " MB\n"
             << "frame " << info.frame << ", resolution " << numberText(info.resolution) << " m, class table "
             << info.classes->name() << "\n";
   if (!bounds.isEmpty()) printBounds("known:", bounds);
@@ -166,10 +171,11 @@ int query(const po::variables_map& given) {
   } else {
     describe(map);
   }
+  if (!given["cost"].as<bool>()) return 0;
   const TiledMap::Reading reading = map.reading();
-  std::cerr << "read " << reading.tiles << " of " << map.tileCount() << " tiles, in " << reading.files
-            << " of " << map.fileCount() << " files; " << std::fixed << std::setprecision(1) << watch.lap()
-            << " ms\n";
+  std::cerr << "read " << reading.tiles << " of " << counted(map.tileCount(), "tile") << ", in "
+            << reading.files << " of " << counted(map.fileCount(), "file") << "; " << std::fixed
+            << std::setprecision(1) << watch.lap() << " ms\n";
   return 0;
 }
 

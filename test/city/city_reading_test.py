@@ -20,7 +20,7 @@ import small_city  # noqa: E402
 
 BIN = pathlib.Path(os.environ['BKI_MAPPING_BIN'])
 CAR = 1  # in the class table semantic_kitti
-READ = re.compile(r'read (\d+) of (\d+) tiles, in (\d+) of (\d+) files; [0-9.]+ ms\n')
+READ = re.compile(r'read (\d+) of (\d+) tiles?, in (\d+) of (\d+) files?; [0-9.]+ ms\n')
 
 
 class City(unittest.TestCase):
@@ -141,7 +141,7 @@ class CityReading(City):
         for region in self.index['regions']:
             if region is not kept:
                 (copy / region['file']).write_text('rubbish')
-        result = self.succeeds('query_city', copy, '--point', '5 2 -1.5')
+        result = self.succeeds('query_city', copy, '--point', '5 2 -1.5', '--cost')
         self.assertEqual(result.stdout, self.succeeds('query_city', self.whole, '--point', '5,2,-1.5').stdout)
         tiles = sum(region['tiles'] for region in self.index['regions'])
         self.assertEqual([int(n) for n in READ.fullmatch(result.stderr).groups()], [1, tiles, 1, len(self.index['regions'])])
@@ -188,12 +188,13 @@ class CityReading(City):
         self.assertIn(f'\noccupied: {len(inside)} voxels, ', layer.stdout)
 
     def test_a_city_is_described(self):
-        result = self.succeeds('query_city', self.city)
+        self.assertEqual(self.succeeds('query_city', self.city).stderr, '', 'the cost is told on demand')
+        result = self.succeeds('query_city', self.city, '--cost')
         self.assertRegex(result.stdout, rf'city: \d+ tiles in {len(self.index["regions"])} files, [0-9.]+ MB\n'
                                         'frame map, resolution 0.3 m, ')
         self.assertTrue(result.stdout.endswith('drives:\n  d1/000000-000004\n  d2/000000-000004\n'), result.stdout)
         self.assertEqual(READ.fullmatch(result.stderr)[1], '0')
-        self.assertIn('tiles in 1 files', self.succeeds('query_city', self.whole).stdout)
+        self.assertIn('tiles in 1 file, ', self.succeeds('query_city', self.whole).stdout)
 
     def test_wrong_questions_are_refused(self):
         for words, arguments in (

@@ -203,10 +203,10 @@ TEST_F(Shapes, RefusesWhatIsNoShape) {
   expectRefused("the box reaches beyond the map's grid; cut it to where the map is", [&] {
     box({0, 0, 0}, {1, 1, 1e9});
   });
-  expectRefused("the box spans 1003003001.000000 voxels; split it, 100 million are the most", [&] {
+  expectRefused("the box spans 1003003001 voxels; split it, 100 million are the most", [&] {
     box({0, 0, 0}, {250, 250, 250});
   });
-  expectRefused("the sphere has a half extent that is not a number > 0; give metres > 0", [&] {
+  expectRefused("the sphere has a radius that is not a number > 0; give metres > 0", [&] {
     contentOf(states, Sphere{{0, 0, 0}, -1.0});
   });
   OrientedBox oriented = {Eigen::Isometry3d::Identity(), {1, 1, 0}};
@@ -222,7 +222,7 @@ TEST_F(Shapes, RefusesWhatIsNoShape) {
                std::invalid_argument);
   std::vector<Sphere> spheres(70, Sphere{{0, 0, 0}, 0.1});
   spheres[65].radius = kNan;
-  expectRefused("sphere 65 has a half extent that is not a number > 0; give metres > 0",
+  expectRefused("sphere 65 has a radius that is not a number > 0; give metres > 0",
                 [&] { contentsOf(states, spheres, contents); });
   const std::vector<Eigen::AlignedBox3d> boxes(69, {Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones()});
   expectRefused("there are 69 boxes and room for 70 contents; give as many contents as boxes",

@@ -6,6 +6,7 @@
 // (default 2000), or BKI_MAPPING_HOSTILE_SECONDS: duration. BKI_MAPPING_HOSTILE_SETTINGS: use only this set
 // of settings. BKI_MAPPING_HOSTILE_JOURNAL: file to which the kind of each message is written before it is
 // sent.
+#include <bki_mapping/BoundingBoxQuery.h>
 #include <bki_mapping/MappingStatus.h>
 #include <bki_mapping/SaveMap.h>
 #include <dynamic_reconfigure/Reconfigure.h>
@@ -22,6 +23,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -322,6 +324,7 @@ class Attack {
     if (kind.name == "deed/reset") return callEmpty("reset");
     if (kind.name == "deed/publish_map") return callEmpty("publish_map");
     if (kind.name == "deed/include") return include();
+    if (kind.name == "deed/clear_box") return clearBox();
     if (kind.name == "deed/listeners") return listeners_.change(dice_);
     if (kind.name == "deed/reload") return reload();
     ADD_FAILURE() << kind.name << " is not done";
@@ -381,6 +384,20 @@ class Attack {
         dice_.oneOf<std::string>({"occupied", ",", "nothing", many, std::string("free\0", 5)});
     EXPECT_TRUE(mapper_.call("save_map", save)) << where();
     EXPECT_GT(save.response.message.size(), 10u) << where();
+  }
+  void clearBox() {
+    BoundingBoxQuery clear;
+    geometry_msgs::Point &a = clear.request.min, &b = clear.request.max;
+    bool wrong = false;
+    for (double* const coordinate : {&a.x, &a.y, &a.z, &b.x, &b.y, &b.z}) {
+      constexpr double kInf = std::numeric_limits<double>::infinity();
+      *coordinate =
+          dice_.oneIn(2) ? dice_.between(-5.0, 5.0) : dice_.oneOf<double>({1e300, -1e9, kInf, -kInf, 0.0});
+      if (!dice_.oneIn(12)) continue;
+      *coordinate = std::numeric_limits<double>::quiet_NaN();
+      wrong = true;
+    }
+    EXPECT_EQ(mapper_.call("clear_bbx", clear), !wrong) << where();
   }
   void reload() {
     for (int n = 0; n < 5; ++n) publish(changedCloud(cloudKinds().front()));

@@ -190,10 +190,10 @@ class MapFile(unittest.TestCase):
         mapper = Mapper(self, 'clearing', map_file=path, window=WINDOW)
         mapper.map([180])
         box = BoundingBoxQueryRequest(min=Point(-5.0, -4.0, -9.0), max=Point(1000.0, 4.0, 9.0))
-        mapper.call('clear_bbx', BoundingBoxQuery, box)
-        for wrong in (Point(float('nan'), 0, 0), Point(1001.0, 0, 0)):
-            with self.assertRaises(rospy.ServiceException):
-                mapper.call('clear_bbx', BoundingBoxQuery, BoundingBoxQueryRequest(min=wrong, max=box.max))
+        swapped = BoundingBoxQueryRequest(min=Point(box.max.x, box.min.y, box.max.z), max=Point(box.min.x, box.max.y, box.min.z))
+        mapper.call('clear_bbx', BoundingBoxQuery, swapped)
+        with self.assertRaisesRegex(rospy.ServiceException, 'a corner of the box is not a number; correct it'):
+            mapper.call('clear_bbx', BoundingBoxQuery, BoundingBoxQueryRequest(min=Point(float('nan'), 0, 0), max=box.max))
         mapper.end()
         edge = 0.4
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <functional>
 
@@ -150,7 +151,18 @@ TEST(MapFile, RefusesOtherFiles) {
   const std::string path = folder / "map.bkm";
   EXPECT_NE(fault(path).find("cannot be opened"), std::string::npos) << fault(path);
   std::ofstream(path) << std::string(5000, 'x');
-  EXPECT_NE(fault(path).find("is not a map of bki_mapping"), std::string::npos) << fault(path);
+  EXPECT_EQ(fault(path),
+            path + " is not a map of bki_mapping, although its name ends in .bkm; use another copy of it");
+  std::filesystem::resize_file(path, 50);  // less than a header
+  EXPECT_EQ(fault(path),
+            path + " is not a map of bki_mapping, although its name ends in .bkm; use another copy of it");
+  std::filesystem::resize_file(path, 0);
+  EXPECT_EQ(fault(path), path + " is empty; use another copy of it, or make the map again");
+  std::filesystem::rename(path, folder / "map.ply");
+  EXPECT_EQ(fault(folder / "map.ply"), (folder / "map.ply") + " is empty; give the name of a .bkm file");
+  std::ofstream(folder / "map.ply") << std::string(5000, 'x');
+  EXPECT_EQ(fault(folder / "map.ply"),
+            (folder / "map.ply") + " is not a map of bki_mapping; give the name of a .bkm file");
   EXPECT_NE(fault("/dev/null").find("not a regular file"), std::string::npos) << fault("/dev/null");
   // Somebody else's file is replaced, as by any program that saves.
   saveMap(path, infoOf(), {}, randomMap(1));
@@ -169,6 +181,12 @@ TEST(MapInfo, SaysWhyMapsCannotBeAdded) {
   EXPECT_EQ(fault(infoOf(), infoOf()), "");
   EXPECT_EQ(fault(infoOf(0.25), infoOf(0.5)),
             "the resolution of A is 0.25 and that of B is 0.5; maps can only be added if they agree");
+  EXPECT_EQ(fault(infoOf(0.1), infoOf(0.3)),
+            "the resolution of A is 0.1 and that of B is 0.3; maps can only be added if they agree");
+  EXPECT_EQ(
+      fault(infoOf(0.1), infoOf(std::nextafter(0.1, 1.0))),
+      "the resolution of A is 0.10000000000000001 and that of B is 0.10000000000000002; maps can only be "
+      "added if they agree");
   MapInfo other = infoOf();
   std::vector<SemanticClass> classes = other.classes->classes();
   classes[1].color = {9, 9, 9};

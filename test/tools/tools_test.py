@@ -115,7 +115,7 @@ class Tools(unittest.TestCase):
                        self.path('far.json'))
         self.assertEqual(trusted.returncode, 1)
         self.assertIn('scan 000002: the scan would touch', trusted.stderr)
-        self.assertIn('1 of 4 scans were refused', trusted.stderr)
+        self.assertIn('1 of 4 scans was refused', trusted.stderr)
         with open(self.path('far.json')) as file:
             self.assertEqual(len(json.load(file)['scans']), 3, 'the others are mapped')
 
@@ -514,7 +514,7 @@ class Tools(unittest.TestCase):
                    '--set', 'resolutoin=0.1')
         self.fails("did you mean 'line'?", 'map_sequence', '--sequence', self.drive, '--set', 'free_space/mode=liner')
         self.fails('no such', 'map_sequence', '--sequence', '/no such')
-        self.fails('must end in .ply or .pcd', 'map_sequence', '--sequence', self.drive, '--output', 'map.xyz')
+        self.fails('must end in .bkm, which holds all of a map, or in .ply or .pcd', 'map_sequence', '--sequence', self.drive, '--output', 'map.xyz')
         self.fails("did you mean 'toy'?", 'map_sequence', '--sequence', self.drive, '--classes', 'tooy')
         self.fails("state 'busy' is unknown", 'map_sequence', '--sequence', self.drive, '--include', 'busy')
         self.fails('--first 9 is beyond', 'map_sequence', '--sequence', self.drive, '--first', '9')

@@ -34,7 +34,8 @@ void exportMap(const std::string& path, const SemanticMap& map, const ClassTable
 /// The origin of the coordinates in a PCD file of a map, which the file has as its VIEWPOINT: zero or, far
 /// from it, a place in the map in whole kilometres [m].
 Eigen::Vector3d pcdOrigin(const SemanticMap& map);
-/// Checks the extension before long work. @throws std::invalid_argument if exportMap does not support it.
-void checkExportName(const std::string& path);
+/// Checks the name of a file for a map before long work: a map file (isMapFileName), or one for exportMap.
+/// @throws std::invalid_argument on another extension.
+void checkMapName(const std::string& path);
 
 }  // namespace bki_mapping

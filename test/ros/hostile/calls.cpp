@@ -215,6 +215,7 @@ const std::vector<DeedKind>& deedKinds() {
       {"deed/reset", "`~reset`"},
       {"deed/publish_map", "`~publish_map`"},
       {"deed/include", "`~save_map` with states that are unknown, or a million of them"},
+      {"deed/clear_box", "`~clear_bbx` with corners that are swapped, far away, infinite or NaN"},
       {"deed/listeners", "subscribers of all topics that come and go"},
       {"deed/reload", "unloading under traffic, and loading again"},
   };
