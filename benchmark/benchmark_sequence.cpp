@@ -13,8 +13,8 @@
 #include "core/quantile.h"
 #include "core/stopwatch.h"
 #include "curves.h"
-#include "tools/options.h"
 #include "tools/run_report.h"
+#include "tools/sequence_options.h"
 
 namespace {
 

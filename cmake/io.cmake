@@ -9,7 +9,7 @@ find_package(octomap REQUIRED)
 include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
     city_index.cpp class_table_yaml.cpp cleaned_points.cpp config_yaml.cpp display_colors.cpp export_file.cpp grid_export.cpp html_export.cpp html_page.cpp map_export.cpp map_picture.cpp
-    label_watch.cpp map_statistics.cpp mapper_file.cpp named_file.cpp octomap_export.cpp pcd_file.cpp region_files.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp tiled_map.cpp trajectory_file.cpp truth_cloud.cpp voxel_drives.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
+    label_watch.cpp map_statistics.cpp mapper_file.cpp named_file.cpp octomap_export.cpp pcd_file.cpp pose_agreement.cpp pose_file.cpp region_files.cpp scan_tables.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp tiled_map.cpp trajectory_file.cpp truth_cloud.cpp voxel_drives.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
   LINK bki_mapping_mapping bki_mapping_store)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io PRIVATE pcl_common pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ZLIB::ZLIB ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
@@ -24,7 +24,7 @@ target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_jso
 bki_mapping_join(bki_mapping_io bki_mapping_simulation bki_mapping_evaluation)
 bki_mapping_precompile(bki_mapping_io
   <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
-bki_mapping_room(tools SOURCES draw.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp
+bki_mapping_room(tools SOURCES draw.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp
   LINK bki_mapping_simulation bki_mapping_query Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 # Of one file: precompiled headers serve only targets with all the definitions of theirs.

@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <memory>
+#include <optional>
 
 #include "arrays.h"
 #include "bki_mapping/core/scan.h"
@@ -71,6 +72,13 @@ std::size_t positionIn(const Sequence& sequence, py::ssize_t i) {
   return static_cast<std::size_t>(i < 0 ? i + size : i);
 }
 
+std::optional<PosesIn> sensorOf(const std::optional<std::string>& name) {
+  if (!name) return std::nullopt;
+  if (*name == "camera") return PosesIn::kCamera;
+  if (*name == "lidar") return PosesIn::kLidar;
+  throw std::invalid_argument("poses_in is '" + *name + "', but must be 'camera' or 'lidar'");
+}
+
 void addSequence(py::module& m) {
   using Frame = SequenceFrame;
   py::class_<Frame, std::shared_ptr<Frame>>(m, "Frame", "One scan of a sequence, in the sensor's frame.")
@@ -103,14 +111,26 @@ void addSequence(py::module& m) {
       m, "Sequence",
       "A folder in SemanticKITTI's layout: velodyne/NNNNNN.bin, labels/NNNNNN.label, poses.txt, calib.txt "
       "and, optionally, times.txt. The map frame is the sensor's at the first pose.")
-      .def(py::init([](py::handle folder, const std::string& labels) {
+      .def(py::init([](py::handle folder, const std::optional<std::string>& labels, const py::object& poses,
+                       const std::optional<std::string>& poses_in) {
              const std::string path = pathOf(folder, "folder");
+             SequenceOptions options;
+             options.labels = labels.value_or("");
+             if (!poses.is_none()) options.map_poses = pathOf(poses, "poses");
+             options.poses_in = sensorOf(poses_in);
              const py::gil_scoped_release release;
-             return std::make_unique<Sequence>(path, labels);
+             return std::make_unique<Sequence>(path, options);
            }),
-           py::arg("folder"), py::arg("labels") = "labels",
-           "Open a folder. labels: name of the folder with the labels, such as 'predictions'.\n\nRaises "
-           "RuntimeError if a file is missing or wrong.")
+           py::arg("folder"), py::arg("labels") = "labels", py::arg("poses") = py::none(),
+           py::arg("poses_in") = py::none(),
+           "Open a folder.\n\n"
+           "labels: name of the folder with the labels, such as 'predictions'; None: the scans have no "
+           "labels, and all are 0.\n"
+           "poses: a file of poses in the map frame, instead of poses.txt, relative to its first pose.\n"
+           "poses_in: which sensor the poses are of, 'camera' or 'lidar'; by default the camera, as in "
+           "KITTI, and the lidar if poses have stamps.\n\n"
+           "Raises RuntimeError if a file is missing or wrong. A pose or time that is missing or wrong is "
+           "reported when its scan is read.")
       .def("__len__", &Sequence::size)
       .def(
           "__getitem__",

@@ -9,7 +9,10 @@
 #include <stdexcept>
 
 #include "bki_mapping/io/sequence.h"
+#include "core/counted.h"
 #include "io/pcd_file.h"
+#include "io/pose_file.h"
+#include "io/scan_tables.h"
 
 namespace bki_mapping {
 namespace {
@@ -26,45 +29,10 @@ std::ifstream openFile(const fs::path& path, const std::string& remedy) {
   return file;
 }
 
-/// The numbers of each line; trailing empty lines are dropped.
-std::vector<std::vector<double>> readNumberLines(const fs::path& path, const std::string& remedy) {
-  std::ifstream file = openFile(path, remedy);
-  std::vector<std::vector<double>> lines;
-  for (std::string line; std::getline(file, line);) {
-    std::istringstream words(line);
-    std::vector<double> numbers;
-    for (std::string word; words >> word;) {
-      char* end = nullptr;
-      numbers.push_back(std::strtod(word.c_str(), &end));
-      if (*end != '\0' || !std::isfinite(numbers.back())) {
-        fail(path.string() + " line " + std::to_string(lines.size() + 1) + ": '" + word +
-             "' is not a finite number");
-      }
-    }
-    lines.push_back(numbers);
-  }
-  while (!lines.empty() && lines.back().empty()) lines.pop_back();
-  return lines;
-}
-
-/// A rigid transform from 3x4 row-major numbers; the rotation is made orthonormal.
-Eigen::Isometry3d rigid(const std::vector<double>& numbers, const std::string& what) {
-  if (numbers.size() != 12)
-    fail(what + " has " + std::to_string(numbers.size()) + " numbers, but needs 12 (3x4)");
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
-  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-  if (!(std::abs(rotation.determinant() - 1.0) < 0.1)) {
-    fail(what + " is not a rigid transform: its rotation has determinant " +
-         std::to_string(rotation.determinant()) + " instead of 1");
-  }
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
-  T.translation() = matrix.col(3);
-  return T;
-}
-
 Eigen::Isometry3d readCalibration(const fs::path& path) {
-  std::ifstream file = openFile(path, "a sequence needs calib.txt with a line 'Tr:' (sensor to camera)");
+  std::ifstream file = openFile(path,
+                                "poses of the camera need calib.txt with a line 'Tr:' (sensor to camera); if "
+                                "they are of the lidar, say so with --poses-in lidar");
   for (std::string line; std::getline(file, line);) {
     std::istringstream words(line);
     std::string key;
@@ -72,7 +40,7 @@ Eigen::Isometry3d readCalibration(const fs::path& path) {
     if (key != "Tr:" && key != "Tr") continue;
     std::vector<double> numbers;
     for (double number = 0.0; words >> number;) numbers.push_back(number);
-    return rigid(numbers, path.string() + ", Tr:");
+    return rigidTransform(numbers, path.string() + ", Tr:");
   }
   fail(path.string() + " has no line 'Tr:'; add the transform from sensor to camera");
 }
@@ -117,14 +85,6 @@ std::map<std::size_t, std::string> scanNames(const fs::path& folder, const std::
   return names;
 }
 
-/// The line of a scan, counted from 1.
-const std::vector<double>& lineOf(const std::vector<std::vector<double>>& lines, const fs::path& file,
-                                  std::size_t number, const std::string& scan) {
-  if (number < lines.size()) return lines[number];
-  fail(file.string() + " has no line " + std::to_string(number + 1) + " for scan " + scan + ", but " +
-       std::to_string(lines.size()) + " lines; line 1 belongs to scan 000000");
-}
-
 void readVelodyne(const fs::path& path, SequenceFrame& frame) {
   const auto values = readBinary<float>(path, 4 * sizeof(float));
   frame.points.reserve(values.size() / 4);
@@ -149,80 +109,87 @@ void readPcd(const std::string& path, SequenceFrame& frame) {
   }
 }
 
-std::string sixDigits(std::size_t number) {
-  const std::string digits = std::to_string(number);
-  return std::string(6 - std::min<std::size_t>(digits.size(), 6), '0') + digits;
-}
-
 }  // namespace
 
-Sequence::Sequence(const std::string& folder, const std::string& labels, const std::string& map_poses)
-    : folder_(folder), labels_(labels) {
-  const fs::path root(folder), times_file = root / "times.txt";
-  const fs::path poses_file = map_poses.empty() ? root / "poses.txt" : fs::path(map_poses);
-  const fs::path pcd = root / "pcd", scans = root / "velodyne";
-  std::vector<std::vector<double>> times;
-  const bool timed = fs::exists(times_file);
-  const auto secondsOf = [&](std::size_t number, const std::string& name) {
-    if (!timed) return 0.1 * static_cast<double>(number);
-    const auto& line = lineOf(times, times_file, number, name);
-    if (line.empty()) {
-      fail(times_file.string() + " line " + std::to_string(number + 1) + " is empty, but scan " + name +
-           " needs a time");
+Sequence::Sequence(const std::string& folder, const SequenceOptions& options)
+    : folder_(folder), labels_(options.labels), labelled_(!options.labels.empty()) {
+  const fs::path root(folder), pcd = root / "pcd", scans = root / "velodyne";
+  const ScanTimes times(root / "times.txt");
+  // Faults are kept for the scans that they concern, which need not be asked for.
+  const auto add = [&](std::size_t number, const std::string& name, const auto& pose_at) {
+    Entry& entry = scans_.emplace_back(Entry{number, name, ""});
+    try {
+      const double seconds =
+          times.of(number, name);  // first: where both lack a line, the error names the times
+      entry.stamp = kFirstStamp + static_cast<std::uint64_t>(std::llround(seconds * 1e9));
+      entry.T_map_sensor = pose_at(seconds);
+    } catch (const std::runtime_error& fault) {
+      entry.fault = fault.what();
     }
-    return line.front();
   };
   if (fs::is_directory(pcd) && !fs::is_directory(scans)) {
     layout_ = SequenceLayout::kDynamicMap;
-    if (!map_poses.empty()) {
-      fail(map_poses + " cannot be used for " + pcd.string() +
+    if (!options.map_poses.empty() || options.poses_in) {
+      fail((options.map_poses.empty() ? "the frame of poses" : options.map_poses) +
+           std::string(" cannot be given for ") + pcd.string() +
            ", whose files have the poses of their scans; leave it out");
     }
-    labelled_ = fs::is_directory(root / labels);
-    if (!labelled_ && labels != "labels")
-      fail((root / labels).string() + " is not a folder; give one with labels");
-    if (timed) times = readNumberLines(times_file, "check its rights");
+    if (labels_ == SequenceOptions().labels) labelled_ = fs::is_directory(root / labels_);
+    checkLabels();
     for (const auto& [number, name] : scanNames(pcd, ".pcd")) {
-      const double seconds = secondsOf(number, name);
-      addScan(number, name, readPcdViewpoint((pcd / (name + ".pcd")).string()), seconds);
+      const std::string file = (pcd / (name + ".pcd")).string();
+      add(number, name, [&](double) { return readPcdViewpoint(file); });
     }
     return;
   }
   const auto names = scanNames(scans, ".bin");
-  const Eigen::Isometry3d T_camera_sensor = readCalibration(root / "calib.txt");
-  const auto poses = readNumberLines(poses_file, "a sequence needs a pose a scan");
-  if (timed) times = readNumberLines(times_file, "check its rights");
-  const auto pose = [&](std::size_t number, const std::string& name) {
-    const auto& numbers = lineOf(poses, poses_file, number, name);
-    const std::string what = poses_file.string() + " line " + std::to_string(number + 1);
-    return Eigen::Isometry3d(T_camera_sensor.inverse() * rigid(numbers, what) * T_camera_sensor);
+  checkLabels();
+  const ScanPoses poses(options.map_poses.empty() ? root / "poses.txt" : fs::path(options.map_poses),
+                        times.given());
+  poses_in_ = options.poses_in.value_or(poses.stamped() ? PosesIn::kLidar : PosesIn::kCamera);
+  Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();
+  if (poses_in_ == PosesIn::kCamera) T_camera_sensor = readCalibration(root / "calib.txt");
+  const auto of_sensor = [&](const Eigen::Isometry3d& pose) {
+    return Eigen::Isometry3d(T_camera_sensor.inverse() * pose * T_camera_sensor);
   };
-  const Eigen::Isometry3d T_first = map_poses.empty() ? pose(0, sixDigits(0)) : Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d T_first =
+      options.map_poses.empty() ? of_sensor(poses.first()) : Eigen::Isometry3d::Identity();
   for (const auto& [number, name] : names) {
-    const double seconds =
-        secondsOf(number, name);  // before the pose: where both lack a line, the error names the times
-    addScan(number, name, T_first.inverse() * pose(number, name), seconds);
+    add(number, name, [&, scan = number, called = name](double seconds) {
+      return Eigen::Isometry3d(T_first.inverse() * of_sensor(poses.of(scan, called, seconds)));
+    });
   }
 }
 
-void Sequence::addScan(std::size_t number, const std::string& name, const Eigen::Isometry3d& T_map_sensor,
-                       double seconds) {
-  if (!(seconds >= 0.0 && seconds < 4e9)) {
-    fail((fs::path(folder_) / "times.txt").string() + " line " + std::to_string(number + 1) +
-         ": the time must be from 0 to 4e9 s, as ROS stamps are");
-  }
-  numbers_.push_back(number);
-  names_.push_back(name);
-  poses_.push_back(T_map_sensor);
-  stamps_.push_back(kFirstStamp + static_cast<std::uint64_t>(std::llround(seconds * 1e9)));
+void Sequence::checkLabels() const {
+  const fs::path folder = fs::path(folder_) / labels_;
+  if (!labelled_ || fs::is_directory(folder)) return;
+  fail(
+      folder.string() +
+      " is not a folder; name one with labels, or say --labels none for scans without labels, with --classes "
+      "occupancy");
+}
+
+const Sequence::Entry& Sequence::placed(std::size_t i) const {
+  const Entry& entry = scans_[i];
+  if (!entry.fault.empty()) fail(entry.fault);
+  return entry;
+}
+
+const Eigen::Isometry3d& Sequence::pose(std::size_t i) const {
+  return placed(i).T_map_sensor;
+}
+
+std::uint64_t Sequence::stamp(std::size_t i) const {
+  return placed(i).stamp;
 }
 
 std::string Sequence::gaps() const {
   constexpr std::size_t kMaxNamed = 10;
   std::string text;
   std::size_t missing = 0, ranges = 0;
-  for (std::size_t i = 1; i < numbers_.size(); ++i) {
-    const std::size_t from = numbers_[i - 1] + 1, to = numbers_[i] - 1;
+  for (std::size_t i = 1; i < scans_.size(); ++i) {
+    const std::size_t from = scans_[i - 1].number + 1, to = scans_[i].number - 1;
     if (from > to) continue;
     missing += to - from + 1;
     if (++ranges > kMaxNamed) continue;
@@ -237,10 +204,10 @@ std::string Sequence::gaps() const {
 SequenceFrame Sequence::read(std::size_t i) const {
   const bool is_pcd = layout_ == SequenceLayout::kDynamicMap;
   const fs::path scan =
-      fs::path(folder_) / (is_pcd ? "pcd" : "velodyne") / (names_[i] + (is_pcd ? ".pcd" : ".bin"));
+      fs::path(folder_) / (is_pcd ? "pcd" : "velodyne") / (name(i) + (is_pcd ? ".pcd" : ".bin"));
   SequenceFrame frame;
-  frame.T_map_sensor = poses_[i];
-  frame.stamp = stamps_[i];
+  frame.T_map_sensor = pose(i);
+  frame.stamp = stamp(i);
   if (is_pcd) {
     readPcd(scan.string(), frame);
   } else {
@@ -250,7 +217,7 @@ SequenceFrame Sequence::read(std::size_t i) const {
     frame.labels.assign(frame.points.size(), 0);
     return frame;
   }
-  const fs::path label = fs::path(folder_) / labels_ / (names_[i] + ".label");
+  const fs::path label = fs::path(folder_) / labels_ / (name(i) + ".label");
   frame.labels = readBinary<std::uint32_t>(label, sizeof(std::uint32_t));
   if (frame.labels.size() != frame.points.size()) {
     fail(label.string() + " has " + std::to_string(frame.labels.size()) + " labels, but " + scan.string() +

@@ -1,34 +1,23 @@
 #include "io/trajectory_file.h"
 
-#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 
 #include "bki_mapping/io/sequence.h"
+#include "io/pose_file.h"
 
 namespace bki_mapping {
 namespace {
 
-std::vector<Eigen::Vector3d> readPoses(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::invalid_argument("the trajectory " + path + " cannot be read");
+std::vector<Eigen::Vector3d> readPositions(const std::string& path) {
+  constexpr char kRemedy[] = "give a file of poses, or the folder of a sequence";
   std::vector<Eigen::Vector3d> points;
-  std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    std::istringstream words(line);
-    std::string first;
-    if (!(words >> first) || first[0] == '#') continue;
-    Eigen::Vector3d point;
-    if (!(words >> point.x() >> point.y() >> point.z()) || !point.allFinite()) {
-      throw std::invalid_argument(path + " line " + std::to_string(number) +
-                                  " is not a pose; write: stamp x y z qx qy qz qw");
-    }
-    points.push_back(point);
+  for (const PoseLine& line : readPoseFile(path, kRemedy).lines) {
+    if (line.blank) continue;
+    if (!line.fault.empty()) throw std::runtime_error(line.fault);
+    points.push_back(line.pose.translation());
   }
-  if (points.empty()) throw std::invalid_argument("the trajectory " + path + " has no pose");
+  if (points.empty()) throw std::runtime_error("the trajectory " + path + " has no pose");
   return points;
 }
 
@@ -38,10 +27,12 @@ Trajectory readTrajectory(const std::string& path) {
   Trajectory trajectory;
   trajectory.name = std::filesystem::path(path).lexically_normal().filename().string();
   if (!std::filesystem::is_directory(path)) {
-    trajectory.points = readPoses(path);
+    trajectory.points = readPositions(path);
     return trajectory;
   }
-  const Sequence sequence(path);
+  SequenceOptions options;
+  options.labels.clear();  // only the poses matter
+  const Sequence sequence(path, options);
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     trajectory.points.push_back(sequence.pose(i).translation());
   }

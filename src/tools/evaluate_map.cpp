@@ -18,7 +18,7 @@
 #include "io/truth_cloud.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
-#include "tools/options.h"
+#include "tools/sequence_options.h"
 
 namespace {
 
@@ -174,6 +174,10 @@ std::optional<CloudEvaluation> cloudEvaluation(const po::variables_map& given, c
           "--cloud needs raw labels, because class ids do not say what moves; leave out "
           "label_values=id");
     }
+    if (!sequence.labelled()) {
+      throw std::invalid_argument("--cloud needs labels, which say what moves; " + sequence.folder() +
+                                  " is read without");
+    }
     return CloudEvaluation(std::nullopt, distance);
   }
   if (given["first"].as<std::int64_t>() > 0 || given.count("scans") || given.count("pose-drift")) {
@@ -224,13 +228,17 @@ int evaluate(const po::variables_map& given) {
   const std::vector<Judgement> others = judgements(given, mapper.config());
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
+  tools::warnOfPoses(given, first, last);
   const LabelNoise label_noise{given["label-noise"].as<double>(),
                                labelErrorsNamed(given["label-errors"].as<std::string>()),
                                tools::count(given, "noise-seed"), given["label-error-seconds"].as<double>()};
   std::optional<PoseNoise> pose_noise = poseNoise(given);
   std::optional<Sequence> predictions;
-  if (given.count("predictions"))
-    predictions.emplace(sequence.folder(), given["predictions"].as<std::string>());
+  if (given.count("predictions")) {
+    SequenceOptions options = tools::sequenceOptionsOf(given);
+    options.labels = given["predictions"].as<std::string>();
+    predictions.emplace(sequence.folder(), options);
+  }
   std::optional<LabelWriter> label_writer;
   if (given.count("write-predictions"))
     label_writer.emplace(sequence.folder(), given["write-predictions"].as<std::string>());

@@ -14,8 +14,9 @@
 #include "core/counted.h"
 #include "io/cleaned_points.h"
 #include "io/label_watch.h"
-#include "tools/options.h"
+#include "store/drive_overlap.h"
 #include "tools/run_report.h"
+#include "tools/sequence_options.h"
 
 namespace {
 
@@ -33,8 +34,10 @@ po::options_description options() {
       "resume", text("FILE.bkm"), "continue the map in this file")(
       "drive", text("ID"),
       "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
+      "allow-overlap", po::bool_switch(),
+      "map scans that by its ids the continued map already holds; they count twice then")(
       "poses", text("FILE"),
-      "poses in the frame of the map, in the layout of poses.txt; "
+      "poses in the frame of the map, as matrices or with stamps; "
       "default: poses.txt, relative to its first pose")(
       "include", text("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
@@ -71,14 +74,23 @@ void warnOfParts(const std::string& path) {
   }
 }
 
-/// Loads the map that is continued. @return the drives in it. @throws std::invalid_argument if `id` is one of
-/// them.
-std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path, const std::string& id) {
+/// Loads the map that is continued. @param added the drive that will be added.
+/// @return the drives in the map. @throws std::invalid_argument if it holds that drive or scans of it
+/// already.
+std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path, const DriveRecord& added,
+                                bool allow_overlap) {
   StoredMap stored = loadMapFor(mapper, path, kFrame);
   for (const DriveRecord& drive : stored.drives) {
-    if (drive.id != id) continue;
-    throw std::invalid_argument("the map in " + path + " already holds drive '" + id +
-                                "'; give other scans, or another id with --drive");
+    if (drive.id == added.id) {
+      throw std::invalid_argument("the map in " + path + " already holds drive '" + added.id +
+                                  "'; give other scans, or another id with --drive");
+    }
+    const auto shared = allow_overlap ? std::nullopt : sharedScans(drive, added);
+    if (!shared) continue;
+    throw std::invalid_argument("by its ids, the map in " + path + " already holds " + textOf(*shared) +
+                                ", in drive '" + drive.id +
+                                "', which would count twice; give other scans, or, if they are different "
+                                "scans, go on with --allow-overlap");
   }
   mapper.addMap(std::move(stored.map));
   return stored.drives;
@@ -98,13 +110,18 @@ int mapSequence(const po::variables_map& given) {
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
+  tools::warnOfPoses(given, first, last);
   DriveRecord drive;
   drive.id = driveId(given, sequence, first, last);
   drive.name = sequence.folder();
   std::vector<DriveRecord> drives;
   if (given.count("resume")) {
     const std::string path = given["resume"].as<std::string>();
-    drives = resume(mapper, path, drive.id);
+    DriveRecord planned = drive;
+    planned.scans = last - first;
+    planned.first_stamp = sequence.stamp(first);
+    planned.last_stamp = sequence.stamp(last - 1);
+    drives = resume(mapper, path, planned, given["allow-overlap"].as<bool>());
     if (given.count("output")) warnOfParts(path);
   }
 

@@ -176,40 +176,6 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given) {
   return std::make_shared<const ClassTable>(loadClassTable(given["classes"].as<std::string>()));
 }
 
-po::options_description sequenceOptions() {
-  po::options_description options("Sequence");
-  options.add_options()("sequence", po::value<std::string>()->value_name("DIR"),
-                        "folder with velodyne/, labels/, poses.txt, calib.txt")(
-      "labels", po::value<std::string>()->value_name("FOLDER")->default_value("labels"),
-      "name of the folder with the labels")("first",
-                                            countOption("--first", 0)->value_name("N")->default_value(0),
-                                            "number of the first scan, as in its file name")(
-      "scans", countOption("--scans", 1)->value_name("N"), "number of scans; default: all");
-  return options;
-}
-
-Sequence openSequence(const po::variables_map& given) {
-  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
-  Sequence sequence(given["sequence"].as<std::string>(), given["labels"].as<std::string>(),
-                    given.count("poses") ? given["poses"].as<std::string>() : "");
-  const std::string gaps = sequence.gaps();
-  if (!gaps.empty()) std::cerr << gaps << "; the others keep their poses and times\n";
-  return sequence;
-}
-
-std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence) {
-  const std::size_t number = count(given, "first"), last = sequence.size() - 1;
-  if (number > sequence.number(last)) {
-    throw std::invalid_argument("--first " + std::to_string(number) + " is beyond the last scan, " +
-                                sequence.name(last));
-  }
-  std::size_t first = 0;
-  while (sequence.number(first) < number) ++first;
-  std::size_t scans = sequence.size() - first;
-  if (given.count("scans")) scans = std::min(scans, count(given, "scans"));
-  return {first, first + scans};
-}
-
 int run(const std::string& program, const std::function<int()>& body) {
   try {
     return body();

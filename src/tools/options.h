@@ -9,11 +9,9 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/io/sequence.h"
 #include "bki_mapping/mapping/mapper_config.h"
 
 namespace bki_mapping::tools {
@@ -59,15 +57,6 @@ MapperConfig mapperConfig(const po::variables_map& given);
 /// @throws std::invalid_argument.
 MapperConfig withSettings(MapperConfig config, const std::string& option, const std::string& settings);
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
-
-/// Options of all programs that read a sequence: --sequence, --labels, --first, --scans.
-po::options_description sequenceOptions();
-/// Opens the sequence of these options; reports missing scans on standard error.
-/// @throws std::invalid_argument if --sequence is missing, std::runtime_error as Sequence.
-Sequence openSequence(const po::variables_map& given);
-/// The half-open range of indices that --first and --scans select. @throws std::invalid_argument if it is
-/// empty.
-std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, const Sequence& sequence);
 
 /// Runs a program; an exception becomes one line on standard error and exit status 1.
 int run(const std::string& program, const std::function<int()>& body);

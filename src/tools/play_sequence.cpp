@@ -12,8 +12,8 @@
 #include <stdexcept>
 
 #include "ros/termination.h"
-#include "tools/options.h"
 #include "tools/sequence_messages.h"
+#include "tools/sequence_options.h"
 
 namespace {
 
@@ -128,9 +128,9 @@ void takeFolderOfParameter(po::variables_map& given) {
 
 /// Prints the path of a sequence that can be played. @throws as Sequence.
 int check(const po::variables_map& given) {
-  if (!given.count("sequence")) throw std::invalid_argument("--sequence DIR is missing (see --help)");
+  const SequenceOptions options = tools::sequenceOptionsOf(given);
   const std::string folder = absolutePath(given["sequence"].as<std::string>()).string();
-  Sequence(folder, given["labels"].as<std::string>()).read(0);
+  Sequence(folder, options).read(0);
   std::cout << folder;  // no newline: roslaunch would make it part of the path
   return 0;
 }
@@ -138,6 +138,7 @@ int check(const po::variables_map& given) {
 int play(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
+  tools::warnOfPoses(given, first, last);
   const double rate = given["rate"].as<double>();
 
   Player player({given["map-frame"].as<std::string>(), given["frame"].as<std::string>()});

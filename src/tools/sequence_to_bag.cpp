@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "core/atomic_file.h"
-#include "tools/options.h"
 #include "tools/sequence_messages.h"
+#include "tools/sequence_options.h"
 
 namespace {
 
@@ -36,6 +36,7 @@ rosbag::CompressionType compression(const std::string& name) {
 int writeBag(const po::variables_map& given) {
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
+  tools::warnOfPoses(given, first, last);
   const tools::FrameNames names{given["map-frame"].as<std::string>(), given["frame"].as<std::string>()};
   const std::string output = given["output"].as<std::string>();
   AtomicFile file(output);

@@ -380,14 +380,24 @@ TEST(TrajectoryFile, HasThePlacesOfPoses) {
   EXPECT_EQ(trajectory.points[0], Eigen::Vector3d(1.0, -2.0, 3.0));
   EXPECT_EQ(trajectory.points[1], Eigen::Vector3d(4.0, 5.0, 6.0));
   const auto sentence = [&](const std::string& text) {
-    return refusal<std::invalid_argument>([&] { read(text); });
+    return refusal<std::runtime_error>([&] { read(text); });
   };
   const std::string path = folder / "poses.txt";
-  EXPECT_EQ(sentence("1 2 3 4\n1 2 x 4\n"), path + " line 2 is not a pose; write: stamp x y z qx qy qz qw");
-  EXPECT_EQ(sentence("1 2 3 nan\n"), path + " line 1 is not a pose; write: stamp x y z qx qy qz qw");
+  for (const char* matrix : {"0 -1 0 1 1 0 0 -2 0 0 1 3", "0 -1 0 1 1 0 0 -2 0 0 1 3 0 0 0 1"}) {
+    const Trajectory rows = read(matrix + std::string("\n# comment\n") + matrix + "\n");
+    ASSERT_EQ(rows.points.size(), 2u);
+    EXPECT_EQ(rows.points[1], Eigen::Vector3d(1.0, -2.0, 3.0));
+  }
+  EXPECT_EQ(read("1.5 1 -2 3 0 0 0 0\n").points.size(), 1u) << "a trajectory needs no rotations";
+  EXPECT_EQ(sentence("1 2 3 4\n1 2 x 4\n"), path + " line 2: 'x' is not a finite number");
+  EXPECT_EQ(sentence("1 2 3 nan\n"), path + " line 1: 'nan' is not a finite number");
+  EXPECT_EQ(sentence("# x y z\n1 2 3\n"),
+            path + " line 2 has 3 numbers, but needs 12 (3x4), 16 (4x4) or 8 (seconds x y z qx qy qz qw)");
+  EXPECT_EQ(sentence("1 2 3 4\n1 0 0 0 0 1 0 0 0 0 1 0\n"),
+            path + " line 2 has 12 numbers, but needs 4, as the lines before it");
   EXPECT_EQ(sentence("# nothing\n"), "the trajectory " + path + " has no pose");
-  EXPECT_EQ(refusal<std::invalid_argument>([&] { readTrajectory(folder / "none"); }),
-            "the trajectory " + (folder / "none") + " cannot be read");
+  EXPECT_EQ(refusal<std::runtime_error>([&] { readTrajectory(folder / "none"); }),
+            (folder / "none") + " cannot be read; give a file of poses, or the folder of a sequence");
 }
 
 }  // namespace

@@ -73,10 +73,66 @@ TEST_F(SequenceFolder, PosesOfAnotherFileAreInTheMapFrame) {
   replace("calib.txt", "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n");
   replace("city.txt", "1 0 0 -2 0 1 0 -3 0 0 1 7\n1 0 0 -2 0 1 0 -3 0 0 1 9\n");
-  const Sequence sequence(folder_ / "drive", "labels", folder_ / "drive/city.txt");
+  SequenceOptions options;
+  options.map_poses = folder_ / "drive/city.txt";
+  const Sequence sequence(folder_ / "drive", options);
   EXPECT_TRUE(sequence.pose(0).translation().isApprox(Eigen::Vector3d(7, 2, 3), 1e-12));
   EXPECT_TRUE(sequence.pose(1).translation().isApprox(Eigen::Vector3d(9, 2, 3), 1e-12));
   EXPECT_TRUE(sequence.read(1).T_map_sensor.isApprox(sequence.pose(1)));
+}
+
+TEST_F(SequenceFolder, FormatsOfPosesAreRecognised) {
+  replace("calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n");
+  const auto expectPose = [&](const std::string& poses, std::optional<PosesIn> poses_in,
+                              const Eigen::Vector3d& expected) {
+    replace("poses.txt", poses);
+    SequenceOptions options;
+    options.poses_in = poses_in;
+    const Sequence sequence(folder_ / "drive", options);
+    EXPECT_TRUE(sequence.pose(0).isApprox(Eigen::Isometry3d::Identity(), 1e-12)) << poses;
+    const Eigen::Vector3d found = sequence.pose(1).translation();
+    EXPECT_TRUE(found.isApprox(expected, 1e-12)) << poses << found.transpose();
+  };
+  const Eigen::Vector3d right(0, -5, 0), ahead(5, 0, 0);  // x of the camera is right, of the lidar ahead
+  const std::string rows12 = "1 0 0 7 0 1 0 0 0 0 1 0\n1 0 0 12 0 1 0 0 0 0 1 0\n",
+                    rows16 = "1 0 0 7 0 1 0 0 0 0 1 0 0 0 0 1\n1 0 0 12 0 1 0 0 0 0 1 0 0 0 0 1\n",
+                    stamped = "# seconds x y z qx qy qz qw\n0 7 0 0 0 0 0 1\n0.1 12 0 0 0 0 0 1\n";
+  for (const std::string& rows : {rows12, rows16}) {
+    expectPose(rows, std::nullopt, right);
+    expectPose(rows, PosesIn::kCamera, right);
+    expectPose(rows, PosesIn::kLidar, ahead);
+  }
+  expectPose(stamped, std::nullopt, ahead);
+  expectPose(stamped, PosesIn::kCamera, right);
+  // Stamps find the pose, whatever the order and the number of lines.
+  expectPose("0 7 0 0 0 0 0 1\n0.2 30 0 0 0 0 0 1\n0.102 12 0 0 0 0 0 1\n0.05 9 0 0 0 0 0 1\n", std::nullopt,
+             ahead);
+  std::filesystem::remove(folder_ / "drive/calib.txt");
+  expectPose(rows12, PosesIn::kLidar, ahead);
+  expectFault("say so with --poses-in lidar");
+  // Without times of scans, lines belong to scans by their order.
+  std::filesystem::remove(folder_ / "drive/times.txt");
+  expectPose("100 7 0 0 0 0 0 1\n200 12 0 0 0 0 0 1\n", std::nullopt, ahead);
+}
+
+TEST_F(SequenceFolder, ScansNeedNoLabels) {
+  std::filesystem::remove_all(folder_ / "drive/labels");
+  SequenceOptions options;
+  options.labels.clear();
+  const Sequence sequence(folder_ / "drive", options);
+  EXPECT_FALSE(sequence.labelled());
+  EXPECT_EQ(sequence.read(1).labels, (std::vector<std::uint32_t>{0, 0}));
+}
+
+TEST_F(SequenceFolder, OnlyScansThatAreAskedForNeedAPose) {
+  for (const char* second : {"", "1 0 0 0 0 1\n", "nan 0 0 0 0 1 0 0 0 0 1 0\n"}) {
+    replace("poses.txt", std::string("1 0 0 0 0 1 0 0 0 0 1 0\n") + second);
+    const Sequence sequence(folder_ / "drive");
+    EXPECT_EQ(sequence.size(), 2u);
+    EXPECT_EQ(sequence.read(0).points.size(), 2u);
+    EXPECT_THROW(sequence.pose(1), std::runtime_error);
+    EXPECT_THROW(sequence.read(1), std::runtime_error);
+  }
 }
 
 TEST_F(SequenceFolder, LabelsKeepTheirInstances) {
@@ -114,7 +170,7 @@ TEST_F(SequenceFolder, TheLayoutOfTheDynamicMapBenchmarkReadsAlike) {
   std::filesystem::remove(folder_ / "pcd_drive/times.txt");
   std::filesystem::remove_all(folder_ / "pcd_drive/labels");
   check(100000000, {0, 0});
-  EXPECT_THROW(Sequence(folder_ / "pcd_drive", "predictions"), std::runtime_error);
+  EXPECT_THROW(Sequence(folder_ / "pcd_drive", {"predictions", "", std::nullopt}), std::runtime_error);
   std::filesystem::rename(folder_ / "pcd_drive/pcd/000001.pcd", folder_ / "pcd_drive/pcd/last.pcd");
   EXPECT_THROW(Sequence(folder_ / "pcd_drive"), std::runtime_error);
 }
@@ -122,6 +178,9 @@ TEST_F(SequenceFolder, TheLayoutOfTheDynamicMapBenchmarkReadsAlike) {
 TEST_F(SequenceFolder, NamesMissingThings) {
   std::filesystem::remove(folder_ / "drive/labels/000001.label");
   expectFault("000001.label cannot be read");
+  std::filesystem::remove_all(folder_ / "drive/labels");
+  expectFault("labels is not a folder; name one with labels, or say --labels none");
+  std::filesystem::create_directory(folder_ / "drive/labels");
   std::filesystem::remove(folder_ / "drive/calib.txt");
   expectFault("calib.txt cannot be read");
   std::filesystem::remove_all(folder_ / "drive/velodyne");
@@ -146,6 +205,20 @@ TEST_F(SequenceFolder, NamesFaultsOfPoses) {
   expectFault("'nan' is not a finite number");
   replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 0 0 0 0 0 0 0 0 0 0 0\n");
   expectFault("not a rigid transform");
+  replace("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n1 0 0 0 0 1 0 0 0 0 1 0 5 0 0 1\n");
+  expectFault("poses.txt line 2 is not a rigid transform: the last row of its matrix is not 0 0 0 1");
+  replace("poses.txt", "0 0 0 0 0 0 0 1\n#\n0.1 0 0 0 0 0 0 0.5\n");
+  expectFault("poses.txt line 3 is not a rigid transform: its quaternion has length 0.5 instead of 1");
+  replace("poses.txt", "0 0 0 0 0 0 0 1\n0.1 0 0 0\n");
+  expectFault("poses.txt line 2 has no rotation");
+  replace("poses.txt", "0 0 0 0 0 0 0 1\n0.3 0 0 0 0 0 0 1\n");
+  expectFault(
+      "poses.txt has no pose at 0.1 s, the time of scan 000001 in times.txt; the nearest is at 0 s, in line "
+      "1");
+  replace("poses.txt", "1, 0, 0\n");
+  expectFault("poses.txt line 1: '1,' is not a finite number");
+  replace("poses.txt", "");
+  expectFault("poses.txt has no line 1 for scan 000000");
 }
 
 TEST_F(SequenceFolder, NamesFaultsOfCalibrationAndTimes) {

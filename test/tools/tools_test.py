@@ -772,7 +772,7 @@ class Tools(unittest.TestCase):
         self.fails('must end in .html', 'export_map', a, '--html', self.path('page.ply'), *three)
         self.fails('three.js is not in /no/such', 'export_map', a, '--html', page, '--three-js', '/no/such')
         self.fails('there is no voxel to show', 'export_map', a, '--html', page, '--box', '900 900 900 901 901 901', *three)
-        self.fails('the trajectory /no/such cannot be read', 'export_map', a, '--html', page, '--trajectory', '/no/such', *three)
+        self.fails('/no/such cannot be read; give a file of poses', 'export_map', a, '--html', page, '--trajectory', '/no/such', *three)
 
     def test_cleaned_points(self):
         kept = {}

@@ -156,6 +156,7 @@ class Builder:
         source = {'bag': str(drive.bag.path)} if drive.bag else {}
         folder = pieces[0].drive.folder
         return {'name': drive.name, 'sequence': str(folder), **source, 'poses': str(pieces[0].drive.poses),
+                'poses_in': drive.poses_in,
                 'pieces': [dict(file=piece.file, id=piece.id, first=piece.first, scans=piece.scans) for piece in pieces]}
 
     def leave_out(self, drive, why):

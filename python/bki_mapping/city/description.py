@@ -24,6 +24,7 @@ class Drive(NamedTuple):
     labels: str
     poses: pathlib.Path  # in the frame of the city
     bag: Optional[Bag] = None
+    poses_in: str = ''  # the sensor that the poses are of, one of SENSORS; '': as map_sequence finds it
 
 
 class City(NamedTuple):
@@ -36,7 +37,8 @@ class City(NamedTuple):
 
 
 KEYS = {'drives', 'classes', 'config', 'set', 'piece_scans', 'region_tiles'}
-SEQUENCE_KEYS = {'sequence', 'name', 'labels', 'poses'}
+SEQUENCE_KEYS = {'sequence', 'name', 'labels', 'poses', 'poses_in'}
+SENSORS = ('camera', 'lidar')
 BAG_KEYS = {'bag', 'name', 'cloud_topic', 'frame', 'label_field', 'labelled'}
 
 
@@ -96,7 +98,10 @@ def read_drive(entry, path) -> Drive:
                         'begin with another character than a dot')
     if not is_bag:
         poses = path.parent / text_of(entry, 'poses', '-', path) if 'poses' in entry else source / 'poses.txt'
-        return Drive(name, source, text_of(entry, 'labels', 'labels', path), poses.absolute())
+        poses_in = entry.get('poses_in', '')
+        if poses_in and poses_in not in SENSORS:
+            raise CityError(f"poses_in in {path} is {poses_in!r}; give {' or '.join(SENSORS)}")
+        return Drive(name, source, text_of(entry, 'labels', 'labels', path), poses.absolute(), poses_in=poses_in)
     if 'cloud_topic' not in entry:
         raise CityError(f'{source} in {path} has no cloud_topic; give that of its labelled clouds')
     labelled = entry.get('labelled', True)

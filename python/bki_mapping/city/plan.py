@@ -60,7 +60,7 @@ def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     drive has no scans."""
     files = scans_of(drive)
     numbers = list(files)
-    shared = [str(drive.poses), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
+    shared = [str(drive.poses), *filter(None, [drive.poses_in]), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
     settings = [city.classes, stamps_of([pathlib.Path(city.classes)]),
                 stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings, identity]
     pieces = []

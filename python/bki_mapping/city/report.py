@@ -171,7 +171,12 @@ def way_of(drive):
             return numpy.array(heads, float).reshape(-1, 3)
         numbers = sorted(int(path.stem) for path in (folder / 'velodyne').glob('*.bin')
                          if path.stem.isascii() and path.stem.isdigit())
-        poses = numpy.loadtxt(drive['poses'], ndmin=2).reshape(-1, 3, 4)
+        rows = numpy.loadtxt(drive['poses'], ndmin=2)
+        if rows.shape[1] in (4, 8):  # with stamps, of the lidar
+            return rows[:, 1:4] if drive.get('poses_in') != 'camera' else numpy.zeros((0, 3))
+        poses = rows.reshape(len(rows), -1, 4)[:, :3]
+        if drive.get('poses_in') == 'lidar':
+            return poses[numbers, :, 3]
         calibration = next(line.split(':')[1].split() for line in (folder / 'calib.txt').read_text().splitlines()
                            if line.startswith('Tr:'))
         camera = numpy.array(calibration, float).reshape(3, 4)

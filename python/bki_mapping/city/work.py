@@ -206,6 +206,8 @@ def map_piece(setup, piece):
                  '--drive', piece.id, '--threads', 1, *setup.settings]
     if (drive.folder / 'velodyne').is_dir():
         arguments += ['--poses', drive.poses]
+        if drive.poses_in:
+            arguments += ['--poses-in', drive.poses_in]
     path = pathlib.Path(setup.folder) / piece.file
     while True:
         try:

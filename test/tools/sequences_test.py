@@ -1,0 +1,170 @@
+#!/usr/bin/env python3
+"""Sequences as people have them: without labels, with poses of other sensors and in other formats, or with few of them."""
+import contextlib
+import glob
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import tempfile
+import unittest
+
+BIN = os.environ['BKI_MAPPING_BIN']
+DATA = os.environ.get('BKI_MAPPING_TEST_DATA')
+TR = [[0, -1, 0, 0.1], [0, 0, -1, 0.2], [1, 0, 0, 0.3]]  # from a lidar (x ahead, z up) to a camera (z ahead, y down)
+
+
+def call(program, *arguments):
+    return subprocess.run([os.path.join(BIN, program), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          universal_newlines=True, timeout=300)
+
+
+def product(a, b):
+    """Of transforms as three rows of four numbers."""
+    return [[sum(a[r][k] * b[k][c] for k in range(3)) + (a[r][3] if c == 3 else 0) for c in range(4)] for r in range(3)]
+
+
+def inverse(a):
+    return [[a[k][r] for k in range(3)] + [-sum(a[k][r] * a[k][3] for k in range(3))] for r in range(3)]
+
+
+def text_of(transform):
+    return ' '.join(repr(number) for row in transform for number in row)
+
+
+class Sequences(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.drive, self.out = self.path('drive'), self.path('out.bkm')
+        self.make('--scans', '4', '--speed', '20')
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def make(self, *more):
+        shutil.rmtree(self.drive, ignore_errors=True)
+        self.succeeds('simulate_drive', '--output', self.drive, '--beams', '16', '--columns', '400', *more)
+        with open(os.path.join(self.drive, 'poses.txt')) as file:
+            numbers = [[float(word) for word in line.split()] for line in file]
+        self.poses = [[line[0:4], line[4:8], line[8:12]] for line in numbers]  # of the lidar: Tr is the identity
+
+    def write(self, name, *lines):
+        path = os.path.join(self.drive, name)
+        with open(path, 'w') as file:
+            file.writelines(line + '\n' for line in lines)
+        return path
+
+    def succeeds(self, program, *arguments):
+        result = call(program, *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def fails(self, words, program, *arguments):
+        result = call(program, *arguments)
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertIn(words, result.stderr)
+        self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
+
+    def mapped(self, *options):
+        """The tiles of the map, and what was said."""
+        said = self.succeeds('map_sequence', '--sequence', self.drive, '--output', self.out, *options).stderr
+        with contextlib.closing(sqlite3.connect(self.out)) as database:
+            return sorted(database.execute('SELECT z, y, x, content FROM tile WHERE part = 0')), said
+
+    def test_without_labels(self):
+        labelled, _ = self.mapped('--classes', 'occupancy')
+        shutil.rmtree(os.path.join(self.drive, 'labels'))
+        without, said = self.mapped('--classes', 'occupancy')
+        self.assertEqual((without, said), (labelled, ''), 'labels say nothing where there is one class')
+        self.assertEqual(self.mapped('--classes', 'occupancy', '--labels', 'none')[0], without)
+        sequence = ('--sequence', self.drive)
+        self.fails('labels is not a folder; name one with labels, or say --labels none', 'map_sequence', *sequence)
+        self.fails('predictions is not a folder', 'map_sequence', *sequence, '--classes', 'occupancy', '--labels', 'predictions')
+        self.assertTrue(self.mapped('--labels', 'none')[0], 'hits of no known class')
+        figures = self.path('figures.json')
+        self.succeeds('evaluate_map', *sequence, '--classes', 'occupancy', '--json', figures)
+        with open(figures) as file:
+            self.assertIsNone(json.load(file)['sa'])
+        self.fails('--cloud needs labels', 'evaluate_map', *sequence, '--classes', 'occupancy', '--cloud')
+
+    def test_scans_that_are_not_asked_for_need_no_pose(self):
+        whole, _ = self.mapped('--scans', '3')
+        lines = [text_of(pose) for pose in self.poses]
+        for last in ((), ('0.5 1 0',), ('nan' + lines[3][1:],)):
+            self.write('poses.txt', *lines[:3], *last)
+            self.assertEqual(self.mapped('--scans', '3'), (whole, ''))
+            self.fails('poses.txt has no line 4 for scan 000003' if not last else 'poses.txt line 4', 'map_sequence', '--sequence',
+                       self.drive)
+        self.write('poses.txt', *lines)
+        self.write('times.txt', '0', '0.1', '0.2')
+        self.assertEqual(self.mapped('--scans', '3'), (whole, ''))
+        self.fails('times.txt has no line 4 for scan 000003', 'map_sequence', '--sequence', self.drive, '--first', '3')
+
+    def test_one_reader_for_poses_and_trajectories(self):
+        self.poses = [[[1, 0, 0, 0.5 * n], [0, 1, 0, 0.25 * n], [0, 0, 1, 0]] for n in range(4)]
+        rows = self.write('rows.txt', *(text_of(pose) for pose in self.poses))
+        whole, _ = self.mapped('--poses', rows)
+        squares = self.write('squares.txt', '# 4x4', *(text_of(pose) + ' 0 0 0 1' for pose in self.poses))
+        self.assertEqual(self.mapped('--poses', squares), (whole, ''))
+        places = [' '.join(repr(pose[axis][3]) for axis in range(3)) for pose in self.poses]
+        stamped = self.write('stamped.txt', *(f'{0.1 * n} {place} 0 0 0 1' for n, place in reversed(list(enumerate(places)))))
+        self.assertEqual(self.mapped('--poses', stamped), (whole, ''))
+        page, header = self.path('page.html'), set()
+        for path in (rows, squares, self.write('places.txt', *(f'{n} {place}' for n, place in enumerate(places)))):
+            self.succeeds('export_map', self.out, '--html', page, '--trajectory', path)
+            with open(page) as file:
+                header.add(file.read().split('"trajectories":')[1].split('"points":')[1].split('}')[0])
+        self.assertEqual(len(header), 1)
+        self.fails('rows.txt line 5 has 3 numbers, but needs 12, as the lines before it', 'export_map', self.out, '--html', page,
+                   '--trajectory', self.write('rows.txt', *(text_of(pose) for pose in self.poses), '1 2 3'))
+        late = self.write('late.txt', *(f'{100 + 0.1 * n} {place} 0 0 0 1' for n, place in enumerate(places)))
+        self.fails('late.txt has no pose at 0 s, the time of scan 000000 in times.txt; the nearest is at 100 s, in line 1',
+                   'map_sequence', '--sequence', self.drive, '--poses', late)
+        self.fails('places.txt line 1 has no rotation', 'map_sequence', '--sequence', self.drive, '--poses',
+                   os.path.join(self.drive, 'places.txt'))
+
+    def test_poses_of_the_other_sensor_are_noticed(self):
+        self.write('calib.txt', 'Tr: ' + text_of(TR))
+        of_camera = [text_of(product(product(TR, pose), inverse(TR))) for pose in self.poses]
+        of_lidar = [text_of(pose) for pose in self.poses]
+        for lines, right, wrong in ((of_camera, 'camera', 'lidar'), (of_lidar, 'lidar', 'camera')):
+            self.write('poses.txt', *lines)
+            whole, said = self.mapped('--poses-in', right)
+            self.assertEqual(said, '')
+            self.assertNotEqual(self.mapped('--poses-in', wrong), (whole, ''))
+            self.assertEqual(self.mapped('--poses-in', wrong)[1], '', 'whoever says which sensor it is, is not warned')
+            default, said = self.mapped()
+            if right == 'camera':
+                self.assertEqual((default, said), (whole, ''))
+                continue
+            self.assertNotEqual(default, whole)
+            self.assertRegex(said, r'^warning: the poses seem to be those of the lidar: .* \d+ cm apart as poses of the camera, but '
+                                   r'\d+ cm as poses of the lidar; say .* --poses-in lidar\n$')
+            self.assertIn('poses seem to be those of the lidar', call('evaluate_map', '--sequence', self.drive).stderr)
+        stamps = self.write('stamped.txt', *(f'{0.1 * n} {" ".join(repr(row[3]) for row in product(product(TR, pose), inverse(TR)))} 0 0 0 1'
+                                             for n, pose in enumerate(self.poses)))
+        self.assertRegex(self.mapped('--poses', stamps)[1], 'poses seem to be those of the camera')
+        os.remove(os.path.join(self.drive, 'calib.txt'))
+        self.assertEqual(self.mapped('--poses-in', 'lidar'), (whole, ''))
+        self.fails('calib.txt cannot be read; poses of the camera need calib.txt', 'map_sequence', '--sequence', self.drive)
+        self.fails("--poses-in 'radar' is unknown; known sensors: camera, lidar", 'map_sequence', '--sequence', self.drive,
+                   '--poses-in', 'radar')
+
+    def test_a_sensor_at_rest_gives_no_warning(self):
+        self.make('--scans', '3', '--speed', '0')
+        self.write('calib.txt', 'Tr: ' + text_of(TR))
+        self.assertEqual(self.mapped()[1], '')
+
+    @unittest.skipUnless(DATA, 'needs BKI_MAPPING_TEST_DATA')
+    def test_right_poses_of_real_drives_give_no_warning(self):
+        drives = sorted(glob.glob(os.path.join(DATA, 'semantickitti', 'sequences', '*'))) + \
+            sorted(glob.glob(os.path.join(DATA, 'vlp32', '*')))
+        self.assertTrue(drives)
+        for self.drive in drives:
+            self.assertNotIn('poses', self.mapped('--set', 'free_space/mode=none')[1], self.drive)
+
+
+if __name__ == '__main__':
+    unittest.main()
