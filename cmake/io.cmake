@@ -24,7 +24,7 @@ target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_jso
 bki_mapping_join(bki_mapping_io bki_mapping_simulation bki_mapping_evaluation)
 bki_mapping_precompile(bki_mapping_io
   <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
-bki_mapping_room(tools SOURCES draw.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp
+bki_mapping_room(tools SOURCES draw.cpp interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp
   LINK bki_mapping_simulation bki_mapping_query Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 # Of one file: precompiled headers serve only targets with all the definitions of theirs.

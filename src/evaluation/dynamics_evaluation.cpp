@@ -7,7 +7,6 @@
 namespace bki_mapping {
 
 void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
-  const bool early = added_ < scans_ / 2, late = added_ + late_ >= scans_;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto id = classes.classOf(scan.labels[i], labelValues(scan));
@@ -22,17 +21,24 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     voxel.ground_points += !moving && known.ground;
     voxel.standing_points += !moving && known.dynamic;
     voxel.other_points += !moving && !known.ground && !known.dynamic;
-    voxel.hit_late |= late;
+    voxel.last_hit = added_;
     if (!moving) continue;
-    voxel.moved = true;
+    moving_points_.push_back({n, added_});
     voxel.last_moved = added_;
-    if (early && voxel.early_moving_points++ == 0) unseen_.push_back(n);
+    if (!voxel.moved) unseen_.push_back(n);
+    voxel.moved = true;
     if (!voxel.seen_again) continue;
     voxel.seen_again = false;
     unseen_.push_back(n);
   }
   findSeenAgain(whole);
   ++added_;
+}
+
+std::vector<std::uint32_t> DynamicsEvaluation::earlyMovingPoints() const {
+  std::vector<std::uint32_t> early(voxels_.size());
+  for (const MovingPoint& point : moving_points_) early[point.voxel] += point.scan < scans_ / 2;
+  return early;
 }
 
 void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
@@ -60,12 +66,14 @@ bool DynamicsEvaluation::isStillThere(const VoxelIndex& index, const Taken& take
 
 std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,
                                                                         const Taken& taken) const {
+  const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
-  for (const Voxel& voxel : voxels_) {
+  for (std::size_t n = 0; n < voxels_.size(); ++n) {
+    const Voxel& voxel = voxels_[n];
     const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
     if (voxel.isShared()) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
-    } else if (voxel.early_moving_points > 0 && !mayBeOccupied(voxel, taken)) {
+    } else if (early_moving_points[n] > 0 && !mayBeOccupied(voxel, taken)) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kLeft : VoxelFate::kForgotten);
     }
   }
@@ -73,8 +81,11 @@ std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const Se
 }
 
 DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const Taken& taken) const {
+  const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   DynamicsQuality quality;
-  for (const Voxel& voxel : voxels_) {
+  for (std::size_t n = 0; n < voxels_.size(); ++n) {
+    const Voxel& voxel = voxels_[n];
+    const std::uint32_t moving = early_moving_points[n];
     const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
@@ -87,15 +98,15 @@ DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const Taken&
     } else {
       quality.floor_holes += voxel.ground_points > 0;
     }
-    if (voxel.early_moving_points == 0 || mayBeOccupied(voxel, taken)) continue;
-    quality.moving_points += voxel.early_moving_points;
-    if (!occupied) quality.moving_removed += voxel.early_moving_points;
+    if (moving == 0 || mayBeOccupied(voxel, taken)) continue;
+    quality.moving_points += moving;
+    if (!occupied) quality.moving_removed += moving;
     if (voxel.isShared() || !voxel.seen_again) {
-      (voxel.isShared() ? quality.moving_shared : quality.moving_unseen) += voxel.early_moving_points;
+      (voxel.isShared() ? quality.moving_shared : quality.moving_unseen) += moving;
       continue;
     }
-    quality.decidable_points += voxel.early_moving_points;
-    if (!occupied) quality.decidable_removed += voxel.early_moving_points;
+    quality.decidable_points += moving;
+    if (!occupied) quality.decidable_removed += moving;
   }
   quality.static_points = quality.ground_points + quality.standing_points + quality.other_points;
   quality.static_kept = quality.ground_kept + quality.standing_kept + quality.other_kept;

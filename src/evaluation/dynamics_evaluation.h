@@ -87,6 +87,8 @@ class DynamicsEvaluation {
   /// The same of a scan that lacks points. @param whole the scan with all of its beams, whatever their
   /// labels.
   void add(const Scan& scan, const ClassTable& classes, const Scan& whole);
+  /// Says that no more scans will be added, although fewer were than announced.
+  void end() { scans_ = added_; }
 
   /// Whether what moved through a voxel has left it: no point of the last scans hits the voxel, and it is not
   /// taken. @param taken may be empty.
@@ -103,19 +105,27 @@ class DynamicsEvaluation {
  private:
   struct Voxel {
     VoxelIndex index;
-    std::uint32_t ground_points = 0, standing_points = 0, other_points = 0, early_moving_points = 0;
+    std::uint32_t ground_points = 0, standing_points = 0, other_points = 0;
+    std::size_t last_hit = 0;    ///< the last scan with a point
     std::size_t last_moved = 0;  ///< the last scan with a moving point, if moved
-    bool moved = false, hit_late = false;
+    bool moved = false;
     bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
 
     bool isShared() const { return ground_points + standing_points + other_points > 0; }
   };
 
+  struct MovingPoint {
+    std::uint32_t voxel;  ///< position in voxels_
+    std::size_t scan;
+  };
+
+  /// The number of moving points in the first half of the scans, for each voxel.
+  std::vector<std::uint32_t> earlyMovingPoints() const;
   /// Notes the voxels that something moving has left and that beams of the scan come near.
   void findSeenAgain(const Scan& scan);
 
-  static bool mayBeOccupied(const Voxel& voxel, const Taken& taken) {
-    return voxel.hit_late || (taken && taken(voxel.index));
+  bool mayBeOccupied(const Voxel& voxel, const Taken& taken) const {
+    return voxel.last_hit + late_ >= scans_ || (taken && taken(voxel.index));
   }
 
   GridGeometry geometry_;
@@ -123,7 +133,8 @@ class DynamicsEvaluation {
   std::size_t scans_, late_, added_ = 0;
   GridTable index_of_;
   std::vector<Voxel> voxels_;
-  std::vector<std::uint32_t> unseen_;  ///< voxels with early moving points that were not seen again
+  std::vector<MovingPoint> moving_points_;
+  std::vector<std::uint32_t> unseen_;  ///< voxels with moving points that were not seen again
   PassingBeams beams_;                 ///< of the last scan
 };
 

@@ -55,7 +55,7 @@ void checkPointFileName(const std::string& path) {
 
 CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,
                                 const std::vector<std::size_t>& scans, const SemanticMap& map,
-                                const std::function<void(std::size_t)>& progress) {
+                                const std::function<bool(std::size_t)>& progress) {
   checkPointFileName(path);
   CleanedCount count;
   const Eigen::Vector3d origin =
@@ -63,7 +63,6 @@ CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequenc
                     : floatOrigin(sequence.pose(scans.front()).translation(), map.geometry().resolution());
   AtomicFile file(path);
   file.write(header(0, origin));
-  std::size_t done = 0;
   std::string bytes;
   for (const std::size_t i : scans) {
     const SequenceFrame frame = sequence.read(i);
@@ -72,7 +71,8 @@ CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequenc
     file.write(bytes);
     count.points += frame.points.size();
     count.kept += bytes.size() / sizeof(CleanedPoint);
-    if (progress) progress(++done);
+    ++count.scans;
+    if (progress && !progress(count.scans)) break;
   }
   std::fstream begin(file.temporaryPath(), std::ios::binary | std::ios::in | std::ios::out);
   begin << header(count.kept, origin) << std::flush;

@@ -9,6 +9,7 @@
 #include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "core/quantile.h"
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/label_noise.h"
@@ -18,6 +19,7 @@
 #include "io/truth_cloud.h"
 #include "simulation/drive_file.h"
 #include "tools/draw.h"
+#include "tools/interruption.h"
 #include "tools/sequence_options.h"
 
 namespace {
@@ -224,6 +226,7 @@ std::vector<Judgement> judgements(const po::variables_map& given, const MapperCo
 }
 
 int evaluate(const po::variables_map& given) {
+  const tools::Interruption interruption;
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const std::vector<Judgement> others = judgements(given, mapper.config());
   const Sequence sequence = tools::openSequence(given);
@@ -263,7 +266,9 @@ int evaluate(const po::variables_map& given) {
   }
   std::vector<double> times;
   LabelWatch watch;
-  for (std::size_t i = first; i < last; ++i) {
+  bool ends = interruption.requested();
+  if (ends) throw tools::Stopped("stopped before the first scan; nothing was written");
+  for (std::size_t i = first; !ends; ++i) {
     SequenceFrame frame = sequence.read(i);
     Scan scan = frame.scan();
     if (pose_noise) frame.T_map_sensor = pose_noise->next(frame.T_map_sensor);
@@ -281,12 +286,20 @@ int evaluate(const po::variables_map& given) {
     } else {
       evaluation.addUnlabelled(scan, mapper.classes());
     }
+    ends = i + 1 == last || interruption.requested();
     if (drive) {
       evaluation.end = drive->timeOf(sequence.number(i));
-      const bool count = times.size() % kGhostsEvery == 0 || i + 1 == last;
+      const bool count = times.size() % kGhostsEvery == 0 || ends;
       if (count) evaluation.truth->countGhosts(mapper.map(), evaluation.end);
     }
     tools::showProgress(times.size(), last - first, "");
+  }
+  const bool stopped = times.size() < last - first;
+  if (stopped) evaluation.dynamics.end();
+  if (stopped && sequence.layout() == SequenceLayout::kDynamicMap && evaluation.cloud) {
+    evaluation.cloud.reset();
+    std::cerr
+        << "evaluate_map: the ground-truth cloud is of all scans, so that nothing is compared with it\n";
   }
   tools::MapQuality quality = evaluation.compare(mapper.map());
   quality.median_ms = quantile(times, 0.5);
@@ -302,6 +315,11 @@ int evaluate(const po::variables_map& given) {
   }
   if (given.count("errors")) {
     drawErrors(given["errors"].as<std::string>(), errors);
+  }
+  if (stopped) {
+    throw tools::Stopped("stopped after scan " + sequence.name(first + times.size() - 1) +
+                         "; all figures are of the first " + std::to_string(times.size()) + " of " +
+                         counted(last - first, "scan"));
   }
   return 0;
 }

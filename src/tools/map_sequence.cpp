@@ -15,6 +15,7 @@
 #include "io/cleaned_points.h"
 #include "io/label_watch.h"
 #include "store/drive_overlap.h"
+#include "tools/interruption.h"
 #include "tools/run_report.h"
 #include "tools/sequence_options.h"
 
@@ -96,6 +97,25 @@ std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path,
   return stored.drives;
 }
 
+/// The id of a drive of which only a part has been mapped. @param whole the id of all of it, which stays if
+/// the map holds another drive with the id of the part.
+std::string idOfPart(const po::variables_map& given, const Sequence& sequence, std::size_t first,
+                     std::size_t end, const std::vector<DriveRecord>& drives, const std::string& whole) {
+  const std::string id = driveId(given, sequence, first, end);
+  const auto has_id = [&](const DriveRecord& drive) { return drive.id == id; };
+  return std::any_of(drives.begin(), drives.end(), has_id) ? whole : id;
+}
+
+/// How far a stopped run has come, and how to map the rest.
+std::string stoppedText(const po::variables_map& given, const Sequence& sequence, std::size_t first,
+                        std::size_t end, std::size_t last) {
+  std::string text = "stopped after scan " + sequence.name(end - 1) + ", " + std::to_string(end - first) +
+                     " of " + counted(last - first, "scan");
+  if (!given.count("output") || !isMapFileName(given["output"].as<std::string>())) return text;
+  return text + "; to map the rest, say --first " + std::to_string(sequence.number(end)) + " --resume " +
+         given["output"].as<std::string>() + (given.count("drive") ? " and another --drive" : "");
+}
+
 int mapSequence(const po::variables_map& given) {
   if (given["print-config"].as<bool>()) {
     std::cout << parameterYaml(tools::mapperConfig(given));
@@ -107,6 +127,7 @@ int mapSequence(const po::variables_map& given) {
   for (const char* file : {"output", "points", "report"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
+  const tools::Interruption interruption;
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
@@ -127,23 +148,28 @@ int mapSequence(const po::variables_map& given) {
 
   std::vector<tools::ScanReport> scans;
   std::vector<std::size_t> mapped;
-  std::size_t refused = 0;
+  std::size_t refused = 0, end = first;
   LabelWatch labels;
-  for (std::size_t i = first; i < last; ++i) {
+  for (; end < last && !interruption.requested(); ++end) {
     try {
-      const Scan scan = sequence.read(i).scan();
-      scans.push_back({sequence.name(i), mapper.integrate(scan)});
-      mapped.push_back(i);
+      const Scan scan = sequence.read(end).scan();
+      scans.push_back({sequence.name(end), mapper.integrate(scan)});
+      mapped.push_back(end);
       tools::warn(labels.report(mapper, scan, scans.back().stats.counts));
       drive.addScan(scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
     } catch (const ScanRefused& refusal) {
       // Report the first refusal and count the others, which mostly have the same reason.
       if (refused++ == 0)
-        std::cerr << "map_sequence: scan " << sequence.name(i) << ": " << refusal.what() << "\n";
+        std::cerr << "map_sequence: scan " << sequence.name(end) << ": " << refusal.what() << "\n";
       continue;
     }
     tools::showProgress(scans.size(), last - first, progressText(scans.back()));
   }
+  const bool stopped = end < last;
+  if (stopped && end == first) {
+    throw tools::Stopped("stopped before the first scan; nothing was written");
+  }
+  if (stopped) drive.id = idOfPart(given, sequence, first, end, drives, drive.id);
   if (given.count("output")) {
     const std::string output = given["output"].as<std::string>();
     if (isMapFileName(output)) {
@@ -153,19 +179,29 @@ int mapSequence(const po::variables_map& given) {
       exportMap(output, mapper.map(), mapper.classes(), states);
     }
   }
+  std::size_t cleaned = mapped.size();
   if (given.count("points")) {
     const std::string path = given["points"].as<std::string>();
-    const CleanedCount count = writeCleanedPoints(
-        path, sequence, mapped, mapper.map(),
-        [&](std::size_t done) { tools::showProgress(done, mapped.size(), "scans cleaned"); });
+    const CleanedCount count =
+        writeCleanedPoints(path, sequence, mapped, mapper.map(), [&](std::size_t done) {
+          tools::showProgress(done, mapped.size(), "scans cleaned");
+          return stopped || !interruption.requested();
+        });
     std::cout << path << ": " << count.kept << " of " << count.points << " points\n";
+    cleaned = count.scans;
   }
   if (given.count("report"))
     writeTextFile(given["report"].as<std::string>(), tools::reportJson(mapper, scans));
   std::cout << tools::summaryText(mapper, scans);
   if (refused > 0) {
-    std::cerr << "map_sequence: " << refused << " of " << counted(last - first, "scan")
+    std::cerr << "map_sequence: " << refused << " of " << counted(end - first, "scan")
               << (refused == 1 ? " was" : " were") << " refused\n";
+  }
+  if (stopped) throw tools::Stopped(stoppedText(given, sequence, first, end, last));
+  if (cleaned < mapped.size()) {
+    throw tools::Stopped("stopped after the map was complete; " + given["points"].as<std::string>() +
+                         " holds the points of " + std::to_string(cleaned) + " of " +
+                         counted(mapped.size(), "scan"));
   }
   return refused > 0 ? 1 : 0;
 }

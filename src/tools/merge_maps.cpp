@@ -9,6 +9,7 @@
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_merge.h"
 #include "core/counted.h"
+#include "tools/interruption.h"
 #include "tools/options.h"
 
 namespace {
@@ -115,7 +116,14 @@ MergeOptions mergeOptions(const po::variables_map& given) {
 
 int mergeFiles(const po::variables_map& given) {
   MergeOptions options = mergeOptions(given);
-  options.progress = [](std::size_t done, std::size_t all) { tools::showProgress(done, all, "tiles"); };
+  const tools::Interruption interruption;
+  options.progress = [&](std::size_t done, std::size_t all) {
+    tools::showProgress(done, all, "tiles");
+    if (done == all || !interruption.requested()) return;
+    // A map of some tiles would look like the whole one.
+    throw tools::Stopped("stopped after " + std::to_string(done) + " of " + counted(all, "tile") + "; " +
+                         options.output + " is as it was");
+  };
   const MergeReport report = mergeMaps(options);
   for (const std::string& path : report.resampled) {
     std::cerr << "warning: " << path

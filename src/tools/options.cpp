@@ -11,6 +11,7 @@
 #include "bki_mapping/io/tiled_map.h"
 #include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "tools/interruption.h"
 
 namespace bki_mapping::tools {
 namespace {
@@ -179,6 +180,9 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given) {
 int run(const std::string& program, const std::function<int()>& body) {
   try {
     return body();
+  } catch (const Stopped& stopped) {
+    std::cerr << (isatty(STDERR_FILENO) ? "\n" : "") << program << ": " << stopped.what() << "\n";
+    return kStoppedStatus;
   } catch (const std::exception& error) {
     std::cerr << program << ": " << error.what() << "\n";
     return 1;

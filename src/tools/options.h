@@ -58,7 +58,7 @@ MapperConfig mapperConfig(const po::variables_map& given);
 MapperConfig withSettings(MapperConfig config, const std::string& option, const std::string& settings);
 std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 
-/// Runs a program; an exception becomes one line on standard error and exit status 1.
+/// Runs a program; an exception becomes one line on standard error and exit status 1, or that of Stopped.
 int run(const std::string& program, const std::function<int()>& body);
 
 /// Prints a sentence on standard error as a warning; nothing if it is empty.

@@ -20,6 +20,7 @@ from bki_mapping.city import bags, plan
 from bki_mapping.city.description import CityError
 
 VERSION = 3  # of the tasks: a worker whose modules have another cannot do them
+STOPPED = 130  # status of programs that SIGTERM or SIGINT has ended early
 TRIES = 3  # of a program that a signal ends, as when memory is short
 SIGHT = 10.0  # how long a worker may take to see what another machine has written [s]
 # Signals that come from outside of a program, or from a processor that it was not built for.
@@ -134,6 +135,8 @@ def run(setup, name, arguments, log):
                 raise not_started(command[0], error.strerror) from None
             _, status, usage = os.wait4(process.pid, 0)
             status = process.returncode = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
+            if status == STOPPED:
+                status = -signal.SIGTERM
             errors.seek(0)
             text = errors.read().decode(errors='replace')
             spent += usage.ru_utime + usage.ru_stime
