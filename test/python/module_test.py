@@ -318,6 +318,37 @@ class Queries(unittest.TestCase):
 
 
 class Files(WithFolder):
+    def test_scans_that_drives_share_count_once(self):
+        whole, part = (bki.SemanticMapper(drive=f'04/000000-00000{last}') for last in (9, 4))
+        whole.integrate((0, 0, 1), *wall())
+        part.integrate((0, 0, 1), *wall())
+        whole.save(self.path('whole.bkm'))
+        part.save(self.path('part.bkm'))
+        files, both = [self.path('whole.bkm'), self.path('part.bkm')], self.path('both.bkm')
+        with self.assertRaisesRegex(bki.MapFileError, 'share scans 000000 to 000004 of 04, which would count twice'):
+            bki.merge(files, both)
+        for add in (lambda: whole.load(files[1]), lambda: whole.add(part.map)):
+            with self.assertRaisesRegex(ValueError, 'share scans 000000 to 000004 of 04'):
+                add()
+        self.assertEqual(len(bki.merge(files, both, allow_overlap=True)['drives']), 2)
+
+    def test_sequences_without_labels_and_with_poses_of_the_lidar(self):
+        subprocess.run([os.path.join(BIN, 'simulate_drive'), '--scans', '2', '--beams', '16', '--columns', '100', '--output',
+                        self.path('drive')], check=True, capture_output=True, timeout=60)
+        labelled = bki.Sequence(self.path('drive'))
+        for name in ('labels', 'calib.txt'):
+            os.rename(os.path.join(self.path('drive'), name), self.path(name))
+        with self.assertRaisesRegex(RuntimeError, 'labels is not a folder'):
+            bki.Sequence(self.path('drive'))
+        plain = bki.Sequence(self.path('drive'), labels=None, poses_in='lidar')
+        self.assertEqual(set(plain[1].labels), {0})
+        np.testing.assert_array_equal(plain[1].pose, labelled[1].pose)
+        with open(self.path('poses.tum'), 'w') as file:
+            file.write('0 1 2 3 0 0 0 1\n0.1 4 5 6 0 0 0 1\n')
+        self.assertEqual(list(bki.Sequence(self.path('drive'), None, poses=self.path('poses.tum'))[1].pose[:3, 3]), [4, 5, 6])
+        with self.assertRaisesRegex(ValueError, "poses_in is 'radar', but must be 'camera' or 'lidar'"):
+            bki.Sequence(self.path('drive'), None, poses_in='radar')
+
     def test_save_load_add_and_merge(self):
         a, b = bki.SemanticMapper(drive='a'), bki.SemanticMapper(drive='b')
         a.integrate((0, 0, 1), *wall())
