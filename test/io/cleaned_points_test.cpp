@@ -88,7 +88,9 @@ TEST(CleanedPoints, AreRelativeToTheViewpointFarFromTheOrigin) {
   const GridIndex blocks{208000, 1666000, 0};  // a place in UTM coordinates
   const Eigen::Vector3d place = 2.4 * Eigen::Vector3d(blocks.x, blocks.y, blocks.z);
   const std::string written = writeSequence(folder, place);
-  const Sequence sequence(written, "labels", written + "/poses.txt");
+  SequenceOptions options;
+  options.map_poses = written + "/poses.txt";
+  const Sequence sequence(written, options);
   const SemanticMap near = randomMap(2, 200, 3);
   SemanticMap map = infoOf().emptyMap();
   for (const auto& [index, block] : near.entries()) {
