@@ -40,29 +40,20 @@ bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Thr
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES
     clear_box.cpp column_map.cpp neighbourhood.cpp semantic_map.cpp voxel_state.cpp
-    view_kernels.cpp view_kernels_avx2.cpp view_kernels_avx512.cpp view_kernels_generic.cpp
   LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
-bki_mapping_core_room(update SOURCES
-    map_updater.cpp
-    sum_kernels.cpp sum_kernels_avx2.cpp sum_kernels_avx512.cpp sum_kernels_generic.cpp
-    sum_sink.cpp update_rules.cpp void_search.cpp
+bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.cpp void_search.cpp
   LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(query SOURCES
     distance_field.cpp
-    distance_kernels.cpp distance_kernels_avx2.cpp distance_kernels_avx512.cpp distance_kernels_generic.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_map bki_mapping_parallel)
 bki_mapping_core_room(points SOURCES
-    cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp
-    point_kernels.cpp point_kernels_avx2.cpp point_kernels_avx512.cpp point_kernels_generic.cpp
-    tile_grid.cpp
+    cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp
-    raster/group_sums.cpp
-    raster/line_kernels.cpp raster/line_kernels_avx2.cpp raster/line_kernels_avx512.cpp raster/line_kernels_generic.cpp
-    raster/line_setup.cpp
+    raster/group_sums.cpp raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
 bki_mapping_core_room(free_space SOURCES
@@ -70,6 +61,12 @@ bki_mapping_core_room(free_space SOURCES
   LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
+
+bki_mapping_kernels(map view_kernels)
+bki_mapping_kernels(update sum_kernels)
+bki_mapping_kernels(query distance_kernels)
+bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
+bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
 
 # Map files: SQLite and zlib. They name the program that wrote them.
 file(STRINGS package.xml version_line REGEX "<version>")

@@ -315,5 +315,8 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
   return AnyTrue(any != 0);
 }
 
+constexpr ViewKernels kViewKernels = {kInstructionSet, readPlanes<false, false>, readPlanes<true, false>,
+                                      readPlanes<true, true>, readVotes};
+
 }  // namespace
 }  // namespace bki_mapping

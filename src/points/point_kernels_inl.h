@@ -7,6 +7,7 @@
 #include "bki_mapping/map/block.h"
 #include "kernel/vec_kernel_inl.h"
 #include "points/local_point.h"
+#include "points/tile_kernels_inl.h"
 
 namespace bki_mapping {
 namespace {
@@ -206,6 +207,8 @@ Block::Layers sumPoints(const PointRun* runs, std::size_t count, float reach, fl
   for (int v = 0; v < kBlockVoxels; ++v) sums[v] = notNegative(scale * sums[v]);
   return {};
 }
+
+constexpr PointKernels kPointKernels = {kInstructionSet, sumPoints, locatePoints, locateCells, reachBlocks};
 
 }  // namespace
 }  // namespace bki_mapping

@@ -1,5 +1,5 @@
 /// @file Which cells of a grid hold points. Plain loops over arrays, which compilers turn into vector
-/// instructions; included once for each instruction set, by point_kernels_*.cpp.
+/// instructions; included once for each instruction set, with point_kernels_inl.h.
 #pragma once
 
 #include <cmath>

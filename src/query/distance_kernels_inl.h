@@ -131,5 +131,7 @@ void searchColumns(const std::int32_t* first, std::size_t stride, std::size_t la
   }
 }
 
+constexpr DistanceKernels kDistanceKernels = {kInstructionSet, sweepColumns, searchRow, searchColumns};
+
 }  // namespace
 }  // namespace bki_mapping

@@ -21,6 +21,7 @@
 
 namespace bki_mapping {
 namespace {
+constexpr const char* kInstructionSet = "avx2";
 constexpr int kLanes = 8;
 constexpr bool kHasTable32 = false;
 }  // namespace

@@ -23,6 +23,7 @@
 
 namespace bki_mapping {
 namespace {
+constexpr const char* kInstructionSet = "avx512";
 constexpr int kLanes = 16;
 constexpr bool kHasTable32 = true;
 }  // namespace

@@ -3,6 +3,7 @@
 
 namespace bki_mapping {
 namespace {
+constexpr const char* kInstructionSet = "generic";
 constexpr int kLanes = 4;
 constexpr bool kHasTable32 = false;
 }  // namespace

@@ -104,5 +104,8 @@ inline void findSums(const float* sums, Block::Layers layers, float least, std::
   }
 }
 
+constexpr SumKernels kSumKernels = {kInstructionSet, addSums<false>, addSums<true>, addUnits<false>,
+                                    addUnits<true>,  limitSums,      findSums};
+
 }  // namespace
 }  // namespace bki_mapping

@@ -16,7 +16,7 @@
 /// The narrow way exists because it evaluates the kernel only twice for a beam and a slice, whereas a
 /// straight slice takes a whole vector for the three or four voxels that matter.
 ///
-/// These files are included once for each instruction set, by line_kernels_*.cpp.
+/// These files are included once for each instruction set, by files that cmake/kernels.cmake writes.
 #pragma once
 
 #include <algorithm>
@@ -126,6 +126,8 @@ void traceBeams(const LineSetupArrays& beams, const BeamRange* ranges, std::size
 void weigh(BeamWeight weight, float* rho) {
   withWeight(weight, [&](auto w) { weighWith<decltype(w)::value>(rho); });
 }
+
+constexpr LineKernels kLineKernels = {kInstructionSet, setUpLines, traceBeams, weigh, VecKernel::kScale};
 
 }  // namespace
 }  // namespace bki_mapping
