@@ -97,16 +97,16 @@ void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBl
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockIndex& index = blocks[b].index;
-    BlockSums& sums = sink.open(b);
-    float* const values = sums.open(kFreeClass).values;
-    if (counting) {
-      countCrossings(index, own.near, values);
-    } else {
-      own.group.sumsOf({coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)},
-                       values);
-    }
-    if (!scaleSums(field_->kernel().scale, values)) sums.drop();
-    sink.close();
+    sink.add(b, [&](BlockSums& sums) {
+      float* const values = sums.open(kFreeClass).values;
+      if (counting) {
+        countCrossings(index, own.near, values);
+      } else {
+        own.group.sumsOf({coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)},
+                         values);
+      }
+      if (!scaleSums(field_->kernel().scale, values)) sums.drop();
+    });
   }
 }
 

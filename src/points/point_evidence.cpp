@@ -142,8 +142,7 @@ void PointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>&
                                SumSink& sink) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (b + kAhead < blocks.size()) prefetch(blocks[b + kAhead].position);
-    sumBlock(blocks[b].position, workspaces_[worker], sink.open(b));
-    sink.close();
+    sink.add(b, [&](BlockSums& sums) { sumBlock(blocks[b].position, workspaces_[worker], sums); });
   }
 }
 

@@ -15,12 +15,6 @@ namespace bki_mapping {
 /// A set of classes; may contain kFreeClass.
 using ClassSet = std::bitset<256>;
 
-/// A block of a group, and its position in touchedBlocks().
-struct GroupBlock {
-  BlockIndex index;
-  std::uint32_t position;
-};
-
 /// A step of the update that works on blocks, group by group. Owns the working memory of each thread.
 class BlockTask {
  public:

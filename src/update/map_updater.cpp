@@ -43,7 +43,7 @@ std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
   return static_cast<std::uint32_t>(jobs_.size() - 1);
 }
 
-void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {
+void MapUpdater::collect(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {
   for (std::size_t t = 0; t < task_count_; ++t) {
     const std::vector<GridIndex>& blocks = tasks_[t].work->touchedBlocks(map, limits.blocks, pool);
     std::vector<std::uint32_t>& positions = tasks_[t].positions;
@@ -54,6 +54,7 @@ void MapUpdater::collectJobs(SemanticMap& map, const UpdateLimits& limits, Threa
       positions[job] = static_cast<std::uint32_t>(b);
     }
   }
+  groupJobs();
 }
 
 void MapUpdater::groupJobs() {
@@ -98,9 +99,8 @@ std::size_t MapUpdater::reservePlanes(BlockJob& job) {
   return count;
 }
 
-void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
-                         bool withdraws, ThreadPool& pool) {
-  for (std::size_t t = 0; t < task_count_; ++t) tasks_[t].work->reserve(pool.count());
+std::size_t MapUpdater::reserveBlocks(const UpdateLimits& limits, std::ptrdiff_t index_bytes,
+                                      ThreadPool& pool) {
   std::atomic<std::ptrdiff_t> bytes{index_bytes};
   std::atomic<std::size_t> most_classes{0};
   const auto most = static_cast<std::ptrdiff_t>(
@@ -123,26 +123,30 @@ void MapUpdater::reserve(const UpdateRules& rules, const UpdateLimits& limits, s
     const std::ptrdiff_t sum = bytes += of_group;
     if (sum > most) throw TooMuchWork(TooMuchWork::What::kBytes, static_cast<double>(sum));
   });
+  return most_classes;
+}
+
+void MapUpdater::reserveSeams() {
+  const auto isBottom = [](const BlockJob& job) { return slotInGroup(job.index) < kSlotsOfLayer; };
+  seams_.assign(jobs_.size(), {});
+  seam_sums_.resize(static_cast<std::size_t>(std::count_if(jobs_.begin(), jobs_.end(), isBottom)));
+  auto sums = seam_sums_.begin();
+  for (std::size_t j = 0; j < jobs_.size(); ++j) {
+    if (isBottom(jobs_[j])) seams_[j].sums = (sums++)->data();
+  }
+}
+
+void MapUpdater::reserve(const UpdateLimits& limits, std::ptrdiff_t index_bytes, ThreadPool& pool) {
+  for (std::size_t t = 0; t < task_count_; ++t) tasks_[t].work->reserve(pool.count());
+  const std::size_t most_classes = reserveBlocks(limits, index_bytes, pool);
   workers_.resize(pool.count());
   for (Worker& worker : workers_) {
-    worker.sink.reserve(rules, most_classes, withdraws);
+    worker.sums.reserve(rules_, most_classes, withdraws_);
     worker.blocks.reserve(kGroupBlocks);
-    worker.slots.reserve(kGroupBlocks);
-    worker.targets.reserve(kGroupBlocks);
-    worker.seen.reserve(kGroupBlocks);
-    worker.seams.reserve(kGroupBlocks);
-    worker.later = {};
+    worker.mended = {};
   }
-  if (rules.asksBelow()) {
-    const auto isBottom = [](const BlockJob& job) { return slotInGroup(job.index) < kSlotsOfLayer; };
-    seams_.assign(jobs_.size(), {});
-    seam_sums_.resize(static_cast<std::size_t>(std::count_if(jobs_.begin(), jobs_.end(), isBottom)));
-    auto sums = seam_sums_.begin();
-    for (std::size_t j = 0; j < jobs_.size(); ++j) {
-      if (isBottom(jobs_[j])) seams_[j].sums = (sums++)->data();
-    }
-  }
-  if (rules.seeksVoids()) voids_.start(jobs_.size());
+  if (rules_.asksBelow()) reserveSeams();
+  if (rules_.seeksVoids()) voids_.start(jobs_.size());
 }
 
 void MapUpdater::useCopies(SemanticMap& map) noexcept {
@@ -163,44 +167,57 @@ void MapUpdater::rollBack(SemanticMap& map) noexcept {
 BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker& to) {
   BlockGroup selected = {group.blocks.index, 0};
   to.blocks.clear();
-  to.slots.clear();
-  to.targets.clear();
-  to.seen.clear();
-  to.seams.clear();
   for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
-    const std::uint32_t touched = task.positionOf(jobs_[j].number);
+    const BlockJob& job = jobs_[j];
+    const std::uint32_t touched = task.positionOf(job.number);
     if (touched == kNoPosition) continue;
-    const int slot = slotInGroup(jobs_[j].index);
-    selected.blocks |= std::uint64_t{1} << slot;
-    to.blocks.push_back({jobs_[j].index, touched});
-    to.slots.push_back(slot);
-    to.targets.push_back(jobs_[j].block);
-    if (seeks_voids_) to.seen.push_back(&voids_.at(j));
-    if (asks_below_) to.seams.push_back(&seams_[j]);
+    selected.blocks |= std::uint64_t{1} << slotInGroup(job.index);
+    to.blocks.emplace_back(job.index, touched, job.block, rules_.seeksVoids() ? &voids_.at(j) : nullptr,
+                           rules_.asksBelow() ? &seams_[j] : nullptr);
   }
   return selected;
 }
 
 void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   Worker& own = workers_[worker];
-  own.sink.startGroup();
+  GroupInWork in_work(own.sums);
   for (std::size_t t = 0; t < task_count_; ++t) {
     const Task& task = tasks_[t];
     const BlockGroup selected = selectBlocks(task, group, own);
     if (own.blocks.empty()) continue;
     if (task.evidence) {
-      own.sink.startEvidence(task.kind, own.slots, own.targets, own.seen, own.seams);
-      task.evidence->accumulate(selected, own.blocks, worker, own.sink);
+      SumSink sink(in_work, task.kind, own.blocks);
+      task.evidence->accumulate(selected, own.blocks, worker, sink);
     } else {
-      for (std::size_t b = 0; b < own.blocks.size(); ++b)
-        task.pass->apply(own.blocks[b], worker, *own.targets[b]);
+      for (const GroupBlock& block : own.blocks) task.pass->apply(block, worker, *block.block_);
     }
   }
 }
 
-void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws,
-                                std::size_t worker) {
-  const auto add = withdraws ? kernels_.withdraw_units : kernels_.add_units;
+void MapUpdater::add(ThreadPool& pool) {
+  const auto add_group = [&](std::size_t g, std::size_t worker) {
+    addGroup(groups_[g], worker);
+    if (!mends()) finishGroup(groups_[g]);
+  };
+  if (!groups_.empty() && groups_.front().cost > 0.0) {
+    pool.forEachInOrder(groups_.size(), add_group);
+  } else {
+    pool.forEach(groups_.size(), add_group);
+  }
+}
+
+void MapUpdater::mend(ThreadPool& pool) {
+  if (rules_.seeksVoids()) voids_.find(by_group_, pool);
+  const EvidenceUnits of_void = roundedUnits(rules_.void_evidence);
+  pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
+    if (rules_.asksBelow()) mendSeams(groups_[g], worker);
+    if (rules_.seeksVoids()) addVoids(groups_[g], of_void, worker);
+    finishGroup(groups_[g]);
+  });
+}
+
+void MapUpdater::mendSeams(const Group& group, std::size_t worker) {
+  const auto add = withdraws_ ? kernels_.withdraw_units : kernels_.add_units;
   const GridIndex& index = group.blocks.index;
   const std::uint32_t group_below = by_group_.groups().find({index.x, index.y, index.z - 1});
   if (group_below == kNoPosition) return;
@@ -213,17 +230,17 @@ void MapUpdater::addAcrossSeams(const Group& group, const UpdateRules& rules, bo
     EvidenceUnits units[kBlockEdge * kBlockEdge] = {};
     for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
       const int v = __builtin_ctzll(left);
-      units[v] = heldBack(rules, seams_[job].sums[v]);
+      units[v] = heldBack(rules_, seams_[job].sums[v]);
     }
     jobs_[job].block->change(kFreeClass, [&](EvidenceUnits* plane) {
-      return add(&voxels, 1, units, plane, workers_[worker].later);
+      return add(&voxels, 1, units, plane, workers_[worker].mended);
     });
   }
 }
 
-void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker) {
-  SumCounts& counts = workers_[worker].later;
-  const auto add = withdraws ? kernels_.withdraw_units : kernels_.add_units;
+void MapUpdater::addVoids(const Group& group, EvidenceUnits units, std::size_t worker) {
+  SumCounts& counts = workers_[worker].mended;
+  const auto add = withdraws_ ? kernels_.withdraw_units : kernels_.add_units;
   EvidenceUnits of_layer[kBlockEdge * kBlockEdge];
   std::fill(std::begin(of_layer), std::end(of_layer), units);
   const std::size_t end = by_group_.end(group.position);
@@ -239,10 +256,10 @@ void MapUpdater::addVoids(const Group& group, EvidenceUnits units, bool withdraw
   }
 }
 
-void MapUpdater::finishGroup(const Group& group, bool withdraws) {
+void MapUpdater::finishGroup(const Group& group) {
   for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
     BlockJob& job = jobs_[j];
-    if (withdraws) job.block->shrink();
+    if (withdraws_) job.block->shrink();
     job.empty = job.block->empty();
     const std::size_t after = job.empty ? 0 : job.block->bytes();
     job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
@@ -255,16 +272,14 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   Stopwatch watch;
   touched_.clear();
   jobs_.clear();
+  rules_ = rules;
+  withdraws_ = scan.withdraws;
   const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
   const std::ptrdiff_t index_before = indexBytes();
-  seeks_voids_ = rules.seeksVoids();
-  asks_below_ = rules.asksBelow();
-  const bool adds_later = seeks_voids_ || asks_below_;
   try {
     setTasks(scan);
-    collectJobs(map, limits, pool);
-    groupJobs();
-    reserve(rules, limits, indexBytes() - index_before, scan.withdraws, pool);
+    collect(map, limits, pool);
+    reserve(limits, indexBytes() - index_before, pool);
   } catch (...) {
     rollBack(map);
     throw;
@@ -274,29 +289,13 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
 
   // From here on nothing allocates memory, so that nothing can fail.
   useCopies(map);
-  const auto add = [&](std::size_t g, std::size_t worker) {
-    addGroup(groups_[g], worker);
-    if (!adds_later) finishGroup(groups_[g], scan.withdraws);
-  };
-  if (!groups_.empty() && groups_.front().cost > 0.0) {
-    pool.forEachInOrder(groups_.size(), add);
-  } else {
-    pool.forEach(groups_.size(), add);
-  }
-  if (seeks_voids_) voids_.find(by_group_, pool);
-  if (adds_later) {
-    const EvidenceUnits of_void = roundedUnits(rules.void_evidence);
-    pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
-      if (asks_below_) addAcrossSeams(groups_[g], rules, scan.withdraws, worker);
-      if (seeks_voids_) addVoids(groups_[g], of_void, scan.withdraws, worker);
-      finishGroup(groups_[g], scan.withdraws);
-    });
-  }
+  add(pool);
+  if (mends()) mend(pool);
   for (const BlockJob& job : jobs_) {
     stats.bytes += job.bytes;
     if (job.empty) map.erase(job.index);
   }
-  for (Worker& worker : workers_) stats.sums += worker.later += worker.sink.counts();
+  for (Worker& worker : workers_) stats.sums += worker.mended += worker.sums.counts();
   stats.update_ms = watch.lap();
   return stats;
 }

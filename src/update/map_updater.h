@@ -36,9 +36,12 @@ struct UpdateLimits {
   std::size_t bytes = std::numeric_limits<std::size_t>::max();   ///< by which the map's memory may grow
 };
 
-/// Adds scans to maps in three phases: collect the touched blocks and create those that are missing, reserve
-/// all memory and copy the blocks that a snapshot shares, then add the sums, one job for each group of
-/// blocks. Only the first two phases can fail; they are then undone. Keeps its memory from scan to scan.
+/// Adds scans to maps in four phases:
+/// 1. collect the touched blocks, create those that are missing, and order them by group;
+/// 2. reserve all memory, and copy the blocks that a snapshot shares;
+/// 3. add the sums, one job for each group;
+/// 4. mend what depends on blocks of other groups: the threshold across the seams of groups, and voids.
+/// Only the first two phases can fail; they are then undone. Keeps its memory from scan to scan.
 class MapUpdater {
  public:
   /// Adds a scan: hits, then free space, then marks. The result is the same to the bit for any number of
@@ -86,42 +89,49 @@ class MapUpdater {
     }
   };
 
-  /// Working memory of one thread: the blocks of a group that a task touches.
+  /// Working memory of one thread.
   struct alignas(kThreadsApart) Worker {
-    SumSink sink;
-    std::vector<GroupBlock> blocks;
-    std::vector<int> slots;
-    std::vector<Block*> targets;
-    std::vector<SeenVoxels*> seen;
-    std::vector<BlockSeam*> seams;
-    SumCounts later;  ///< of addAcrossSeams and addVoids
+    SumWorkspace sums;
+    std::vector<GroupBlock> blocks;  ///< of a group that a task touches
+    SumCounts mended;                ///< of mend()
   };
 
   void setTasks(const ScanEvidence& scan);
-  void collectJobs(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool);
+  // The phases:
+  void collect(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool);
+  /// @param index_bytes growth of the map's index in this update.
+  void reserve(const UpdateLimits& limits, std::ptrdiff_t index_bytes, ThreadPool& pool);
+  void add(ThreadPool& pool);
+  void mend(ThreadPool& pool);
+
+  // Parts of collect():
   /// @return the position of a block's job in jobs_; creates the job, and the block, if missing.
   std::uint32_t jobOf(SemanticMap& map, const BlockIndex& index);
   void groupJobs();
-  /// Allocates all planes and all working memory that the jobs can need.
-  /// @param index_bytes growth of the map's index in this update.
-  void reserve(const UpdateRules& rules, const UpdateLimits& limits, std::ptrdiff_t index_bytes,
-               bool withdraws, ThreadPool& pool);
+  // Of reserve():
   /// Reserves the planes of a job's block.
   /// @return the number of classes to which this scan may add in the block.
   std::size_t reservePlanes(BlockJob& job);
+  /// Reserves the planes of all blocks. @return the most classes that one of them needs.
+  std::size_t reserveBlocks(const UpdateLimits& limits, std::ptrdiff_t index_bytes, ThreadPool& pool);
+  void reserveSeams();
   /// Puts the copies of shared blocks into the map.
   void useCopies(SemanticMap& map) noexcept;
   /// Undoes the first two phases: erases the blocks that they created, and frees reserved planes.
   void rollBack(SemanticMap& map) noexcept;
+  // Of add():
   void addGroup(const Group& group, std::size_t worker);
-  /// Adds to the bottom layer of a group what the threshold has taken above crossed voxels, or withdraws it.
-  void addAcrossSeams(const Group& group, const UpdateRules& rules, bool withdraws, std::size_t worker);
-  /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
-  void addVoids(const Group& group, EvidenceUnits units, bool withdraws, std::size_t worker);
-  /// Counts the memory of a group. @param withdraws whether that of planes that are gone is returned.
-  void finishGroup(const Group& group, bool withdraws);
   /// Lists, in the worker's memory, the blocks of a group that a task touches. @return them as a group.
   BlockGroup selectBlocks(const Task& task, const Group& group, Worker& to);
+  // Of mend():
+  /// Adds to the bottom layer of a group what the threshold has taken above crossed voxels, or withdraws it.
+  void mendSeams(const Group& group, std::size_t worker);
+  /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
+  void addVoids(const Group& group, EvidenceUnits units, std::size_t worker);
+
+  bool mends() const { return rules_.seeksVoids() || rules_.asksBelow(); }
+  /// Counts the memory of a group, and returns that of planes that are gone.
+  void finishGroup(const Group& group);
 
   const SumKernels& kernels_ = sumKernelsFor("");
   IndexNumbering touched_;        ///< blocks, in the order in which jobs were collected
@@ -133,7 +143,8 @@ class MapUpdater {
   std::size_t task_count_ = 0;  ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
   // Of this scan:
-  bool seeks_voids_ = false, asks_below_ = false;
+  UpdateRules rules_;
+  bool withdraws_ = false;
   VoidSearch voids_;
   std::vector<BlockSeam> seams_;                                       ///< of the jobs
   std::vector<std::array<float, kBlockEdge * kBlockEdge>> seam_sums_;  ///< of those at the bottom of a group

@@ -1,7 +1,9 @@
-/// @file The receiver of the sums of evidence.
+/// @file The way of sums from the evidence into the map: SumWorkspace, of a thread; GroupInWork, of a group
+/// of blocks; SumSink, of a piece of evidence. Each needs the one before.
 #pragma once
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "parallel/thread_pool.h"
@@ -11,56 +13,104 @@
 
 namespace bki_mapping {
 
-/// Receives the sums of the blocks of one group, applies the rules, rounds the result to units, and adds it
-/// to the map's blocks, or subtracts it: first the hits of all blocks, then their free space. Each thread has
-/// one.
-class alignas(kThreadsApart) SumSink {
+/// A block of a group that a piece of evidence, or a pass, touches.
+class GroupBlock {
  public:
-  /// Call before an update. @param classes most classes for a block; their memory is allocated here.
-  void reserve(const UpdateRules& rules, std::size_t classes, bool withdraws);
-  /// Call before each group.
-  void startGroup();
-  enum class Kind { kHits, kFree };
-  /// Call before each piece of evidence. @param slots of its blocks in the group, rising. @param targets
-  /// those blocks in the same order. @param seen, seams what the scan says of those blocks, to be noted if
-  /// rules ask for it. All must stay valid until the evidence is done.
-  void startEvidence(Kind kind, const std::vector<int>& slots, const std::vector<Block*>& targets,
-                     const std::vector<SeenVoxels*>& seen, const std::vector<BlockSeam*>& seams);
+  BlockIndex index;
+  std::uint32_t position;  ///< in BlockTask::touchedBlocks()
 
-  /// For the evidence: returns the empty sums of its i-th block, to be filled.
-  BlockSums& open(std::size_t i) {
-    // Prefetch planes while the sums of the blocks before are computed.
-    constexpr std::size_t kAhead = 2;
-    if (i + 2 * kAhead < targets_->size()) __builtin_prefetch((*targets_)[i + 2 * kAhead]);
-    if (i + kAhead < targets_->size()) (*targets_)[i + kAhead]->prefetch();
-    current_ = i;
-    sums_.clear();
-    return sums_;
+  /// @param seen, seam what the scan says of the block, to be noted if rules ask for it; nullptr: they do
+  /// not.
+  GroupBlock(const BlockIndex& index_of_block, std::uint32_t position_of_block, Block* block,
+             SeenVoxels* seen, BlockSeam* seam)
+      : index(index_of_block),
+        position(position_of_block),
+        block_(block),
+        seen_(seen),
+        seam_(seam),
+        slot_(static_cast<std::size_t>(slotInGroup(index))) {}
+
+ private:
+  friend class MapUpdater;
+  friend class SumSink;  // evidence itself writes to no map
+
+  Block* block_;
+  SeenVoxels* seen_;
+  BlockSeam* seam_;
+  std::size_t slot_;
+};
+
+/// Working memory of one thread, for one scan after the other.
+class alignas(kThreadsApart) SumWorkspace {
+ public:
+  /// @param classes most classes for a block; their memory is allocated here.
+  void reserve(const UpdateRules& rules, std::size_t classes, bool withdraws) {
+    rules_ = rules;
+    withdraws_ = withdraws;
+    counts_ = {};
+    sums_.reserve(classes);
   }
-  /// For the evidence: applies the rules to the sums, and adds them to the block.
-  void close();
-
   const SumCounts& counts() const { return counts_; }  ///< since reserve()
 
  private:
-  /// Also fills the seam of the block, and reached_top_. @return the voxels whose evidence for `free` reaches
-  /// its limit.
-  VoxelMask applyRulesToFree(std::size_t slot);
+  friend class GroupInWork;
+  friend class SumSink;
 
   const SumKernels* kernels_ = &sumKernelsFor("");
   UpdateRules rules_;
   bool withdraws_ = false;
-  Kind kind_ = Kind::kHits;
-  const std::vector<int>* slots_ = nullptr;
-  const std::vector<Block*>* targets_ = nullptr;
-  const std::vector<SeenVoxels*>* seen_ = nullptr;
-  const std::vector<BlockSeam*>* seams_ = nullptr;
-  std::size_t current_ = 0;
   BlockSums sums_;
   std::array<VoxelMask, kGroupBlocks> protected_;        ///< voxels that take no evidence for `free`, by slot
   std::array<VoxelMask, kGroupBlocks> hit_;              ///< voxels to which hits add evidence, by slot
   std::array<std::uint64_t, kGroupBlocks> reached_top_;  ///< as in BlockSeam, by slot
   SumCounts counts_;
+};
+
+/// The group that a thread works on: remembers what its hits say, for its free space. One lives at a time.
+class GroupInWork {
+ public:
+  explicit GroupInWork(SumWorkspace& workspace) : workspace_(workspace) {
+    if (workspace.rules_.protectsVoxels()) workspace.protected_.fill({});
+    if (workspace.rules_.seeksVoids()) workspace.hit_.fill({});
+    if (workspace.rules_.asksBelow()) workspace.reached_top_.fill(0);
+  }
+
+ private:
+  friend class SumSink;
+  SumWorkspace& workspace_;
+};
+
+/// Receives the sums of the blocks of one group from one piece of evidence, hits before free space: applies
+/// the rules, rounds the result to units, and adds it to the map's blocks, or subtracts it.
+class SumSink {
+ public:
+  enum class Kind { kHits, kFree };
+
+  /// @param blocks must stay as they are while this exists.
+  SumSink(GroupInWork& group, Kind kind, const std::vector<GroupBlock>& blocks)
+      : work_(group.workspace_), kind_(kind), blocks_(blocks) {}
+
+  /// Adds to the i-th block what `fill(BlockSums&)` puts into its empty sums. Call it by rising i.
+  template <typename Fill>
+  void add(std::size_t i, Fill&& fill) {
+    // Prefetch planes while the sums of the blocks before are computed.
+    constexpr std::size_t kAhead = 2;
+    if (i + 2 * kAhead < blocks_.size()) __builtin_prefetch(blocks_[i + 2 * kAhead].block_);
+    if (i + kAhead < blocks_.size()) blocks_[i + kAhead].block_->prefetch();
+    work_.sums_.clear();
+    std::forward<Fill>(fill)(work_.sums_);
+    addSums(blocks_[i]);
+  }
+
+ private:
+  void addSums(const GroupBlock& to);
+  /// Also fills the seam of the block, and reached_top_. @return the voxels whose evidence for `free` reaches
+  /// its limit.
+  VoxelMask applyRulesToFree(const GroupBlock& block);
+
+  SumWorkspace& work_;
+  Kind kind_;
+  const std::vector<GroupBlock>& blocks_;
 };
 
 }  // namespace bki_mapping
