@@ -13,6 +13,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include "bki_mapping/io/yaml.h"
@@ -179,6 +180,21 @@ class DriverLayouts : public testing::Test {
     EXPECT_TRUE(placed.unlisted_labels.empty() || !labelled);
   }
 
+  /// The directions of beams without a return, where the returns tell them, are right to half the spacing of
+  /// beams. @param holes by place in the cloud.
+  static void expectHoles(const PlacedScan& placed, const std::map<std::size_t, Beam>& holes) {
+    const std::vector<Eigen::Vector3f>& found = placed.scan.no_returns;
+    ASSERT_EQ(found.size(), holes.size());
+    std::size_t known = 0, n = 0;
+    for (const auto& [place, beam] : holes) {
+      const Eigen::Vector3f& direction = found[n++];
+      if (direction.isZero()) continue;
+      ++known;
+      ASSERT_LT((direction.normalized() - beam.direction.cast<float>()).norm(), 0.5 * kStep) << place;
+    }
+    EXPECT_GT(known, 100u);
+  }
+
   InputConfig input_;
   std::unique_ptr<ClassTable> classes_;
 };
@@ -222,21 +238,23 @@ TEST_F(DriverLayouts, Velodyne) {
 TEST_F(DriverLayouts, VelodyneOrganised) {
   // organize_cloud: a row a firing, a column a ring, NaN without a return.
   Layout layout(kVelodyne, 26, kColumns, kRings);
-  std::size_t hits = 0, holes = 0;
+  std::size_t hits = 0;
+  std::map<std::size_t, Beam> holes;
   for (const Beam& beam : fired()) {
     const std::size_t n = beam.column * kRings + beam.ring;
     const auto hit = hitOf(beam, sensorAt(beam));
     hits += hit ? 1 : 0;
-    holes += hit ? 0 : 1;
+    if (!hit) holes.emplace(n, beam);
     layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : Eigen::Vector3f::Constant(kNan));
     layout.set(n, "time", beam.time - kScan);
     layout.set(n, "label", hit ? hit->label : 0);
   }
   layout.cloud.header.stamp = ros::Time(kStamp + kScan);
   input_.time_field = "time";
+  input_.clear_no_returns = true;
   const PlacedScan scan = read(layout.cloud, kStamp);
   expectHall(scan, hits);
-  ASSERT_GT(holes, 500u);
+  expectHoles(scan, holes);
 }
 
 TEST_F(DriverLayouts, Ouster) {
@@ -250,11 +268,13 @@ TEST_F(DriverLayouts, Ouster) {
                                   {"label", PointField::UINT16, 36}});
   Layout layout(fields, 48, kRings, kColumns);
   std::size_t hits = 0;
+  std::map<std::size_t, Beam> holes;
   for (const Beam& beam : fired()) {
     const std::size_t n = beam.ring * kColumns + beam.column;
     layout.set(n, "t", 1e9 * beam.time);
     layout.set(n, "ring", static_cast<double>(beam.ring));
     const auto hit = hitOf(beam, sensorAt(beam));
+    if (!hit) holes.emplace(n, beam);
     if (!hit) continue;
     ++hits;
     layout.set(n, hit->place.cast<float>());
@@ -264,9 +284,11 @@ TEST_F(DriverLayouts, Ouster) {
   layout.cloud.header.stamp = ros::Time(kStamp);
   layout.cloud.is_dense = true;
   input_.time_field = "t";
+  input_.clear_no_returns = true;
   const PlacedScan scan = read(layout.cloud, kStamp);
   EXPECT_EQ(scan.times, "in ns after the stamp");
   expectHall(scan, hits);
+  expectHoles(scan, holes);
 }
 
 /// Unorganised points without those of no return, with absolute times.
@@ -336,20 +358,24 @@ TEST_F(DriverLayouts, Robosense) {
                                   {"label", PointField::UINT16, 26}});
   Layout layout(fields, 28, kColumns, kRings);
   std::size_t hits = 0;
+  std::map<std::size_t, Beam> holes;
   for (const Beam& beam : fired()) {
     const std::size_t n = beam.column * kRings + beam.ring;
     const auto hit = hitOf(beam, sensorAt(beam));
     hits += hit ? 1 : 0;
+    if (!hit) holes.emplace(n, beam);
     layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : Eigen::Vector3f::Constant(kNan));
     layout.set(n, "timestamp", kStamp + beam.time);
     layout.set(n, "label", hit ? hit->label : 0);
   }
   layout.cloud.header.stamp = ros::Time(kStamp + kScan);
   input_.time_field = "timestamp";
+  input_.clear_no_returns = true;
   const PlacedScan scan = read(layout.cloud, kStamp);
   EXPECT_EQ(scan.times, "in s since 1970");
   EXPECT_NEAR(scan.scan.origin.x(), kSpeed * kScan, 1e-6);
   expectHall(scan, hits);
+  expectHoles(scan, holes);
 }
 
 TEST_F(DriverLayouts, GazeboVelodynePlugin) {
@@ -376,16 +402,21 @@ TEST_F(DriverLayouts, GazeboGpuLidar) {
                                   {"label", PointField::UINT32, 24}});
   Layout layout(fields, 32, kRings, kColumns);
   std::size_t hits = 0;
+  std::map<std::size_t, Beam> holes;
   for (const Beam& beam : fired()) {
     const std::size_t n = beam.ring * kColumns + beam.column;
     const auto hit = hitOf(beam, 0.0);
     hits += hit ? 1 : 0;
+    if (!hit) holes.emplace(n, beam);
     const Eigen::Vector3f infinite = beam.direction.cast<float>() * std::numeric_limits<float>::infinity();
     layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : infinite);
     layout.set(n, "label", hit ? hit->label : 0);
   }
   layout.cloud.header.stamp = ros::Time(12.0);
-  expectHall(read(layout.cloud, 12.0), hits);
+  input_.clear_no_returns = true;
+  const PlacedScan scan = read(layout.cloud, 12.0);
+  expectHall(scan, hits);
+  expectHoles(scan, holes);
 }
 
 TEST_F(DriverLayouts, CarlaSemanticLidar) {
