@@ -58,11 +58,11 @@ TEST(CleanedPoints, LieInOccupiedVoxels) {
     }
   }
   std::vector<std::size_t> told;
-  const CleanedCount count = writeCleanedPoints(folder / "points.pcd", sequence, {0, 2}, map,
-                                                [&](std::size_t n) {
-                                                  told.push_back(n);
-                                                  return true;
-                                                });
+  const CleanedCount count =
+      writeCleanedPoints(folder / "points.pcd", sequence, {0, 2}, map, [&](std::size_t n) {
+        told.push_back(n);
+        return true;
+      });
   EXPECT_EQ(count.points, 4000u);
   EXPECT_EQ(count.kept, expected.size());
   EXPECT_EQ(told, (std::vector<std::size_t>{1, 2}));
