@@ -114,7 +114,7 @@ class Live(MapperTest):
         nan = float('nan')
         for points, labels, level, words in (
                 ([(2.0, 0.0, 0.0), (3.0, 0.0, 0.0)], [7777, 7777], DiagnosticStatus.ERROR,
-                 "class table 'semantic_kitti' does not list (7777 most often); set classes or label_values"),
+                 "class table 'semantic_kitti' does not list (7777 most often); list them in the table"),
                 ([(nan, nan, nan)], [CAR], DiagnosticStatus.WARN, 'are NaN or infinite')):
             def scan():
                 self.integrate(points, labels)

@@ -198,6 +198,7 @@ class MappingTest(unittest.TestCase):
         self.assertEqual(status.dropped_transform_late, before.dropped_transform_late + 1)
         self.assertIn('37 s ahead', status.last_drop)
         self.assertIn('TAI', status.last_drop)
+        self.robot.seconds += 40  # no later cloud has that stamp
         status = self.deal_with(self.robot.scan([(4200.0, 300.0, 400.0), (9000.0, 0.0, 0.0)], [CAR] * 2))
         self.assertFalse(status.integrated_last)
         self.assertEqual(status.dropped_bad_cloud, before.dropped_bad_cloud + 1)

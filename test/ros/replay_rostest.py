@@ -132,7 +132,7 @@ class Replay(unittest.TestCase):
                   'sequence:=none')
         self.ends(f"{self.path('none/velodyne')} is not a folder; give the folder of a sequence", 'demo.launch',
                   'sequence:=none')
-        self.ends(f"{self.path('drive/predictions/000000.label')} cannot be read; check", 'semantic_kitti.launch',
+        self.ends(f"{self.path('drive/predictions')} is not a folder; name one with labels", 'semantic_kitti.launch',
                   'sequence:=drive', 'labels:=predictions')
 
     def test_a_mapper_that_does_not_start_ends_the_launch(self):
