@@ -43,10 +43,12 @@ class Program:
             return False
         return True
 
-    def wait_for(self, words):
-        while words not in self.said:
+    def wait_for(self, pattern):
+        """Returns the match; a program may say a line in several parts."""
+        while not re.search(pattern, self.said):
             if not self.read():
-                raise AssertionError(f'{words} was never said: {self.said}')
+                raise AssertionError(f'{pattern} was never said: {self.said}')
+        return re.search(pattern, self.said)
 
     def end(self):
         """Returns the exit status and what the program said at last."""
@@ -146,8 +148,7 @@ class Signals(unittest.TestCase):
             file.write('good')
         before = sorted(os.listdir(self.folder))
         program = Program('merge_maps', *maps, '--output', output)
-        program.wait_for('1/')
-        all_tiles = int(re.search(r' 1/(\d+) ', program.said).group(1))
+        all_tiles = int(program.wait_for(r' 1/(\d+) ').group(1))
         self.assertGreater(all_tiles * 50, 1 << 16, 'more progress than a terminal buffers')
         program.process.send_signal(signal.SIGINT)
         status, last = program.end()
