@@ -71,7 +71,7 @@ double ScanTimes::of(std::size_t number, const std::string& scan) const {
 }
 
 ScanPoses::ScanPoses(const std::filesystem::path& file, bool timed)
-    : path_(file), file_(readPoseFile(file.string(), "a sequence needs a pose a scan")) {
+    : path_(file), file_(readPoseFile(file.string(), "a sequence needs one pose for each scan")) {
   if (!file_.has_stamps || !timed) return;
   for (const PoseLine& line : file_.lines) {
     if (line.seconds) by_time_.emplace(*line.seconds, &line);

@@ -228,7 +228,7 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
                                             transforms + clockAdvice(stamp, latest)};
   }
   if (-ahead <= kKeptByTf) {
-    return {DropReason::kTooOld, transforms + " do not reach back to it: the latest is " +
+    return {DropReason::kTooOld, transforms + " do not reach back to the cloud: the latest is " +
                                      durationText(-ahead) +
                                      " newer; send clouds sooner, or check the clocks"};
   }

@@ -178,7 +178,7 @@ std::optional<CloudEvaluation> cloudEvaluation(const po::variables_map& given, c
     }
     if (!sequence.labelled()) {
       throw std::invalid_argument("--cloud needs labels, which say what moves; " + sequence.folder() +
-                                  " is read without");
+                                  " is read without labels; give --labels FOLDER, or leave out --cloud");
     }
     return CloudEvaluation(std::nullopt, distance);
   }
@@ -298,8 +298,8 @@ int evaluate(const po::variables_map& given) {
   if (stopped) evaluation.dynamics.end();
   if (stopped && sequence.layout() == SequenceLayout::kDynamicMap && evaluation.cloud) {
     evaluation.cloud.reset();
-    std::cerr
-        << "evaluate_map: the ground-truth cloud is of all scans, so that nothing is compared with it\n";
+    std::cerr << "evaluate_map: the ground-truth cloud covers all scans, so the map of these is not compared "
+                 "with it\n";
   }
   tools::MapQuality quality = evaluation.compare(mapper.map());
   quality.median_ms = quantile(times, 0.5);
