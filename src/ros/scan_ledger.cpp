@@ -72,7 +72,7 @@ MappingStatus ScanLedger::status(Clock::time_point now, std::size_t waiting) {
   status_.latency_p99_ms = static_cast<float>(latency_.quantile(0.99));
   status_.integration_median_ms = static_cast<float>(integration_.median());
   status_.integration_p99_ms = static_cast<float>(integration_.quantile(0.99));
-  status_.points_without_label = unknown_.missing();
+  status_.labels_missing = unknown_.missing();
   status_.unknown_labels.clear();
   status_.unknown_label_counts.clear();
   for (const auto& [label, count] : unknown_.counts()) {

@@ -80,7 +80,8 @@ class PosesOfScan {
 
 /// Transforms each point, and each direction, by the pose at its time. Points that need no time take that of
 /// the cloud, so that those at the sensor stay there. A point whose time is not finite becomes NaN, so that
-/// it is counted among those. @return the missing pose, if there is one.
+/// it is counted among those. Directions at times without a pose take that of the cloud: drivers may write
+/// any time where nothing came back. @return the missing pose of a point, if there is one.
 std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& poses, Scan& scan) {
   scan.points = content.points;
   for (std::size_t i = 0; i < content.times.size(); ++i) {
@@ -99,13 +100,13 @@ std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& p
   for (std::size_t i = 0; i < content.no_return_times.size(); ++i) {
     if (scan.no_returns[i].isZero()) continue;
     const Eigen::Isometry3d* const pose = poses.at(content.no_return_times[i]);
-    if (!pose) return poses.missing;
-    scan.no_returns[i] = pose->linear().cast<float>() * scan.no_returns[i];
+    scan.no_returns[i] = (pose ? *pose : poses.ofCloud()).linear().cast<float>() * scan.no_returns[i];
   }
   return std::nullopt;
 }
 
-/// @throws std::invalid_argument if hardly any return is as near as a sensor can see.
+/// @throws std::invalid_argument if hardly any return is as near as a sensor can see, and they are at
+/// different ranges: some drivers write one far range where nothing came back.
 void checkMetres(const Scan& scan, const SensorModelConfig& sensor) {
   constexpr float kAtSensor = 1e-3f;
   constexpr double kHardlyAny = 0.01;
@@ -118,6 +119,11 @@ void checkMetres(const Scan& scan, const SensorModelConfig& sensor) {
   const auto near = std::count_if(ranges.begin(), ranges.end(),
                                   [&](float range) { return static_cast<double>(range) <= farthest; });
   if (ranges.empty() || static_cast<double>(near) >= kHardlyAny * static_cast<double>(ranges.size())) return;
+  constexpr float kSame = 0.999f;
+  const float longest = *std::max_element(ranges.begin(), ranges.end());
+  const auto farthest_of_all =
+      std::count_if(ranges.begin(), ranges.end(), [&](float range) { return range >= kSame * longest; });
+  if (2 * farthest_of_all > static_cast<std::ptrdiff_t>(ranges.size())) return;
   const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
   std::nth_element(ranges.begin(), middle, ranges.end());
   throw std::invalid_argument("its points are " + numberText(std::round(static_cast<double>(*middle))) +

@@ -24,10 +24,10 @@ struct Velocity {
 
 bool TfJumpWatch::watch(const std::string& child, const Eigen::Vector3d& sensor) {
   if (const auto known = edges_.find(child); known != edges_.end()) {
-    known->second.sensor = sensor;
+    if (sensor.norm() > known->second.sensor.norm()) known->second.sensor = sensor;
     return false;
   }
-  if (edges_.size() >= kMostFrames) edges_.clear();
+  if (edges_.size() >= kMostFrames) return false;
   edges_[child].sensor = sensor;
   return true;
 }

@@ -27,8 +27,9 @@ class TfJumpWatch {
   static constexpr double kLeastDistance = 0.2;  ///< [m]
   static constexpr double kLeastAngle = 2.0;     ///< [degrees]
 
-  /// Watches the transforms of a child frame from now on. @param sensor its position in the child frame [m].
-  /// @return whether they were not watched before.
+  /// Watches the transforms of a child frame from now on, unless kMostFrames are watched. Of several sensors
+  /// the farthest from the frame counts. @param sensor its position in the child frame [m].
+  /// @return whether they are watched and were not before.
   bool watch(const std::string& child, const Eigen::Vector3d& sensor);
   /// Takes a transform that tf takes, too.
   void add(const geometry_msgs::TransformStamped& transform);

@@ -112,7 +112,8 @@ std::string stoppedText(const po::variables_map& given, const Sequence& sequence
   std::string text = "stopped after scan " + sequence.name(end - 1) + ", " + std::to_string(end - first) +
                      " of " + counted(last - first, "scan");
   if (!given.count("output") || !isMapFileName(given["output"].as<std::string>())) return text;
-  return text + "; to map the rest, say --first " + std::to_string(sequence.number(end)) + " --resume " +
+  return text + "; to map the rest, say --first " + std::to_string(sequence.number(end)) +
+         (given.count("scans") ? " --scans " + std::to_string(last - end) : "") + " --resume " +
          given["output"].as<std::string>() + (given.count("drive") ? " and another --drive" : "");
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
@@ -91,7 +92,13 @@ void warnOfPoses(const po::variables_map& given, std::size_t first, std::size_t 
   const bool of_camera = as_given.posesIn() == PosesIn::kCamera;
   if (!of_camera && !std::filesystem::exists(std::filesystem::path(folder) / "calib.txt")) return;
   options.poses_in = of_camera ? PosesIn::kLidar : PosesIn::kCamera;
-  const auto agreement = comparePoses(as_given, Sequence(folder, options), first, last);
+  std::optional<PoseAgreement> agreement;
+  try {
+    agreement = comparePoses(as_given, Sequence(folder, options), first, last);
+  } catch (const std::runtime_error&) {  // the other reading is impossible; a scan's fault is said when it is
+                                         // mapped
+    return;
+  }
   if (!agreement || !agreement->otherIsBetter()) return;
   const auto centimetres = [](double metres) { return numberText(std::round(100.0 * metres)) + " cm"; };
   std::cerr << "warning: the poses seem to be those of the " << nameOf(*options.poses_in)

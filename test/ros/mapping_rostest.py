@@ -245,7 +245,7 @@ class MappingTest(unittest.TestCase):
             self.assertIn(-1, status.unknown_labels)
         self.integrate(HITS, [float('nan'), float('nan'), ROAD], label_type=PointField.FLOAT32)
         status = self.integrate(HITS, [float('nan'), float('nan'), ROAD], label_type=PointField.FLOAT32)
-        self.assertGreaterEqual(status.points_without_label, 4)
+        self.assertGreaterEqual(status.labels_missing, 4)
         log.wait_for(lambda m: 'none at all (2 points)' in m.msg, 'a warning of points without a label')
         for words in ('does not list, and are left out of the map: -1 (2 points); list -1 under raw', 'none at all (2 points)'):
             found = [m.msg for m in log.messages if words in m.msg]

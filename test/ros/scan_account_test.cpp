@@ -130,7 +130,7 @@ TEST(ScanLedger, TellsUnknownLabelsApart) {
   const MappingStatus status = ledger.status(Clock::time_point(), 0);
   EXPECT_EQ(status.unknown_labels, (std::vector<std::int64_t>{-1, 7, 300}));
   EXPECT_EQ(status.unknown_label_counts, (std::vector<std::uint64_t>{4, 5, 1}));
-  EXPECT_EQ(status.points_without_label, 1u);
+  EXPECT_EQ(status.labels_missing, 1u);
   UnlistedLabels many;
   for (std::int64_t label = 1000; label < 2000; ++label) many.add(label);
   ledger.unlistedLabels(many);

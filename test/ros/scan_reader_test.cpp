@@ -450,6 +450,7 @@ TEST_F(Reader, ACloudInMillimetresIsRefused) {
   EXPECT_THROW(read(millimetres), std::invalid_argument) << "each beam would clear 60 m";
   EXPECT_NO_THROW(read(cloud({{0, 0, 0}, {NAN, NAN, NAN}}).message())) << "a sensor that sees nothing";
   EXPECT_NO_THROW(read(cloud({{500, 0, 0}, {600, 0, 0}, {10, 0, 0}}).message()));
+  EXPECT_NO_THROW(read(cloud({{655.35f, 0, 0}, {0, 655.35f, 0}, {0, 0, 655.35f}}).message())) << "no returns";
 }
 
 TEST_F(Reader, HolesTurnWithTheSensorLikeTheirFiring) {

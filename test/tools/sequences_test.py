@@ -150,6 +150,12 @@ class Sequences(unittest.TestCase):
         self.fails("--poses-in 'radar' is unknown; known sensors: camera, lidar", 'map_sequence', '--sequence', self.drive,
                    '--poses-in', 'radar')
 
+    def test_poses_of_the_lidar_need_no_calibration(self):
+        for calibration in ('P0: 1 0 0 0 0 1 0 0 0 0 1 0', 'Tr: 2 0 0 0 0 2 0 0 0 0 2 0'):
+            self.write('calib.txt', calibration)
+            self.write('poses.txt', *(f'{0.1 * n} {n} 0 0 0 0 0 1' for n in range(4)))
+            self.assertEqual(self.mapped()[1], '')
+
     def test_a_sensor_at_rest_gives_no_warning(self):
         self.make('--scans', '3', '--speed', '0')
         self.write('calib.txt', 'Tr: ' + text_of(TR))
