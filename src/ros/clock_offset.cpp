@@ -26,10 +26,10 @@ bool near(double value, double expected, double tolerance) {
 
 /// Whether a difference is a multiple of a quarter of an hour, as between time zones.
 bool isTimeZone(double difference) {
-  constexpr double kStep = kHour / 4.0;
-  const double steps = std::round(difference / kStep);
+  constexpr double kQuarter = kHour / 4.0;
+  const double steps = std::round(difference / kQuarter);
   return steps >= 1.0 && difference <= 14.0 * kHour + kTolerance &&
-         near(difference, steps * kStep, 2.0 * kTolerance);
+         near(difference, steps * kQuarter, 2.0 * kTolerance);
 }
 
 }  // namespace
