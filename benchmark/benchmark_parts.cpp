@@ -7,16 +7,16 @@
 
 #include "beams/line_evidence.h"
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/query/distance_field.h"
 #include "bki_mapping/query/queries.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "io/voxel_points.h"
-#include "map/view_kernels.h"
 #include "mapping/scan_preprocessor.h"
 #include "parallel/counter_random.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
+#include "rules/view_kernels.h"
 #include "simd/instruction_sets.h"
 #include "simulation/lidar.h"
 #include "update/map_updater.h"
@@ -128,10 +128,11 @@ void readBlocks(benchmark::State& state, const std::string& instruction_set, Blo
   const SemanticMap map = mapOfFivePlanes();
   const auto blocks = sortedBlocks(map);
   const ViewKernels& kernels = viewKernelsFor(instruction_set);
+  const StateRules rules;
   BlockView view;
   for (auto _ : state) {
     for (const auto& [index, block] : blocks) {
-      readBlock(kernels, map, index, *block, fields, view);
+      readBlock(kernels, map, rules, index, *block, fields, view);
       benchmark::DoNotOptimize(&view);
     }
   }
@@ -155,7 +156,7 @@ void queries(benchmark::State& state) {
   for (auto _ : state) {
     for (const auto& entry : f.mapper.map().entries()) {
       for (int v = 0; v < kBlockVoxels; ++v) {
-        benchmark::DoNotOptimize(viewVoxel(f.mapper.map(), entry.index, *entry.block, v));
+        benchmark::DoNotOptimize(viewVoxel(f.mapper.map(), f.mapper.rules(), entry.index, *entry.block, v));
         ++voxels;
       }
     }
@@ -168,8 +169,9 @@ void voxelCloud(benchmark::State& state) {
   Fixture& f = fixture();
   std::vector<std::uint8_t> data;
   for (auto _ : state) {
-    const VoxelPoints points(f.mapper.map(), *f.classes, {{VoxelState::kOccupied, VoxelState::kFree}},
-                             sortedBlocks(f.mapper.map()), f.pool);
+    const VoxelPoints points(f.mapper.map(), f.mapper.rules(), *f.classes,
+                             {{VoxelState::kOccupied, VoxelState::kFree}}, sortedBlocks(f.mapper.map()),
+                             f.pool);
     data.resize(points.count() * sizeof(VoxelPoint));
     points.write(reinterpret_cast<VoxelPoint*>(data.data()), Eigen::Vector3d::Zero());
     benchmark::DoNotOptimize(data.data());
@@ -217,7 +219,7 @@ QueryFixture& queryFixture() {
 void decideStates(benchmark::State& state) {
   const SemanticMap& map = queryFixture().mapper.map();
   for (auto _ : state) {
-    const StateMap states(map, 1);
+    const StateMap states(map, queryFixture().mapper.rules(), 1);
     for (const auto& entry : map.entries()) benchmark::DoNotOptimize(states.find(entry.index));
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(map.size()));
@@ -226,10 +228,10 @@ void decideStates(benchmark::State& state) {
 /// What the snapshot after a scan takes over from the one before, of which all was decided and searched.
 void takingOver(benchmark::State& state) {
   QueryFixture& f = queryFixture();
-  const SemanticMap before = f.mapper.snapshot();
+  const MapSnapshot before = f.mapper.snapshot();
   const Scan scan = simulation::Drive({11, 8.0, 1, {}}).frame(10).scan();
   f.mapper.integrate(scan);
-  const SemanticMap after = f.mapper.snapshot();
+  const MapSnapshot after = f.mapper.snapshot();
   f.mapper.withdraw(scan);
   const StateMap states(before, 1);
   frontiers(states);
@@ -242,7 +244,7 @@ void takingOver(benchmark::State& state) {
 /// @param query called as query(const StateMap&); answers `items`.
 template <typename Query>
 void ask(benchmark::State& state, int threads, std::size_t items, Query&& query) {
-  const StateMap states(queryFixture().mapper.map(), threads);
+  const StateMap states(queryFixture().mapper.map(), queryFixture().mapper.rules(), threads);
   for (auto _ : state) query(states);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(items));
 }
@@ -269,7 +271,8 @@ void readingEachPoint(benchmark::State& state) {
   const QueryFixture& f = queryFixture();
   for (auto _ : state) {
     for (const Eigen::Vector3d& point : f.points) {
-      benchmark::DoNotOptimize(viewWithoutEntropy(f.mapper.map(), f.mapper.map().geometry().voxelAt(point)));
+      benchmark::DoNotOptimize(
+          viewWithoutEntropy(f.mapper.map(), f.mapper.rules(), f.mapper.map().geometry().voxelAt(point)));
     }
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(f.points.size()));
@@ -312,7 +315,7 @@ void findingFrontiersFirst(benchmark::State& state, int threads) {
   const SemanticMap& map = queryFixture().mapper.map();
   for (auto _ : state) {
     state.PauseTiming();
-    auto states = std::make_unique<StateMap>(map, threads);
+    auto states = std::make_unique<StateMap>(map, queryFixture().mapper.rules(), threads);
     for (const auto& entry : map.entries()) states->find(entry.index);
     state.ResumeTiming();
     benchmark::DoNotOptimize(frontiers(*states, {1, false, std::nullopt}));
@@ -337,11 +340,11 @@ void distances(benchmark::State& state, int threads, const ObstacleRules& rules)
 /// An update of that where the next scan has changed the map.
 void updatingDistances(benchmark::State& state, int threads) {
   QueryFixture& f = queryFixture();
-  const SemanticMap before = f.mapper.snapshot();
+  const MapSnapshot before = f.mapper.snapshot();
   const Scan scan = simulation::Drive({11, 8.0, 1, {}}).frame(10).scan();
   f.mapper.integrate(scan);
   const std::vector<GridIndex> changed = f.mapper.touchedBlocks();
-  const SemanticMap after = f.mapper.snapshot();
+  const MapSnapshot after = f.mapper.snapshot();
   f.mapper.withdraw(scan);
   const StateMap old_states(before, threads), new_states(after, threads);
   DistanceField field(old_states, f.region(100.0, 100.0, 10.0));

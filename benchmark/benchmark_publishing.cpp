@@ -23,6 +23,7 @@ namespace {
 
 using namespace bki_mapping;
 using namespace bki_mapping::ros_interface;
+using Snapshot = bki_mapping::ros_interface::MapSnapshot;  // there is another in the core
 namespace po = tools::po;
 
 po::options_description options() {
@@ -80,8 +81,8 @@ int measureTopics(const po::variables_map& given) {
   ros::CallbackQueue connections;
   node.setCallbackQueue(&connections);
   const auto snapshot = [&] {
-    return std::make_shared<const MapSnapshot>(
-        MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor, 0});
+    return std::make_shared<const Snapshot>(
+        Snapshot{mapper.snapshot(), {}, mapper.classes(), trajectory, config, sensor, 0});
   };
   const auto publishers = makePublishers({node, config, snapshot});
   Listener listener;
@@ -147,13 +148,13 @@ std::vector<double> waits(const std::vector<Scan>& scans, double rate, bool list
   PublisherSet* publishers = nullptr;
   const auto snapshot = [&] {
     publishers->closeChanges();
-    return MapSnapshot{{}, mapper.snapshot(), mapper.classes(), trajectory, config, sensor, 0};
+    return Snapshot{mapper.snapshot(), {}, mapper.classes(), trajectory, config, sensor, 0};
   };
   std::vector<double> waits;
   std::atomic<bool> mapped{false}, done{false};
   PublisherSet publishing(ros::NodeHandle("~"), config, [&] {
-    return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(
-        queue, [&] { return std::make_shared<const MapSnapshot>(snapshot()); });
+    return QueuedCall<std::shared_ptr<const Snapshot>>::ask(
+        queue, [&] { return std::make_shared<const Snapshot>(snapshot()); });
   });
   publishers = &publishing;
   publishing.start();

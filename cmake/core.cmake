@@ -38,16 +38,16 @@ endfunction()
 bki_mapping_core_room(core SOURCES atomic_file.cpp class_filter.cpp class_table.cpp named_parameter.cpp unlisted_labels.cpp LINK Eigen3::Eigen)
 bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
-bki_mapping_core_room(map SOURCES
-    clear_box.cpp column_map.cpp neighbourhood.cpp semantic_map.cpp voxel_state.cpp
-  LINK bki_mapping_core bki_mapping_simd)
+bki_mapping_core_room(map SOURCES clear_box.cpp semantic_map.cpp LINK bki_mapping_parallel)
+bki_mapping_core_room(rules SOURCES
+    class_sets.cpp neighbourhood.cpp scan_rules.cpp state_rules.cpp void_search.cpp voxel_state.cpp
+  LINK bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
-bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp update_rules.cpp void_search.cpp
-  LINK bki_mapping_parallel bki_mapping_map bki_mapping_simd)
+bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp LINK bki_mapping_rules)
 bki_mapping_core_room(query SOURCES
-    distance_field.cpp
+    column_map.cpp distance_field.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
-  LINK bki_mapping_map bki_mapping_parallel)
+  LINK bki_mapping_rules)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
@@ -62,7 +62,8 @@ bki_mapping_core_room(free_space SOURCES
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
 
-bki_mapping_kernels(map view_kernels)
+bki_mapping_kernels(rules limit_kernels)
+bki_mapping_kernels(rules view_kernels)
 bki_mapping_kernels(update sum_kernels)
 bki_mapping_kernels(query distance_kernels)
 bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)

@@ -10,7 +10,7 @@ include_directories(SYSTEM ${PCL_INCLUDE_DIRS})
 bki_mapping_room(io SOURCES
     city_index.cpp class_table_yaml.cpp cleaned_points.cpp config_yaml.cpp display_colors.cpp export_file.cpp grid_export.cpp html_export.cpp html_page.cpp map_export.cpp map_picture.cpp
     label_watch.cpp map_statistics.cpp mapper_file.cpp named_file.cpp octomap_export.cpp pcd_file.cpp pose_agreement.cpp pose_file.cpp region_files.cpp scan_tables.cpp sequence_reader.cpp sequence_writer.cpp share_path.cpp tiled_map.cpp trajectory_file.cpp truth_cloud.cpp voxel_drives.cpp voxel_pcl.cpp voxel_points.cpp yaml_file.cpp
-  LINK bki_mapping_mapping bki_mapping_store)
+  LINK bki_mapping_mapping bki_mapping_query bki_mapping_store)
 target_compile_definitions(bki_mapping_io PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_io PRIVATE pcl_common pcl_io yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ZLIB::ZLIB ${OCTOMAP_LIBRARIES} ${CMAKE_DL_LIBS})
 target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})

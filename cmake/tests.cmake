@@ -150,8 +150,7 @@ endfunction()
 bki_mapping_unit_tests(core atomic_file class_filter grid_geometry)
 bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
-bki_mapping_unit_tests(map column_map read_block semantic_map voxel_state)
-bki_mapping_unit_tests(map neighbours)
+bki_mapping_unit_tests(map semantic_map)
 bki_mapping_unit_tests(map clear_box LINK bki_mapping_store)
 bki_mapping_unit_tests(store damaged_file full_disk map_clear map_file migration
   LINK SQLite::SQLite3 ZLIB::ZLIB)
@@ -197,7 +196,9 @@ bki_mapping_fuzzer(tile_codec fuzz_tile_codec)
 if(BKI_MAPPING_LIBFUZZER)
   target_sources(fuzz_map_file PRIVATE test/store/fuzz_map_file_mutator.cpp)
 endif()
-bki_mapping_unit_tests(query distance_field points rays shapes)
+bki_mapping_unit_tests(rules limit_kernels read_block scan_rules void_search voxel_state)
+bki_mapping_unit_tests(rules neighbours)
+bki_mapping_unit_tests(query column_map distance_field points rays shapes)
 bki_mapping_unit_tests(query state_map)  # scripts/test leaves a part of it out by GTEST_FILTER, which joined tests do not heed
 find_package(dynamicEDT3D QUIET)
 if(dynamicEDT3D_FOUND)
@@ -208,7 +209,7 @@ else()
   set_tests_properties(dynamic_edt_test PROPERTIES SKIP_RETURN_CODE 77)
 endif()
 bki_mapping_unit_tests(points downsample point_bins tile_grid)
-bki_mapping_unit_tests(update sum_kernels update_rules void_search)
+bki_mapping_unit_tests(update sum_kernels)
 bki_mapping_unit_tests(beams beam_index line_setup occlusion)
 bki_mapping_unit_tests(beams instruction_sets LINK bki_mapping_points)
 bki_mapping_unit_tests(free_space sampling)
@@ -299,8 +300,8 @@ endif()
 add_test(NAME vector_symbols_test
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
     $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
-    $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_kernel> $<TARGET_OBJECTS:bki_mapping_update>
-    $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams> $<TARGET_OBJECTS:bki_mapping_query>
+    $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_rules> $<TARGET_OBJECTS:bki_mapping_kernel>
+    $<TARGET_OBJECTS:bki_mapping_update> $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams> $<TARGET_OBJECTS:bki_mapping_query>
     $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping> $<TARGET_OBJECTS:bki_mapping_store>)
 
 if(CATKIN_ENABLE_TESTING)

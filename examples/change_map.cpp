@@ -1,7 +1,7 @@
 // Reads a map while it grows, merges another robot's map, and takes a scan back.
 #include <bki_mapping/io/yaml.h>
-#include <bki_mapping/map/voxel_state.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
+#include <bki_mapping/rules/voxel_state.h>
 
 #include <future>
 #include <iostream>
@@ -19,10 +19,10 @@ Scan wallFrom(double x) {
   return scan;
 }
 
-std::size_t occupiedIn(const SemanticMap& map) {
+std::size_t occupiedIn(const SemanticMap& map, const StateRules& rules) {
   std::size_t count = 0;
   forEachKnownVoxel(
-      map, [&](const VoxelIndex&, const VoxelView& v) { count += v.state == VoxelState::kOccupied; });
+      map, rules, [&](const VoxelIndex&, const VoxelView& v) { count += v.state == VoxelState::kOccupied; });
   return count;
 }
 
@@ -32,21 +32,22 @@ int main() try {
   robot.integrate(wallFrom(0.0));
 
   // A snapshot stays as it is; another thread reads it while mapping goes on.
-  const SemanticMap before = robot.snapshot();
-  auto reader = std::async(std::launch::async, [&] { return occupiedIn(before); });
+  const MapSnapshot before = robot.snapshot();
+  auto reader = std::async(std::launch::async, [&] { return occupiedIn(before.map, before.rules); });
   robot.integrate(wallFrom(20.0));
-  std::cout << reader.get() << " occupied voxels, then " << occupiedIn(robot.map()) << "\n";
+  std::cout << reader.get() << " occupied voxels, then " << occupiedIn(robot.map(), robot.rules()) << "\n";
 
   // Maps are sums: another robot's is added, in any order.
   other.integrate(wallFrom(40.0));
   robot.addMap(other.map());
-  std::cout << occupiedIn(robot.map()) << " with the other robot's\n";
+  std::cout << occupiedIn(robot.map(), robot.rules()) << " with the other robot's\n";
 
   // A scan that was wrong is taken back, as if it had never been there.
   robot.withdraw(wallFrom(20.0));
   robot.withdraw(wallFrom(40.0));
-  std::cout << occupiedIn(robot.map()) << " without the last two scans\n";
-  if (occupiedIn(robot.map()) != occupiedIn(before)) throw std::runtime_error("the scans are not taken back");
+  std::cout << occupiedIn(robot.map(), robot.rules()) << " without the last two scans\n";
+  if (occupiedIn(robot.map(), robot.rules()) != occupiedIn(before.map, before.rules))
+    throw std::runtime_error("the scans are not taken back");
 } catch (const std::exception& error) {
   std::cerr << "change_map: " << error.what() << "\n";
   return 1;

@@ -20,7 +20,7 @@ int main(int argc, char** argv) try {
     start[i] = std::stod(argv[3 + i]);
     goal[i] = std::stod(argv[6 + i]);
   }
-  const StoredMap stored = loadMapWithGains(argv[1]);
+  const RuledMap stored = loadRuledMap(argv[1]);
   const ClassTable classes = loadClassTable(argv[2]);  // with costs, which map files do not have
   for (const SemanticClass& each : stored.info.classes->classes()) {
     const SemanticClass* const own = classes.find(each.id);
@@ -30,7 +30,7 @@ int main(int argc, char** argv) try {
   }
   Eigen::AlignedBox3d area;
   for (const DriveRecord& drive : stored.drives) area.extend(drive.bounds);
-  const Street street(stored.map, classes, area);
+  const Street street(stored.map, stored.rules, classes, area);
   if (!street.isDrivable(start)) throw std::invalid_argument("the robot cannot stand at the start");
   if (!street.isDrivable(goal)) throw std::invalid_argument("the robot cannot stand at the goal");
   const std::vector<Pose> path = plan(street, start, goal);

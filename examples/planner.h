@@ -2,7 +2,7 @@
 // given, around what moves.
 #pragma once
 
-#include <bki_mapping/map/column_map.h>
+#include <bki_mapping/query/column_map.h>
 #include <bki_mapping/query/distance_field.h>
 #include <bki_mapping/query/queries.h>
 
@@ -107,10 +107,11 @@ class Movers {
 // What the map says about driving.
 class Street {
  public:
-  Street(const SemanticMap& map, const ClassTable& classes, const Eigen::AlignedBox3d& area)
-      : states_(map), distances_(states_, area, {obstacles(classes), false}) {
+  Street(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
+         const Eigen::AlignedBox3d& area)
+      : states_(map, rules), distances_(states_, area, {obstacles(classes), false}) {
     columns_.start({0.0, kLift + 2.0 * kHalf.z(), HeightReference::kGround});
-    columns_.update(map, classes);
+    columns_.update(map, rules, classes);
   }
   ColumnView columnAt(const Pose& at) const {
     const Eigen::Vector3d point(at.x(), at.y(), 0.0);

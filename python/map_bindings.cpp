@@ -13,7 +13,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/map_export.h"
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "class_bindings.h"
 #include "io/export_file.h"
 #include "query_bindings.h"
@@ -33,7 +33,7 @@ py::array voxels(const FixedMap& map, py::handle states) {
   std::vector<VoxelRecord> records;
   {
     const py::gil_scoped_release release;
-    records = collectVoxels(map.stored.map, *map.stored.info.classes, wanted);
+    records = collectVoxels(map.stored.map, map.stored.rules, *map.stored.info.classes, wanted);
   }
   using V = VoxelRecord;
   return ownedArray(std::move(records),
@@ -69,7 +69,7 @@ void exportTo(const FixedMap& map, py::handle path, py::handle states, py::handl
   options.html.name = std::filesystem::path(file).stem().string();
   const py::gil_scoped_release release;
   checkExport(file, options);
-  exportFile(file, map.stored.map, *map.stored.info.classes, options);
+  exportFile(file, map.stored.map, map.stored.rules, *map.stored.info.classes, options);
 }
 
 void save(const FixedMap& map, py::handle path) {

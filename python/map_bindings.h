@@ -8,17 +8,17 @@
 #include <memory>
 #include <utility>
 
+#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/query/state_map.h"
-#include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping::python {
 
 /// A map that does not change, prepared for queries.
 struct FixedMap {
   /// @param threads of queries; 0: all cores.
-  FixedMap(StoredMap map, int threads) : stored(std::move(map)), states(stored.map, threads) {}
+  FixedMap(RuledMap map, int threads) : stored(std::move(map)), states(stored.map, stored.rules, threads) {}
 
-  StoredMap stored;
+  RuledMap stored;
   StateMap states;
 };
 

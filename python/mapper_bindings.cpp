@@ -186,8 +186,9 @@ SharedMap snapshot(Mapper& self) {
   return alone(self, [&] {
     std::vector<DriveRecord> drives = self.drives;
     if (self.drive.scans > 0) drives.push_back(self.drive);
+    MapSnapshot taken = self.mapper.snapshot();
     return std::make_shared<FixedMap>(
-        StoredMap{mapInfoOf(self.mapper, self.frame), std::move(drives), self.mapper.snapshot()},
+        RuledMap{{mapInfoOf(self.mapper, self.frame), std::move(drives), std::move(taken.map)}, taken.rules},
         self.mapper.config().threads);
   });
 }

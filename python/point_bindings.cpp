@@ -156,9 +156,10 @@ class RecordReader {
     }
     const auto view =
         record_.has(PointRecord::kEntropy) ? &viewVoxel : static_cast<ViewInBlock>(&viewWithoutEntropy);
-    return view(map_.states.map(), index, block ? *block : kNoEvidence, offset);
+    return view(map_.states.map(), map_.states.rules(), index, block ? *block : kNoEvidence, offset);
   }
-  using ViewInBlock = VoxelView (*)(const SemanticMap&, const BlockIndex&, const Block&, int);
+  using ViewInBlock = VoxelView (*)(const SemanticMap&, const StateRules&, const BlockIndex&, const Block&,
+                                    int);
 
   const FixedMap& map_;
   const PointRecord& record_;

@@ -19,7 +19,7 @@ BLUE, ORANGE, GREEN, RED = '#0969da', '#e16f24', '#1a7f37', '#cf222e'
 STYLE = {'font.size': 13, 'axes.edgecolor': GREY, 'axes.titlesize': 14, 'axes.titlelocation': 'left', 'text.color': INK,
          'mathtext.fontset': 'dejavusans'}
 
-# The grid, as in include/bki_mapping/core/types.h, src/update/block_group.h and src/beams/raster/group_sums.h.
+# The grid, as in include/bki_mapping/core/types.h, src/map/block_group.h and src/beams/raster/group_sums.h.
 BLOCK_EDGE = 8  # voxels
 GROUP_EDGE = 4  # blocks
 HALO_ACROSS, HALO_ALONG = 6, 8  # voxels on each side of a group, across rows of voxels and along them

@@ -10,8 +10,8 @@
 #include "beams/row_walk.h"
 #include "bki_mapping/core/grid_geometry.h"
 #include "kernel/sparse_kernel.h"
+#include "map/block_group.h"
 #include "parallel/thread_pool.h"
-#include "update/block_group.h"
 
 namespace bki_mapping {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "parallel/thread_pool.h"
 
 namespace bki_mapping {
@@ -91,12 +91,12 @@ Scan CloudEvaluation::labelled(const Scan& scan) const {
   return known;
 }
 
-CloudQuality CloudEvaluation::compare(const SemanticMap& map) const {
+CloudQuality CloudEvaluation::compare(const SemanticMap& map, const StateRules& rules) const {
   std::vector<Eigen::Vector3f> cleaned;
   for (const Eigen::Vector3f& point : points_) {
     const Eigen::Vector3d at = truth_.origin() + point.cast<double>();
     if (!map.geometry().contains(at)) continue;
-    const VoxelView view = viewWithoutEntropy(map, map.geometry().voxelAt(at));
+    const VoxelView view = viewWithoutEntropy(map, rules, map.geometry().voxelAt(at));
     if (view.state == VoxelState::kOccupied) cleaned.push_back(point);
   }
   return compareClouds(truth_, cleaned, distance_);

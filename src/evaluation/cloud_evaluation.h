@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "evaluation/dynamics_evaluation.h"
 #include "io/truth_cloud.h"
 
@@ -50,7 +50,7 @@ class CloudEvaluation {
   void add(const Scan& scan);
   /// The points of a scan that are in the truth, with raw labels: 252 for those that move there, otherwise 0.
   Scan labelled(const Scan& scan) const;
-  CloudQuality compare(const SemanticMap& map) const;
+  CloudQuality compare(const SemanticMap& map, const StateRules& rules) const;
 
  private:
   TruthCloud truth_;

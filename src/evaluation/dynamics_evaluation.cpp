@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -65,12 +65,13 @@ bool DynamicsEvaluation::isStillThere(const VoxelIndex& index, const Taken& take
 }
 
 std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,
+                                                                        const StateRules& rules,
                                                                         const Taken& taken) const {
   const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const Voxel& voxel = voxels_[n];
-    const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = viewWithoutEntropy(map, rules, voxel.index).state == VoxelState::kOccupied;
     if (voxel.isShared()) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
     } else if (early_moving_points[n] > 0 && !mayBeOccupied(voxel, taken)) {
@@ -80,13 +81,14 @@ std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const Se
   return fates;
 }
 
-DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const Taken& taken) const {
+DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const StateRules& rules,
+                                            const Taken& taken) const {
   const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   DynamicsQuality quality;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const Voxel& voxel = voxels_[n];
     const std::uint32_t moving = early_moving_points[n];
-    const bool occupied = viewWithoutEntropy(map, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = viewWithoutEntropy(map, rules, voxel.index).state == VoxelState::kOccupied;
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
     quality.other_points += voxel.other_points;

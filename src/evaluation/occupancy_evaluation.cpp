@@ -1,6 +1,6 @@
 #include "evaluation/occupancy_evaluation.h"
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping {
@@ -23,11 +23,11 @@ void OccupancyEvaluation::add(const Scan& scan) {
   forEachCrossedVoxel(scan, geometry_, [this](const VoxelIndex& index) { seen(index); });
 }
 
-Reliability OccupancyEvaluation::compare(const SemanticMap& map,
+Reliability OccupancyEvaluation::compare(const SemanticMap& map, const StateRules& rules,
                                          const std::function<bool(const VoxelIndex&)>& left) const {
   Reliability reliability;
   for (const Seen& voxel : voxels_) {
-    const VoxelView view = viewWithoutEntropy(map, voxel.index);
+    const VoxelView view = viewWithoutEntropy(map, rules, voxel.index);
     if (!(view.evidence > 0.0f)) continue;
     if (voxel.moving && !voxel.standing && !left(voxel.index)) continue;
     reliability.add(static_cast<double>(view.occupancy), 1, voxel.standing ? 1 : 0);

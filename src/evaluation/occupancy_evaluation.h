@@ -9,7 +9,7 @@
 
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "evaluation/reliability.h"
 #include "io/truth_cloud.h"
 
@@ -30,7 +30,8 @@ class OccupancyEvaluation {
 
   /// How often something is in a voxel, by its occupancy, over the known voxels that were hit or crossed.
   /// @param left whether what moved through a voxel has left it by the end.
-  Reliability compare(const SemanticMap& map, const std::function<bool(const VoxelIndex&)>& left) const;
+  Reliability compare(const SemanticMap& map, const StateRules& rules,
+                      const std::function<bool(const VoxelIndex&)>& left) const;
 
  private:
   struct Seen {

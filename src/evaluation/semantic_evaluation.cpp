@@ -108,11 +108,12 @@ void SemanticEvaluation::add(const Scan& scan, const std::vector<std::uint32_t>&
   }
 }
 
-SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const StillThere& still_there) const {
+SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const StateRules& rules,
+                                            const StillThere& still_there) const {
   SemanticQuality quality;
   std::vector<Ranked> ranked;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
-    const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
+    const VoxelView view = viewWithoutEntropy(map, rules, voxels_[n]);
     const bool occupied = view.state == VoxelState::kOccupied;
     const bool has_left = still_there && !still_there(voxels_[n]);
     Ranked voxel{static_cast<double>(view.variance), 0, 0};
@@ -138,10 +139,11 @@ SemanticQuality SemanticEvaluation::compare(const SemanticMap& map, const StillT
   return quality;
 }
 
-std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map) const {
+std::vector<VoxelIndex> SemanticEvaluation::wrongVoxels(const SemanticMap& map,
+                                                        const StateRules& rules) const {
   std::vector<VoxelIndex> wrong;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
-    const VoxelView view = viewWithoutEntropy(map, voxels_[n]);
+    const VoxelView view = viewWithoutEntropy(map, rules, voxels_[n]);
     const auto is_right = [&](const Points& p) { return p.truth == view.label; };
     const bool right = std::any_of(points_[n].begin(), points_[n].end(), is_right);
     if (view.state == VoxelState::kOccupied && !right) wrong.push_back(voxels_[n]);

@@ -11,7 +11,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "evaluation/reliability.h"
 #include "io/truth_cloud.h"
 
@@ -73,9 +73,10 @@ class SemanticEvaluation {
   using StillThere = std::function<bool(const VoxelIndex&)>;
 
   /// @param still_there may be empty: all is.
-  SemanticQuality compare(const SemanticMap& map, const StillThere& still_there = {}) const;
+  SemanticQuality compare(const SemanticMap& map, const StateRules& rules,
+                          const StillThere& still_there = {}) const;
   /// Occupied voxels whose class is not the true one of any point in them.
-  std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map) const;
+  std::vector<VoxelIndex> wrongVoxels(const SemanticMap& map, const StateRules& rules) const;
 
  private:
   /// Points of one voxel that have all of this in common.

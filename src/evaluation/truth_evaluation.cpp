@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping::simulation {
@@ -85,21 +85,22 @@ ClassId TruthEvaluation::classOf(const VoxelContent& content) const {
   return content.label ? classes_.classOfRaw(*content.label).value_or(kFreeClass) : kFreeClass;
 }
 
-std::vector<VoxelIndex> TruthEvaluation::ghosts(const SemanticMap& map, double time) const {
+std::vector<VoxelIndex> TruthEvaluation::ghosts(const SemanticMap& map, const StateRules& rules,
+                                                double time) const {
   std::vector<VoxelIndex> ghosts;
-  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
+  forEachKnownVoxel(map, rules, [&](const VoxelIndex& index, const VoxelView& view) {
     const bool movable = view.state == VoxelState::kOccupied && classes_.find(view.label)->dynamic;
     if (movable && isGhost(index, time)) ghosts.push_back(index);
   });
   return ghosts;
 }
 
-void TruthEvaluation::countGhosts(const SemanticMap& map, double time) {
-  ghosts_ += ghosts(map, time).size();
+void TruthEvaluation::countGhosts(const SemanticMap& map, const StateRules& rules, double time) {
+  ghosts_ += ghosts(map, rules, time).size();
   ++moments_;
 }
 
-TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const {
+TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& rules, double time) const {
   TruthQuality quality;
   const auto add = [&](Proportion SpaceQuality::*figure, std::size_t bin, bool correct) {
     (quality.all.*figure).add(correct);
@@ -108,7 +109,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
   for (const Seen& voxel : voxels_) {
     const std::size_t bin = distanceBin(voxel.index);
     const ClassId truth = classOf(truth_.contentAt(voxel.index, time));
-    const VoxelView view = viewWithoutEntropy(map, voxel.index);
+    const VoxelView view = viewWithoutEntropy(map, rules, voxel.index);
     quality.voxels.add(truth, view.label);
     if (view.evidence > 0.0f) {
       quality.occupancy.add(static_cast<double>(view.occupancy), 1, truth == kFreeClass ? 0 : 1);
@@ -120,7 +121,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
       add(&SpaceQuality::occupied_recall, bin, view.state == VoxelState::kOccupied);
     }
   }
-  forEachKnownVoxel(map, [&](const VoxelIndex& index, const VoxelView& view) {
+  forEachKnownVoxel(map, rules, [&](const VoxelIndex& index, const VoxelView& view) {
     if (view.state != VoxelState::kFree && view.state != VoxelState::kOccupied) return;
     const std::size_t bin = distanceBin(index);
     const VoxelContent content = truth_.contentAt(index, time);
@@ -134,7 +135,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, double time) const
     if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, view.label);
     quality.movable += classes_.find(view.label)->dynamic;
   });
-  quality.ghosts = ghosts(map, time).size();
+  quality.ghosts = ghosts(map, rules, time).size();
   quality.mean_ghosts = static_cast<double>(ghosts_) / static_cast<double>(moments_);
   return quality;
 }

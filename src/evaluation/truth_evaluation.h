@@ -7,7 +7,7 @@
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "evaluation/semantic_evaluation.h"
 #include "simulation/voxel_truth.h"
 
@@ -65,11 +65,11 @@ class TruthEvaluation {
   /// Adds the next scan: all its hits, and the voxels that every 16th beam crosses.
   void add(const Scan& scan);
   /// Counts the ghosts in the map at a time. @param time since the start of the drive [s].
-  void countGhosts(const SemanticMap& map, double time);
-  TruthQuality compare(const SemanticMap& map, double time) const;
+  void countGhosts(const SemanticMap& map, const StateRules& rules, double time);
+  TruthQuality compare(const SemanticMap& map, const StateRules& rules, double time) const;
   /// The voxels occupied in the map by a class that can move, although nothing of such a class has been near
   /// for 0.5 s.
-  std::vector<VoxelIndex> ghosts(const SemanticMap& map, double time) const;
+  std::vector<VoxelIndex> ghosts(const SemanticMap& map, const StateRules& rules, double time) const;
 
  private:
   struct Seen {

@@ -41,12 +41,6 @@ inline std::vector<NamedParameter<FreeSpaceConfig>> freeSpaceParameters() {
       choiceParameter("beam_index", &C::beam_index, {"table", "rtree"}, Changes::kAtStart,
                       "Index that finds the beams near a block. Keep table, which is faster; rtree is the "
                       "paper's and gives the same map."),
-      truthParameter("hits_before_misses", &C::hits_before_misses, Changes::kWhileMapping,
-                     "Ignore a scan's evidence for free in voxels that contain one of its hits after "
-                     "down-sampling. Set true to keep surfaces and thin objects that beams graze."),
-      truthParameter("evidence_before_misses", &C::evidence_before_misses, Changes::kWhileMapping,
-                     "Ignore a scan's evidence for free in all voxels that one of its hits adds evidence to. "
-                     "Set true to keep the voxels next to a hit as well."),
   };
 }
 

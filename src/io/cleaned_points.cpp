@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
 
@@ -30,13 +30,13 @@ std::string header(std::uint64_t count, const Eigen::Vector3d& origin) {
 }
 
 /// Appends the points of a scan that lie in occupied voxels, relative to an origin.
-void append(std::string& bytes, const SequenceFrame& frame, const SemanticMap& map,
+void append(std::string& bytes, const SequenceFrame& frame, const SemanticMap& map, const StateRules& rules,
             const Eigen::Vector3d& origin) {
   const Scan scan = frame.scan();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     if (!map.geometry().contains(point)) continue;
-    const VoxelView view = viewWithoutEntropy(map, map.geometry().voxelAt(point));
+    const VoxelView view = viewWithoutEntropy(map, rules, map.geometry().voxelAt(point));
     if (view.state != VoxelState::kOccupied) continue;
     const Eigen::Vector3f rounded = (point - origin).cast<float>();
     const CleanedPoint cleaned = {rounded.x(),         rounded.y(),    rounded.z(),
@@ -55,7 +55,7 @@ void checkPointFileName(const std::string& path) {
 
 CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,
                                 const std::vector<std::size_t>& scans, const SemanticMap& map,
-                                const std::function<bool(std::size_t)>& progress) {
+                                const StateRules& rules, const std::function<bool(std::size_t)>& progress) {
   checkPointFileName(path);
   CleanedCount count;
   const Eigen::Vector3d origin =
@@ -67,7 +67,7 @@ CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequenc
   for (const std::size_t i : scans) {
     const SequenceFrame frame = sequence.read(i);
     bytes.clear();
-    append(bytes, frame, map, origin);
+    append(bytes, frame, map, rules, origin);
     file.write(bytes);
     count.points += frame.points.size();
     count.kept += bytes.size() / sizeof(CleanedPoint);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/io/sequence.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 
 namespace bki_mapping {
 
@@ -35,6 +35,7 @@ struct CleanedCount {
 /// @throws std::runtime_error if a scan cannot be read, or the file cannot be written.
 CleanedCount writeCleanedPoints(const std::string& path, const Sequence& sequence,
                                 const std::vector<std::size_t>& scans, const SemanticMap& map,
+                                const StateRules& rules,
                                 const std::function<bool(std::size_t)>& progress = nullptr);
 
 /// @throws std::invalid_argument if the path does not end in .pcd.

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "map/voxel_color.h"
+#include "io/voxel_color.h"
 
 namespace bki_mapping {
 namespace {

@@ -11,24 +11,25 @@
 namespace bki_mapping {
 namespace {
 
-using Export = void (*)(const std::string&, const SemanticMap&, const ClassTable&, const ExportOptions&);
+using Export = void (*)(const std::string&, const SemanticMap&, const StateRules&, const ClassTable&,
+                        const ExportOptions&);
 
-void exportPoints(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                  const ExportOptions& options) {
-  exportMap(path, map, classes, options.states);
+void exportPoints(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                  const ClassTable& classes, const ExportOptions& options) {
+  exportMap(path, map, rules, classes, options.states);
 }
-void exportTree(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ExportOptions&) {
-  exportOctoMap(path, map, classes);
+void exportTree(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ExportOptions&) {
+  exportOctoMap(path, map, rules, classes);
 }
-void exportColumns(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                   const ExportOptions& options) {
-  exportGrid(path, map, classes, options.columns);
+void exportColumns(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                   const ClassTable& classes, const ExportOptions& options) {
+  exportGrid(path, map, rules, classes, options.columns);
 }
 
-void exportPage(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ExportOptions& options) {
-  exportHtml(path, map, classes, options.html);
+void exportPage(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ExportOptions& options) {
+  exportHtml(path, map, rules, classes, options.html);
 }
 
 Export exportOf(const std::string& path) {
@@ -50,9 +51,9 @@ void checkExport(const std::string& path, const ExportOptions& options) {
   if (chosen == exportPage) checkHtml(options.html);
 }
 
-void exportFile(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ExportOptions& options) {
-  exportOf(path)(path, map, classes, options);
+void exportFile(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ExportOptions& options) {
+  exportOf(path)(path, map, rules, classes, options);
 }
 
 HeightReference parseHeightReference(const std::string& word) {

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/column_map.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/query/column_map.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "io/html_export.h"
 
 namespace bki_mapping {
@@ -22,8 +22,8 @@ struct ExportOptions {
 void checkExport(const std::string& path, const ExportOptions& options = {});
 
 /// Writes a map by exportMap, exportOctoMap, exportGrid or exportHtml. @throws as these and checkExport().
-void exportFile(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ExportOptions& options);
+void exportFile(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ExportOptions& options);
 
 /// The zero of heights. @param word `map` or `ground`. @throws std::invalid_argument on another word.
 HeightReference parseHeightReference(const std::string& word);

@@ -75,11 +75,11 @@ std::string gridImagePath(const std::string& path) {
   return std::filesystem::path(path).replace_extension(".pgm").string();
 }
 
-void exportGrid(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ColumnRules& rules) {
+void exportGrid(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ColumnRules& column_rules) {
   ColumnMap columns;
-  columns.start(rules);
-  columns.update(map, classes);
+  columns.start(column_rules);
+  columns.update(map, rules, classes);
   const Extent extent = extentOf(columns);
   if (extent.width() == 0)
     throw std::invalid_argument("the map is empty, and map_server refuses empty images");

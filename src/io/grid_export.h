@@ -4,7 +4,8 @@
 #include <string>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/column_map.h"
+#include "bki_mapping/query/column_map.h"
+#include "bki_mapping/rules/state_rules.h"
 
 namespace bki_mapping {
 
@@ -13,8 +14,8 @@ namespace bki_mapping {
 /// unknown ones 205.
 /// @param path of the YAML file, ending in .yaml. @throws std::runtime_error if a file cannot be written,
 /// std::invalid_argument if the image would have more than 2^28 cells.
-void exportGrid(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const ColumnRules& rules);
+void exportGrid(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const ColumnRules& column_rules);
 
 /// The image of a YAML file.
 std::string gridImagePath(const std::string& path);

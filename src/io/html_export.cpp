@@ -38,11 +38,11 @@ std::string grouped(std::size_t number) {
 }
 
 /// @throws std::invalid_argument if no browser could show that many.
-Count countVoxels(const SemanticMap& map, const VoxelStates& states) {
+Count countVoxels(const SemanticMap& map, const StateRules& rules, const VoxelStates& states) {
   Count count;
   BlockView view;
   for (const auto& [index, block] : map.entries()) {
-    readBlock(map, index, *block, BlockFields::kStates, view);
+    readBlock(map, rules, index, *block, BlockFields::kStates, view);
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
       const auto v = static_cast<std::size_t>(offset);
       if (view.state[v] == VoxelState::kUnknown || !states.contains(view.state[v])) continue;
@@ -94,9 +94,10 @@ char byteOf(float probability) {
 /// Writes the tiles of a map, and lists them.
 class TileWriter {
  public:
-  TileWriter(const SemanticMap& map, const ClassTable& classes, const HtmlOptions& options,
-             const PageWriter& write)
+  TileWriter(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
+             const HtmlOptions& options, const PageWriter& write)
       : map_(map),
+        rules_(rules),
         states_(options.states),
         drives_(options.drives, options.parts),
         codec_(classes),
@@ -142,7 +143,7 @@ class TileWriter {
  private:
   /// Reads a block, in which voxels that are left out become unknown. @return whether any voxel remains.
   bool readStates(const BlockIndex& index, const Block& block) {
-    readBlock(map_, index, block, BlockFields::kAllButEntropy, view_);
+    readBlock(map_, rules_, index, block, BlockFields::kAllButEntropy, view_);
     left_out_ = false;
     bool any = false;
     for (VoxelState& state : view_.state) {
@@ -192,6 +193,7 @@ class TileWriter {
   }
 
   const SemanticMap& map_;
+  const StateRules& rules_;
   VoxelStates states_;
   VoxelDrives drives_;
   TileCodec codec_;
@@ -252,13 +254,13 @@ void checkHtml(const HtmlOptions& options) {
   findThreeJs(options.three_js);
 }
 
-void exportHtml(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const HtmlOptions& options) {
-  const Count count = countVoxels(map, options.states);
+void exportHtml(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const HtmlOptions& options) {
+  const Count count = countVoxels(map, rules, options.states);
   AtomicFile file(path);
   const PageWriter write = [&](const std::string& bytes) { file.write(bytes); };
   writePage(options.three_js, write, [&] {
-    TileWriter tiles(map, classes, options, write);
+    TileWriter tiles(map, rules, classes, options, write);
     json header = headerOf(map, classes, options, count), list = json::array();
     for (const GridIndex& tile : tilesOf(map)) {
       json entry = tiles.writeTile(tile);

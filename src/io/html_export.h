@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {
@@ -40,8 +40,8 @@ constexpr int kMostHtmlExtent = 1 << 20;
 /// what is computed from it to colour them. web/map.js reads it.
 /// @throws std::invalid_argument if the map is too large for a page, std::runtime_error if the page cannot be
 /// written, and as checkHtml().
-void exportHtml(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-                const HtmlOptions& options);
+void exportHtml(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                const ClassTable& classes, const HtmlOptions& options);
 
 /// Checks before long work that all parts of the page are there.
 /// @throws std::runtime_error that says what to install.

@@ -55,12 +55,12 @@ std::string pcdBytes(const VoxelPoints& points, const Eigen::Vector3d& origin) {
   return withPoints<VoxelPoint>(header + "DATA binary\n", points, origin);
 }
 
-std::string bytesOf(const std::string& ending, const SemanticMap& map, const ClassTable& classes,
-                    const VoxelStates& states) {
+std::string bytesOf(const std::string& ending, const SemanticMap& map, const StateRules& rules,
+                    const ClassTable& classes, const VoxelStates& states) {
   const GridGeometry& geometry = map.geometry();
   const VoxelPoints::Blocks blocks = sortedBlocks(map);
   ThreadPool pool(kThreads);
-  const VoxelPoints points(map, classes, {states}, blocks, pool);
+  const VoxelPoints points(map, rules, classes, {states}, blocks, pool);
   if (ending == ".pcd") return pcdBytes(points, pcdOrigin(map));
   const bool far = std::any_of(blocks.begin(), blocks.end(), [&](const auto& block) {
     return tooFarForFloats(geometry.blockCentre(block.first), geometry.resolution());
@@ -96,10 +96,10 @@ VoxelStates parseStates(const std::string& list) {
   return states;
 }
 
-std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
-                                       const VoxelStates& states) {
+std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const StateRules& rules,
+                                       const ClassTable& classes, const VoxelStates& states) {
   ThreadPool pool(kThreads);
-  const VoxelPoints points(map, classes, {states}, sortedBlocks(map), pool);
+  const VoxelPoints points(map, rules, classes, {states}, sortedBlocks(map), pool);
   std::vector<VoxelRecord> voxels(points.count());
   points.write(voxels.data());
   return voxels;
@@ -117,11 +117,11 @@ void checkMapName(const std::string& path) {
   }
 }
 
-void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-               const VoxelStates& states) {
+void exportMap(const std::string& path, const SemanticMap& map, const StateRules& rules,
+               const ClassTable& classes, const VoxelStates& states) {
   if (!holdsPoints(path)) throw std::invalid_argument("point file '" + path + "' must end in .ply or .pcd");
   AtomicFile file(path);
-  file.write(bytesOf(endingOf(path), map, classes, states));
+  file.write(bytesOf(endingOf(path), map, rules, classes, states));
   file.commit();
 }
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/voxel_state.h"
-#include "map/voxel_color.h"
+#include "bki_mapping/rules/voxel_state.h"
+#include "io/voxel_color.h"
 
 namespace bki_mapping {
 

@@ -38,14 +38,14 @@ void count(MapStatistics& statistics, const BlockIndex& index, const BlockView& 
 }
 
 /// Counts blocks of a map.
-void countAll(MapStatistics& statistics, const SemanticMap& map,
+void countAll(MapStatistics& statistics, const SemanticMap& map, const StateRules& rules,
               const std::vector<std::pair<BlockIndex, const Block*>>& blocks, const BlockVisit& visit) {
   BlockView view;
   for (const auto& [index, block] : blocks) {
     ++statistics.blocks;
     statistics.planes += block->classes().size();
     statistics.memory_bytes += block->bytes();
-    readBlock(map, index, *block, BlockFields::kStates, view);
+    readBlock(map, rules, index, *block, BlockFields::kStates, view);
     count(statistics, index, view);
     if (visit) visit(index, view);
   }
@@ -57,7 +57,8 @@ void countAll(MapStatistics& statistics, const SemanticMap& map,
 /// memory at once; without neighbours, one tile.
 class TileWindow {
  public:
-  TileWindow(MapFile& file, SemanticMap& empty_map) : file_(file), map_(empty_map.snapshot()) {
+  TileWindow(MapFile& file, const StateRules& rules)
+      : file_(file), map_(file.info().emptyMap()), asks_around_(rules.neighbourhoodRatio() > 0.0f) {
     for (const TileEntry& tile : file.tiles()) tiles_.push_back(tile.index);
     std::sort(tiles_.begin(), tiles_.end(), [](const GridIndex& a, const GridIndex& b) {
       return std::make_tuple(stripOf(a), a.y, a.x, a.z) < std::make_tuple(stripOf(b), b.y, b.x, b.z);
@@ -69,7 +70,7 @@ class TileWindow {
 
   /// Reads what decides the states in a tile, and forgets what no later tile needs.
   void moveTo(const GridIndex& tile) {
-    const std::int32_t beside = map_.neighbourhoodRatio() > 0.0f ? 1 : 0, strip = stripOf(tile) * kStrip;
+    const std::int32_t beside = asks_around_ ? 1 : 0, strip = stripOf(tile) * kStrip;
     for (const GridIndex& held : map_.regions()) {
       if (beside == 0 || held.x < strip - beside || held.x >= strip + kStrip + beside ||
           std::abs(held.y - tile.y) > beside) {
@@ -102,6 +103,7 @@ class TileWindow {
 
   MapFile& file_;
   SemanticMap map_;
+  bool asks_around_;  ///< whether states depend on the tiles beside
   std::vector<GridIndex> tiles_;
 };
 
@@ -113,21 +115,21 @@ Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
           resolution * Eigen::Vector3d(high.x + 1.0, high.y + 1.0, high.z + 1.0)};
 }
 
-MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit) {
+MapStatistics readStatistics(MapFile& file, const StateRules& rules, const BlockVisit& visit) {
   MapStatistics statistics;
-  TileWindow window(file, empty_map);
+  TileWindow window(file, rules);
   for (const GridIndex& tile : window.tiles()) {
     window.moveTo(tile);
     ++statistics.tiles;
-    countAll(statistics, window.map(), window.blocksOf(tile), visit);
+    countAll(statistics, window.map(), rules, window.blocksOf(tile), visit);
   }
   return statistics;
 }
 
-MapStatistics statisticsOf(const SemanticMap& map, const BlockVisit& visit) {
+MapStatistics statisticsOf(const SemanticMap& map, const StateRules& rules, const BlockVisit& visit) {
   MapStatistics statistics;
   statistics.tiles = map.regions().size();
-  countAll(statistics, map, sortedBlocks(map), visit);
+  countAll(statistics, map, rules, sortedBlocks(map), visit);
   return statistics;
 }
 

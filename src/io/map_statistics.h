@@ -7,7 +7,7 @@
 #include <map>
 
 #include "bki_mapping/core/types.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {
@@ -25,13 +25,14 @@ struct MapStatistics {
   Eigen::AlignedBox3d bounds(double resolution) const;
 };
 
-/// Reads the map in a file, the sum of all drives, tile by tile. @param empty_map has the gains that decide
-/// the states (emptyMapWithGains). @param visit is called for each block with the state of its voxels.
+/// Reads the map in a file, the sum of all drives, tile by tile. @param rules as storedRules. @param visit is
+/// called for each block with the state of its voxels.
 /// @throws MapFileError.
 using BlockVisit = std::function<void(const BlockIndex& index, const BlockView& view)>;
-MapStatistics readStatistics(MapFile& file, SemanticMap& empty_map, const BlockVisit& visit = nullptr);
+MapStatistics readStatistics(MapFile& file, const StateRules& rules, const BlockVisit& visit = nullptr);
 
 /// The same of a map in memory; `tiles` counts its regions.
-MapStatistics statisticsOf(const SemanticMap& map, const BlockVisit& visit = nullptr);
+MapStatistics statisticsOf(const SemanticMap& map, const StateRules& rules,
+                           const BlockVisit& visit = nullptr);
 
 }  // namespace bki_mapping

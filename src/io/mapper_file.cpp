@@ -30,7 +30,7 @@ StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, cons
   return readMap(file, static_cast<std::size_t>(1e6 * mapper.config().memory_limit));
 }
 
-SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info) {
+StateRules storedRules(const std::string& path, const MapInfo& info) {
   MapperConfig config;
   try {
     const std::map<std::string, std::string> values = parseParameters(info.parameters);
@@ -42,16 +42,16 @@ SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info) {
     setParameters(config, gains);
     config.resolution = info.resolution;
     config.prior = info.prior;
-    config.threads = 1;
-    return SemanticMapper(config, info.classes).snapshot();
+    checkParameters(config);
+    return StateRules(config.free_gain, *info.classes);
   } catch (const std::invalid_argument& error) {
     throw MapFileError("the parameters in " + path + " cannot be used: " + error.what());
   }
 }
 
-StoredMap loadMapWithGains(const std::string& path) {
+RuledMap loadRuledMap(const std::string& path) {
   MapFile file(path, MapFile::Access::kRead);
-  StoredMap stored{file.info(), file.drives(), emptyMapWithGains(path, file.info())};
+  RuledMap stored{{file.info(), file.drives(), file.info().emptyMap()}, storedRules(path, file.info())};
   for (const TileEntry& tile : file.tiles()) file.addTileTo(stored.map, {tile.index});
   return stored;
 }

@@ -10,7 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "core/atomic_file.h"
 
 namespace bki_mapping {
@@ -33,8 +33,8 @@ octomap::OcTreeKey keyOf(const VoxelIndex& voxel) {
 
 /// Calls add(key, view) for each voxel that is occupied or free.
 template <typename Add>
-void forEachLeaf(const SemanticMap& map, Add&& add) {
-  forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
+void forEachLeaf(const SemanticMap& map, const StateRules& rules, Add&& add) {
+  forEachKnownVoxel(map, rules, [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state != VoxelState::kOccluded) add(keyOf(voxel), view);
   });
 }
@@ -69,9 +69,9 @@ bool prune(octomap::ColorOcTree& tree, octomap::ColorOcTreeNode* node) {
   return same && tree.pruneNode(node);
 }
 
-std::string binaryTree(const SemanticMap& map, std::ostringstream& out) {
+std::string binaryTree(const SemanticMap& map, const StateRules& rules, std::ostringstream& out) {
   octomap::OcTree tree(map.geometry().resolution());
-  forEachLeaf(map, [&](const octomap::OcTreeKey& key, const VoxelView& view) {
+  forEachLeaf(map, rules, [&](const octomap::OcTreeKey& key, const VoxelView& view) {
     const bool occupied = view.state == VoxelState::kOccupied;
     tree.setNodeValue(key, occupied ? tree.getClampingThresMaxLog() : tree.getClampingThresMinLog(), true);
   });
@@ -84,9 +84,10 @@ std::string binaryTree(const SemanticMap& map, std::ostringstream& out) {
   return out.str();
 }
 
-std::string colorTree(const SemanticMap& map, const ClassTable& classes, std::ostringstream& out) {
+std::string colorTree(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
+                      std::ostringstream& out) {
   octomap::ColorOcTree tree(map.geometry().resolution());
-  forEachLeaf(map, [&](const octomap::OcTreeKey& key, const VoxelView& view) {
+  forEachLeaf(map, rules, [&](const octomap::OcTreeKey& key, const VoxelView& view) {
     octomap::ColorOcTreeNode* const node = tree.setNodeValue(key, logOdds(view), true);
     const SemanticClass* const known = classes.find(view.label);
     if (known) node->setColor(known->color[0], known->color[1], known->color[2]);
@@ -101,7 +102,8 @@ std::string colorTree(const SemanticMap& map, const ClassTable& classes, std::os
 
 }  // namespace
 
-void exportOctoMap(const std::string& path, const SemanticMap& map, const ClassTable& classes) {
+void exportOctoMap(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                   const ClassTable& classes) {
   const std::string ending = std::filesystem::path(path).extension().string();
   if (ending != ".bt" && ending != ".ot")
     throw std::invalid_argument("OctoMap '" + path + "' must end in .bt or .ot");
@@ -109,7 +111,7 @@ void exportOctoMap(const std::string& path, const SemanticMap& map, const ClassT
   std::ostringstream out;
   out.precision(
       std::numeric_limits<double>::max_digits10);  // of the resolution, which OctoMap writes as text
-  file.write(ending == ".bt" ? binaryTree(map, out) : colorTree(map, classes, out));
+  file.write(ending == ".bt" ? binaryTree(map, rules, out) : colorTree(map, rules, classes, out));
   file.commit();
 }
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 
 namespace bki_mapping {
 
@@ -14,6 +14,7 @@ namespace bki_mapping {
 /// voxels of the same colour are merged.
 /// @throws std::invalid_argument on another extension, or if the map reaches beyond the 2^15 voxels from its
 /// origin that an octree can hold; std::runtime_error if the file cannot be written.
-void exportOctoMap(const std::string& path, const SemanticMap& map, const ClassTable& classes);
+void exportOctoMap(const std::string& path, const SemanticMap& map, const StateRules& rules,
+                   const ClassTable& classes);
 
 }  // namespace bki_mapping

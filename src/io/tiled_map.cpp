@@ -13,7 +13,7 @@
 #include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/semantic_map.h"
 #include "io/region_files.h"
-#include "map/neighbourhood.h"
+#include "rules/neighbourhood.h"
 #include "store/box_tiles.h"
 #include "store/database.h"
 
@@ -97,10 +97,10 @@ struct TiledMap::State {
                        " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
                        " MB; ask for a smaller box, or raise the limit");
   }
-  StoredMap read(const std::vector<Found>& found, std::size_t limit) {
+  RuledMap read(const std::vector<Found>& found, std::size_t limit) {
     const MapInfo& info = files.info();
     checkMemory(found, limit);
-    StoredMap stored{info, {}, emptyMapWithGains(files.infoPath(), info)};
+    RuledMap stored{{info, {}, info.emptyMap()}, storedRules(files.infoPath(), info)};
     for (const Found& each : found) {
       if (!files.file(each.file).addTileTo(stored.map, {each.entry.index})) {
         throw damaged(files.nameOf(each.file), "a tile of its list is missing");
@@ -161,20 +161,20 @@ MapFile* TiledMap::file() {
   return state_->files.isMapFile() ? &state_->files.file(0) : nullptr;
 }
 
-StoredMap TiledMap::readBox(const Eigen::AlignedBox3d& box, std::size_t memory_limit) {
-  StoredMap stored = state_->read(state_->find(box), memory_limit);
+RuledMap TiledMap::readBox(const Eigen::AlignedBox3d& box, std::size_t memory_limit) {
+  RuledMap stored = state_->read(state_->find(box), memory_limit);
   keepOnly(box, stored.map);
   return stored;
 }
 
-StoredMap TiledMap::readTiles(const std::vector<GridIndex>& tiles, std::size_t memory_limit) {
+RuledMap TiledMap::readTiles(const std::vector<GridIndex>& tiles, std::size_t memory_limit) {
   return state_->read(state_->find(tiles), memory_limit);
 }
 
-StoredMap TiledMap::readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit) {
+RuledMap TiledMap::readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit) {
   const GridGeometry grid(resolution());
   const bool asks =
-      emptyMapWithGains(path(), info()).neighbourhoodRatio() > 0.0f;  // states depend on voxels around
+      storedRules(path(), info()).neighbourhoodRatio() > 0.0f;  // states depend on voxels around
   std::vector<GridIndex> tiles;
   for (const Eigen::Vector3d& point : points) {
     if (!point.allFinite()) throw std::invalid_argument("a coordinate of a point is not a finite number");

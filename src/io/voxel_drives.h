@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {

@@ -4,7 +4,7 @@
 #include <new>
 #include <numeric>
 
-#include "map/voxel_color.h"
+#include "io/voxel_color.h"
 
 namespace bki_mapping {
 namespace {
@@ -34,14 +34,19 @@ std::array<Coordinate, kBlockEdge> centresOf(std::int32_t block, double resoluti
 
 }  // namespace
 
-VoxelPoints::VoxelPoints(const SemanticMap& map, const ClassTable& classes, const VoxelSelection& selection,
-                         Blocks blocks, ThreadPool& pool)
-    : map_(map), classes_(classes), selection_(selection), blocks_(std::move(blocks)), pool_(pool) {
+VoxelPoints::VoxelPoints(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
+                         const VoxelSelection& selection, Blocks blocks, ThreadPool& pool)
+    : map_(map),
+      rules_(rules),
+      classes_(classes),
+      selection_(selection),
+      blocks_(std::move(blocks)),
+      pool_(pool) {
   begin_.resize(blocks_.size() + 1);
   forEachBlock([this](std::size_t b) {
     const auto& [index, block] = blocks_[b];
     BlockView view;
-    readBlock(map_, index, *block, BlockFields::kStates, view);
+    readBlock(map_, rules_, index, *block, BlockFields::kStates, view);
     std::size_t count = 0;
     forEachSelected(index, view, [&count](std::size_t) { ++count; });
     begin_[b + 1] = count;
@@ -85,7 +90,7 @@ void VoxelPoints::writeBlock(std::size_t b, Point* to, const Eigen::Vector3d& or
              y = centresOf<Coordinate>(index.y, resolution, origin.y()),
              z = centresOf<Coordinate>(index.z, resolution, origin.z());
   BlockView view;
-  readBlock(map_, index, *block, BlockFields::kAll, view);
+  readBlock(map_, rules_, index, *block, BlockFields::kAll, view);
   forEachSelected(index, view, [&](std::size_t v) {
     Point& point = *new (to++) Point;
     point.x = x[v % kBlockEdge];

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "bki_mapping/io/map_export.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "parallel/thread_pool.h"
 
 namespace bki_mapping {
@@ -71,9 +72,9 @@ class VoxelPoints {
  public:
   using Blocks = std::vector<std::pair<BlockIndex, const Block*>>;
 
-  /// Counts. @param map, classes, pool, and the blocks: must not change, and outlive this.
-  VoxelPoints(const SemanticMap& map, const ClassTable& classes, const VoxelSelection& selection,
-              Blocks blocks, ThreadPool& pool);
+  /// Counts. @param map, rules, classes, pool, and the blocks: must not change, and outlive this.
+  VoxelPoints(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
+              const VoxelSelection& selection, Blocks blocks, ThreadPool& pool);
 
   std::size_t count() const { return begin_.back(); }
   /// Writes all points, in the order of the blocks, by offset within each. @param to memory for count()
@@ -95,6 +96,7 @@ class VoxelPoints {
   void forEachSelected(const BlockIndex& index, const BlockView& view, const Visit& visit) const;
 
   const SemanticMap& map_;
+  const StateRules& rules_;
   const ClassTable& classes_;
   VoxelSelection selection_;
   Blocks blocks_;

@@ -137,15 +137,7 @@ std::vector<GridIndex> SemanticMap::regions() const {
 }
 
 SemanticMap SemanticMap::emptyLikeThis() const {
-  SemanticMap empty(geometry_, prior_, class_count_);
-  empty.free_gains_ = free_gains_;
-  empty.gain_persistence_ = gain_persistence_;
-  empty.remaining_gain_ = remaining_gain_;
-  empty.neighbourhood_ratio_ = neighbourhood_ratio_;
-  empty.asking_ = asking_;
-  empty.neighbourhood_is_below_ = neighbourhood_is_below_;
-  empty.fixed_ = fixed_;
-  return empty;
+  return SemanticMap(geometry_, prior_, class_count_);
 }
 
 SemanticMap::SharedRegion SemanticMap::detach(const GridIndex& index) noexcept {
@@ -254,6 +246,14 @@ std::size_t SemanticMap::bytes() const {
   std::size_t sum = indexBytes();
   for (const Entry& entry : entries()) sum += entry.block->bytes();
   return sum;
+}
+
+std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map) {
+  std::vector<std::pair<BlockIndex, const Block*>> blocks;
+  blocks.reserve(map.size());
+  for (const auto& [index, block] : map.entries()) blocks.emplace_back(index, block);
+  std::sort(blocks.begin(), blocks.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return blocks;
 }
 
 }  // namespace bki_mapping

@@ -10,8 +10,8 @@
 #include "core/sensor_model_parameters.h"
 #include "free_space/free_space_parameters.h"
 #include "kernel/kernel_parameters.h"
-#include "map/free_gain_parameters.h"
-#include "update/scan_limit_parameters.h"
+#include "rules/free_gain_parameters.h"
+#include "rules/scan_limit_parameters.h"
 
 namespace bki_mapping {
 
@@ -32,6 +32,7 @@ std::vector<Parameter> mapperParameters() {
   };
   appendParameters(all, "kernel/", &C::kernel, kernelParameters());
   appendParameters(all, "free_space/", &C::free_space, freeSpaceParameters());
+  appendParameters(all, "free_space/", &C::scan_limit, missParameters());
   appendParameters(all, "free_gain/", &C::free_gain, freeGainParameters());
   appendParameters(all, "scan_limit/", &C::scan_limit, scanLimitParameters());
   appendParameters(all, "sensor_model/", &C::sensor_model, sensorModelParameters());

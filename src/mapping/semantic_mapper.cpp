@@ -18,6 +18,7 @@
 #include "free_space/registry.h"
 #include "mapping/scan_preprocessor.h"
 #include "points/point_evidence.h"
+#include "rules/scan_rules.h"
 #include "update/map_updater.h"
 
 namespace bki_mapping {
@@ -50,34 +51,6 @@ std::string about(double number) {
 
 std::string megabytes(double bytes) {
   return numberText(std::round(bytes / 1e6)) + " MB";
-}
-
-/// The classes that cannot move: those without the flag dynamic, except the unlabelled one.
-SemanticMap::Classes fixedClasses(const ClassTable& classes) {
-  SemanticMap::Classes fixed;
-  for (const SemanticClass& c : classes.classes()) fixed[c.id] = !c.dynamic && !c.unlabelled;
-  return fixed;
-}
-
-/// The classes that ask their neighbourhood: what can be parked; or all, if nothing says what can move.
-SemanticMap::Classes askingClasses(const ClassTable& classes, bool says_what_moves) {
-  SemanticMap::Classes asking;
-  for (const SemanticClass& c : classes.classes()) {
-    asking[c.id] = !c.unlabelled && (!says_what_moves || (c.dynamic && !c.living));
-  }
-  return asking;
-}
-
-UpdateRules rulesOf(const MapperConfig& config, const ClassTable& classes) {
-  UpdateRules rules;
-  rules.hits_before_misses = config.free_space.hits_before_misses;
-  rules.evidence_before_misses = config.free_space.evidence_before_misses;
-  if (config.scan_limit.hits > 0.0) rules.most_hits = static_cast<float>(config.scan_limit.hits);
-  if (config.scan_limit.free > 0.0) rules.most_free = static_cast<float>(config.scan_limit.free);
-  rules.free_threshold = static_cast<float>(config.scan_limit.free_threshold);
-  rules.void_evidence = static_cast<float>(config.scan_limit.void_space);
-  rules.fixed = fixedClasses(classes);
-  return rules;
 }
 
 /// The limits of the update of a scan. @param map_bytes present memory of the map.
@@ -132,6 +105,7 @@ ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::
 }  // namespace
 
 struct SemanticMapper::Pipeline {
+  ScanRules rules;
   ScanPreprocessor preprocessor;
   PointEvidence hits;
   LazyBeamField beams;
@@ -140,9 +114,10 @@ struct SemanticMapper::Pipeline {
   MapUpdater updater;
 
   Pipeline(const MapperConfig& config, const GridGeometry& geometry, const ClassTable& classes)
-      : preprocessor(config),
-        hits(geometry, config.kernel, config.free_space.hits_before_misses,
-             config.kernel.static_spread ? ClassSet() : fixedClasses(classes)),
+      : rules(config.scan_limit, classes),
+        preprocessor(config),
+        hits(geometry, config.kernel, config.scan_limit.hits_before_misses,
+             config.kernel.static_spread ? ClassSet() : rules.fixed),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
@@ -153,35 +128,18 @@ SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const
     : config_(checked(config, *classes)),
       classes_(std::move(classes)),
       map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
+      state_rules_(config_.free_gain, *classes_),
       pool_(std::make_unique<ThreadPool>(config_.threads)),
-      pipeline_(std::make_unique<Pipeline>(config_, map_.geometry(), *classes_)) {
-  setGains();
-}
+      pipeline_(std::make_unique<Pipeline>(config_, map_.geometry(), *classes_)) {}
 
 SemanticMapper::~SemanticMapper() = default;
-
-void SemanticMapper::setGains() {
-  map_.setGainPersistence(config_.free_gain.persistence);
-  map_.setRemainingGain(config_.free_gain.remaining, fixedClasses(*classes_));
-  // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
-  const bool says_what_moves = classes_->saysWhatMoves();
-  map_.setNeighbourhoodRatio(config_.free_gain.neighbourhood, askingClasses(*classes_, says_what_moves),
-                             says_what_moves);
-  for (const SemanticClass& c : classes_->classes()) {
-    const FreeGainConfig& gain = config_.free_gain;
-    double of_kind = gain.static_classes;
-    if (c.dynamic) of_kind = c.living ? gain.ofLiving() : gain.dynamic_classes;
-    if (c.unlabelled) of_kind = 1.0;
-    map_.setFreeGain(c.id, c.free_gain.value_or(of_kind));
-  }
-}
 
 void SemanticMapper::reconfigure(const MapperConfig& config) {
   const MapperConfig allowed = checked(config, *classes_);
   checkChanges(config_, allowed);
   pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry(), *classes_);
   config_ = allowed;
-  setGains();
+  state_rules_ = StateRules(config_.free_gain, *classes_);
 }
 
 void SemanticMapper::reset() {
@@ -322,7 +280,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 
-  const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, rulesOf(config_, *classes_),
+  const MapUpdateStats update = p.updater.update(map_, evidence, *pool_, p.rules,
                                                  limitsFor(scan, config_, map_.geometry(), mapBytes()));
   stats.blocks = update.blocks;
   stats.not_finite = update.sums.not_finite;

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "map/neighbourhood.h"
 #include "query/distance_kernels.h"
 #include "query/voxel_rows.h"
+#include "rules/neighbourhood.h"
 
 namespace bki_mapping {
 namespace {
@@ -181,7 +181,7 @@ void DistanceField::update(const StateMap& states, Span<const GridIndex> changed
   // What is to be recomputed: chunks of columns along y in each layer, and rows along x.
   const std::size_t chunks = stride_ / kChunk;
   std::vector<char> columns(chunks * layers_), rows(height_ * layers_);
-  for (const GridIndex& index : withDependents(states.map(), changed)) {
+  for (const GridIndex& index : withDependents(states.map(), states.rules(), changed)) {
     forEachVoxel(states.find({index}), {index}, [&](std::size_t at, bool obstacle) {
       if ((along_y_[at] < 0) == obstacle) return;
       along_y_[at] = -along_y_[at];

@@ -23,9 +23,9 @@ struct Place {
 class PointReader {
  public:
   PointReader(const StateMap& states, const PointValues& values)
-      : map_(states.map()), reader_(states), values_(values) {
+      : states_(states), map_(states.map()), reader_(states), values_(values) {
     wants_posterior_ = values.occupancy || values.class_probability || values.probability || values.variance;
-    if (wants_posterior_) prior_ = viewWithoutEntropy(map_, BlockIndex(), Block(), 0);
+    if (wants_posterior_) prior_ = viewWithoutEntropy(map_, states_.rules(), BlockIndex(), Block(), 0);
   }
 
   /// Reads points `begin` to `end` - 1, at most kBatch. @return false if one is not finite.
@@ -50,7 +50,7 @@ class PointReader {
     const std::size_t count = end - begin;
     for (std::size_t n = 0; n < count; ++n) {
       const Place& place = places_[n];
-      blocks_[n] = place.region ? place.region->find(map_, place.block) : nullptr;
+      blocks_[n] = place.region ? place.region->find(states_, place.block) : nullptr;
       if (!blocks_[n]) continue;
       __builtin_prefetch(&blocks_[n]->layers[static_cast<std::size_t>(place.offset) / 64]);
       if (values_.labels) __builtin_prefetch(&blocks_[n]->labels[static_cast<std::size_t>(place.offset)]);
@@ -67,13 +67,15 @@ class PointReader {
       values_.labels[n] = block ? block->labels[static_cast<std::size_t>(offset)] : kFreeClass;
     }
     if (!wants_posterior_) return;
-    const VoxelView view = block ? viewWithoutEntropy(map_, place.block, *block->block, offset) : prior_;
+    const VoxelView view =
+        block ? viewWithoutEntropy(map_, states_.rules(), place.block, *block->block, offset) : prior_;
     if (values_.occupancy) values_.occupancy[n] = view.occupancy;
     if (values_.class_probability) values_.class_probability[n] = view.class_probability;
     if (values_.probability) values_.probability[n] = view.probability;
     if (values_.variance) values_.variance[n] = view.variance;
   }
 
+  const StateMap& states_;
   const SemanticMap& map_;
   BlockReader reader_;
   PointValues values_;

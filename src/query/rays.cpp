@@ -93,7 +93,7 @@ class RayCaster {
     const BlockIndex index = GridGeometry::blockOf(walk.voxel());
     const StateMap::RegionStates* const region = reader_.region(index);
     const StateMap::RegionStates::Glance glance =
-        region ? region->glance(states_.map(), index) : StateMap::RegionStates::Glance();
+        region ? region->glance(states_, index) : StateMap::RegionStates::Glance();
     if (!glance.block) {
       meetUnknown(walk);
       if (hit_.end == RayEnd::kNothing) walk.leave(region ? kBlockShift : kRegionShift);

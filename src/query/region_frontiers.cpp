@@ -11,7 +11,7 @@ namespace {
 class Neighbourhood {
  public:
   Neighbourhood(const StateMap& states, const GridIndex& region)
-      : map_(states.map()),
+      : states_(states),
         region_(region),
         own_(states.region(region)),
         beside_{states.region({region.x - 1, region.y, region.z}),
@@ -21,15 +21,15 @@ class Neighbourhood {
                 states.region({region.x, region.y, region.z - 1}),
                 states.region({region.x, region.y, region.z + 1})} {}
 
-  const BlockStates* own(const BlockIndex& block) const { return own_->find(map_, block); }
+  const BlockStates* own(const BlockIndex& block) const { return own_->find(states_, block); }
   /// @param block in the region, or beside it in the direction of `side`: 2 * axis, and 1 more if rising.
   const BlockStates* beside(const BlockIndex& block, std::size_t side) const {
     const StateMap::RegionStates* const in = SemanticMap::regionOf(block) == region_ ? own_ : beside_[side];
-    return in ? in->find(map_, block) : nullptr;
+    return in ? in->find(states_, block) : nullptr;
   }
 
  private:
-  const SemanticMap& map_;
+  const StateMap& states_;
   GridIndex region_;
   const StateMap::RegionStates* own_;
   std::array<const StateMap::RegionStates*, 6> beside_;
@@ -167,7 +167,7 @@ void VoxelSum::add(const VoxelSum& other) {
 
 RegionFrontiers::RegionFrontiers(const StateMap& states, const Region& region, const VoxelBox* box) {
   const Neighbourhood around(states, region.index());
-  if (!box) states.region(region.index())->readAll(states.map());
+  if (!box) states.region(region.index())->readAll(states);
   for (int number = 0; number < Region::kBlocks; ++number) {
     begin_[static_cast<std::size_t>(number)] = static_cast<std::uint16_t>(pieces_.size());
     if (!region.has(number)) continue;

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "map/neighbourhood.h"
 #include "parallel/thread_pool.h"
+#include "rules/neighbourhood.h"
 
 namespace bki_mapping {
 namespace {
@@ -22,10 +22,11 @@ std::uint64_t lowestBits(std::uint64_t bytes) {
   return ((bytes & 0x0101010101010101u) * 0x0102040810204080u) >> 56;
 }
 
-void decide(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockStates& states) {
+void decide(const SemanticMap& map, const StateRules& rules, const BlockIndex& index, const Block& block,
+            BlockStates& states) {
   BlockView view;
-  readBlock(map, index, block, BlockFields::kStates, view);
-  states.asks_neighbourhood = mayAskNeighbourhood(map, block);
+  readBlock(map, rules, index, block, BlockFields::kStates, view);
+  states.asks_neighbourhood = mayAskNeighbourhood(rules, block);
   states.labels = view.label;
   states.block = &block;
   std::uint64_t any_occupied = 0, any_free = 0, all_free = ~std::uint64_t{0};
@@ -102,14 +103,14 @@ StateMap::RegionStates::~RegionStates() {
   }
 }
 
-std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockIndex& index) const {
+std::uintptr_t StateMap::RegionStates::read(const StateMap& map, const BlockIndex& index) const {
   const Block* const block = region_->find(Region::numberOf(index));
   if (!block) {
     slot(index).store(kAbsent, std::memory_order_release);
     return kAbsent;
   }
   auto states = std::make_unique<BlockStates>();
-  decide(map, index, *block, *states);
+  decide(map.map(), map.rules(), index, *block, *states);
   const std::uintptr_t decided = reinterpret_cast<std::uintptr_t>(states.get()) |
                                  (states->any_occupied ? kAnyOccupied : 0) |
                                  (states->all_free ? kAllFree : 0);
@@ -119,7 +120,7 @@ std::uintptr_t StateMap::RegionStates::read(const SemanticMap& map, const BlockI
   return decided;
 }
 
-void StateMap::RegionStates::readAll(const SemanticMap& map) const {
+void StateMap::RegionStates::readAll(const StateMap& map) const {
   std::array<int, Region::kBlocks> numbers;
   std::array<const Block*, Region::kBlocks> blocks;
   std::size_t count = 0;
@@ -143,8 +144,8 @@ StateMap::Known::~Known() {
   if (known && known->owners_.release()) delete known;
 }
 
-StateMap::StateMap(const SemanticMap& map, int threads)
-    : map_(map), threads_(threads), regions_(map.regionCount()) {
+StateMap::StateMap(const SemanticMap& map, const StateRules& rules, int threads)
+    : map_(map), rules_(rules), threads_(threads), regions_(map.regionCount()) {
   constexpr int kMostThreads = 1024;
   if (threads < 0 || threads > kMostThreads) {
     throw std::invalid_argument("the number of threads of a StateMap is " + std::to_string(threads) +
@@ -162,14 +163,15 @@ StateMap::StateMap(const SemanticMap& map, int threads)
   bounds_.max = {high.x * kEdge + kEdge - 1, high.y * kEdge + kEdge - 1, high.z * kEdge + kEdge - 1};
 }
 
-StateMap::StateMap(const SemanticMap& map, const StateMap& earlier, int threads) : StateMap(map, threads) {
-  if (map.decidesAs(earlier.map_)) takeOver(earlier);
+StateMap::StateMap(const SemanticMap& map, const StateRules& rules, const StateMap& earlier, int threads)
+    : StateMap(map, rules, threads) {
+  if (rules.decidesAs(earlier.rules_)) takeOver(earlier);
 }
 
 void StateMap::takeOver(const StateMap& earlier) {
   // Both maps exist, and hold their blocks: a block that both have at the same address is the same object.
   // Neither map changes, and a map copies blocks that it shares before it writes to them.
-  const bool alone = !(map_.neighbourhoodRatio() > 0.0f);  // states depend on nothing outside of the block
+  const bool alone = !(rules_.neighbourhoodRatio() > 0.0f);  // states depend on nothing outside of the block
   const auto surroundings_are_same = [&](const GridIndex& region) {
     return sameAround(
         region, alone, [&](const GridIndex& at) { return map_.findRegion(at); },
@@ -209,7 +211,7 @@ const StateMap::RegionStates* StateMap::region(const GridIndex& region) const {
 
 const BlockStates* StateMap::find(const BlockIndex& index) const {
   const RegionStates* const in = region(SemanticMap::regionOf(index));
-  return in ? in->find(map_, index) : nullptr;
+  return in ? in->find(*this, index) : nullptr;
 }
 
 VoxelState StateMap::state(const VoxelIndex& voxel) const {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "parallel/thread_pool.h"
 #include "ros/server_config.h"
 
@@ -21,9 +21,8 @@ struct SensorPose {
 };
 
 /// The state of the server between two scans, from which messages and files are made in other threads.
-struct MapSnapshot {
-  std_msgs::Header header;  ///< map frame, stamp of the last scan
-  SemanticMap map;
+struct MapSnapshot : bki_mapping::MapSnapshot {
+  std_msgs::Header header;             ///< map frame, stamp of the last scan
   const ClassTable& classes;           ///< the server's; never changes
   std::vector<SensorPose> trajectory;  ///< in the order of integration
   ServerConfig config;

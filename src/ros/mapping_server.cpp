@@ -404,8 +404,8 @@ std_msgs::Header MappingServer::mapHeader() const {
 }
 
 MapSnapshot MappingServer::snapshot() {
-  return {mapHeader(), mapper_->snapshot(),      mapper_->classes(), trajectory_.poses(), config_,
-          sensor_,     mapper_->config().threads};
+  return {mapper_->snapshot(),      mapHeader(), mapper_->classes(), trajectory_.poses(), config_, sensor_,
+          mapper_->config().threads};
 }
 
 std::shared_ptr<const MapSnapshot> MappingServer::askForSnapshot() {

@@ -133,7 +133,7 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     const std::string include = request.include.empty() ? "occupied" : request.include;
     const VoxelStates states = parseStates(include);
     const std::shared_ptr<const MapSnapshot> snapshot = askForSnapshot();
-    exportMap(request.path, snapshot->map, snapshot->classes, states);
+    exportMap(request.path, snapshot->map, snapshot->rules, snapshot->classes, states);
     return "wrote " + request.path + " (" + include + (kept_->hasFile() ? ", of what is in memory)" : ")");
   });
   ROS_INFO("save_map: %s", response.message.c_str());

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "map/neighbourhood.h"
+#include "rules/neighbourhood.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -101,7 +101,7 @@ std::shared_ptr<const MapSnapshot> PublisherSet::takeSnapshot() {
   }
   if (!closed.all() && !closed.empty()) {
     const std::vector<GridIndex>& blocks = closed.blocks();
-    closed.add(withDependents(snapshot->map, {blocks.data(), blocks.size()}));
+    closed.add(withDependents(snapshot->map, snapshot->rules, {blocks.data(), blocks.size()}));
   }
   for (const auto& publisher : publishers_) {
     if (!publisher->wanted()) {

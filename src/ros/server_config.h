@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/map/column_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/query/column_map.h"
 #include "ros/distance_section_config.h"
 #include "ros/input_config.h"
 #include "ros/scan_queue.h"

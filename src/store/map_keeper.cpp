@@ -306,7 +306,7 @@ std::future<void> MapKeeper::save() {
       entry = s.giveAway(entry);
     }
   }
-  std::future<void> saved = s.store->save(s.mapper.snapshot(), std::move(copies), s.drive);
+  std::future<void> saved = s.store->save(s.mapper.snapshot().map, std::move(copies), s.drive);
   s.sweep();
   return saved;
 }

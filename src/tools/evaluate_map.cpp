@@ -6,8 +6,8 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/io/sequence.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/quantile.h"
@@ -111,36 +111,41 @@ struct Evaluation {
     return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
   }
 
-  tools::MapQuality compare(const SemanticMap& map) const {
+  tools::MapQuality compare(const SemanticMapper& mapper) const {
+    const SemanticMap& map = mapper.map();
+    const StateRules& rules = mapper.rules();
     tools::MapQuality quality;
-    quality.dynamics = dynamics.compare(map, taken());
+    quality.dynamics = dynamics.compare(map, rules, taken());
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
-    quality.semantics = semantics.compare(map, still_there);
-    quality.occupancy = occupancy.compare(map, left);
-    if (truth) quality.truth = truth->compare(map, end);
-    if (cloud) quality.cloud = cloud->compare(map);
+    quality.semantics = semantics.compare(map, rules, still_there);
+    quality.occupancy = occupancy.compare(map, rules, left);
+    if (truth) quality.truth = truth->compare(map, rules, end);
+    if (cloud) quality.cloud = cloud->compare(map, rules);
     quality.labels = labels;
     quality.unknown_labels = unknown_labels;
     quality.unknown_label = unknown_label;
-    forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
+    forEachKnownVoxel(map, rules, [&](const VoxelIndex&, const VoxelView& view) {
       if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
     });
     return quality;
   }
 
   /// One row per voxel: its centre and its outcome. Errors come last, so that they are drawn on top.
-  std::string errorRows(const SemanticMap& map) const {
+  std::string errorRows(const SemanticMapper& mapper) const {
+    const SemanticMap& map = mapper.map();
+    const StateRules& rules = mapper.rules();
     std::string csv = "x,y,z,what\n";
     const auto add = [&](const VoxelIndex& voxel, const char* what) {
       const Eigen::Vector3d p = map.geometry().voxelCentre(voxel);
       csv += numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
     };
     constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
-    for (const auto& [voxel, fate] : dynamics.fates(map, taken())) add(voxel, kNames[static_cast<int>(fate)]);
-    for (const VoxelIndex& voxel : semantics.wrongVoxels(map)) add(voxel, "wrong class");
+    for (const auto& [voxel, fate] : dynamics.fates(map, rules, taken()))
+      add(voxel, kNames[static_cast<int>(fate)]);
+    for (const VoxelIndex& voxel : semantics.wrongVoxels(map, rules)) add(voxel, "wrong class");
     if (!truth) return csv;
-    for (const VoxelIndex& voxel : truth->ghosts(map, end)) add(voxel, "ghost");
+    for (const VoxelIndex& voxel : truth->ghosts(map, rules, end)) add(voxel, "ghost");
     return csv;
   }
 };
@@ -290,7 +295,7 @@ int evaluate(const po::variables_map& given) {
     if (drive) {
       evaluation.end = drive->timeOf(sequence.number(i));
       const bool count = times.size() % kGhostsEvery == 0 || ends;
-      if (count) evaluation.truth->countGhosts(mapper.map(), evaluation.end);
+      if (count) evaluation.truth->countGhosts(mapper.map(), mapper.rules(), evaluation.end);
     }
     tools::showProgress(times.size(), last - first, "");
   }
@@ -301,13 +306,14 @@ int evaluate(const po::variables_map& given) {
     std::cerr << "evaluate_map: the ground-truth cloud covers all scans, so the map of these is not compared "
                  "with it\n";
   }
-  tools::MapQuality quality = evaluation.compare(mapper.map());
+  tools::MapQuality quality = evaluation.compare(mapper);
   quality.median_ms = quantile(times, 0.5);
   quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
-  const std::string errors = given.count("errors") ? evaluation.errorRows(mapper.map()) : "";
+  const std::string errors = given.count("errors") ? evaluation.errorRows(mapper) : "";
   for (const Judgement& other : others) {
     mapper.reconfigure(other.config);
-    quality.judged.push_back({other.settings, evaluation.dynamics.compare(mapper.map(), evaluation.taken())});
+    quality.judged.push_back(
+        {other.settings, evaluation.dynamics.compare(mapper.map(), mapper.rules(), evaluation.taken())});
   }
   std::cout << tools::qualityTable(quality, mapper.classes());
   if (given.count("json")) {

@@ -102,12 +102,12 @@ int exportMapFile(const po::variables_map& given) {
   checkExport(output, options);
 
   TiledMap map(path);
-  const StoredMap stored = map.readBox(box, tools::memoryLimit(given));
+  const RuledMap stored = map.readBox(box, tools::memoryLimit(given));
   options.html.name = std::filesystem::path(map.path()).stem().string();
   options.html.frame = stored.info.frame;
   options.html.drives = stored.drives;
   options.html.parts = map.file();
-  exportFile(output, stored.map, *stored.info.classes, options);
+  exportFile(output, stored.map, stored.rules, *stored.info.classes, options);
   std::cout << output << ": written, in frame " << stored.info.frame << originText(output, stored.map)
             << "\n";
   return 0;

@@ -165,14 +165,14 @@ GridIndex lastDrawn(const MapStatistics& found, double resolution, const std::op
   return last;
 }
 
-void draw(MapFile& file, SemanticMap& empty_map, const MapStatistics& found, const GridIndex& last,
+void draw(MapFile& file, const StateRules& rules, const MapStatistics& found, const GridIndex& last,
           const std::string& top, const std::string& profile) {
   std::vector<std::pair<std::string, MapPicture>> pictures;
   if (!top.empty()) pictures.emplace_back(top, MapPicture(MapPicture::View::kTop, found.low, last));
   if (!profile.empty())
     pictures.emplace_back(profile, MapPicture(MapPicture::View::kProfile, found.low, last));
   if (pictures.empty()) return;
-  readStatistics(file, empty_map, [&](const BlockIndex& index, const BlockView& view) {
+  readStatistics(file, rules, [&](const BlockIndex& index, const BlockView& view) {
     for (auto& [path, picture] : pictures) picture.add(index, view);
   });
   for (const auto& [path, picture] : pictures) {
@@ -196,14 +196,14 @@ int inspect(const po::variables_map& given) {
     throw std::invalid_argument("--max-z limits pictures; give --top or --profile as well");
   }
   if (given.count("json")) checkWritable(given["json"].as<std::string>());
-  SemanticMap empty_map = emptyMapWithGains(path, file.info());
-  const MapStatistics found = readStatistics(file, empty_map);
+  const StateRules rules = storedRules(path, file.info());
+  const MapStatistics found = readStatistics(file, rules);
   const GridIndex last = lastDrawn(found, file.info().resolution, most);
   print(std::cout, file, found);
   if (given.count("json")) {
     writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found).dump(2) + "\n");
   }
-  draw(file, empty_map, found, last, top, profile);
+  draw(file, rules, found, last, top, profile);
   return 0;
 }
 

@@ -177,14 +177,14 @@ int mapSequence(const po::variables_map& given) {
       if (drive.scans > 0) drives.push_back(drive);
       saveMap(output, mapInfoOf(mapper, kFrame), drives, mapper.map());
     } else {
-      exportMap(output, mapper.map(), mapper.classes(), states);
+      exportMap(output, mapper.map(), mapper.rules(), mapper.classes(), states);
     }
   }
   std::size_t cleaned = mapped.size();
   if (given.count("points")) {
     const std::string path = given["points"].as<std::string>();
     const CleanedCount count =
-        writeCleanedPoints(path, sequence, mapped, mapper.map(), [&](std::size_t done) {
+        writeCleanedPoints(path, sequence, mapped, mapper.map(), mapper.rules(), [&](std::size_t done) {
           tools::showProgress(done, mapped.size(), "scans cleaned");
           return stopped || !interruption.requested();
         });

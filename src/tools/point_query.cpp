@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "map/neighbourhood.h"
+#include "rules/neighbourhood.h"
 #include "store/box_tiles.h"
 
 namespace bki_mapping::tools {
@@ -52,8 +52,8 @@ void PointQuery::readAll() {
   forEachGroup(kTilesAtOnce, [&](const std::vector<std::size_t>& numbers) {
     std::vector<Eigen::Vector3d> at;
     for (const std::size_t n : numbers) at.push_back(points_[n]);
-    const StoredMap stored = map_.readTilesAt(at, limit_);
-    const StateMap states(stored.map);
+    const RuledMap stored = map_.readTilesAt(at, limit_);
+    const StateMap states(stored.map, stored.rules);
     std::vector<VoxelState> state(at.size());
     std::vector<ClassId> label(at.size());
     std::vector<float> occupancy(at.size()), of_class(at.size()), probability(at.size()), variance(at.size());
@@ -75,8 +75,8 @@ void PointQuery::findNearest(double most, const ClassFilter& classes) {
       for (const std::size_t n : waiting) box.extend(points_[n]);
       const Eigen::Vector3d margin =
           Eigen::Vector3d::Constant(reach + (1.0 + kNeighbourhoodReach) * grid_.resolution());
-      const StoredMap stored = map_.readBox({box.min() - margin, box.max() + margin}, limit_);
-      const StateMap states(stored.map);
+      const RuledMap stored = map_.readBox({box.min() - margin, box.max() + margin}, limit_);
+      const StateMap states(stored.map, stored.rules);
       std::vector<std::size_t> left;
       for (const std::size_t n : waiting) {
         answers_[n].nearest = nearestObstacle(states, points_[n], classes, reach);

@@ -100,8 +100,8 @@ void askBox(TiledMap& map, const po::variables_map& given) {
   }
   const std::string picture = given.count("top") ? given["top"].as<std::string>() : "";
   if (!picture.empty()) checkWritable(picture);
-  const StoredMap stored = map.readBox(box, tools::memoryLimit(given));
-  const MapStatistics found = statisticsOf(stored.map);
+  const RuledMap stored = map.readBox(box, tools::memoryLimit(given));
+  const MapStatistics found = statisticsOf(stored.map, stored.rules);
   const double volume = std::pow(stored.info.resolution, 3.0);
   std::cout << std::fixed << std::setprecision(1);
   const Eigen::AlignedBox3d bounds = found.bounds(stored.info.resolution);
@@ -116,7 +116,8 @@ void askBox(TiledMap& map, const po::variables_map& given) {
   }
   if (picture.empty()) return;
   MapPicture drawing(MapPicture::View::kTop, found.low, found.high);
-  statisticsOf(stored.map, [&](const BlockIndex& index, const BlockView& view) { drawing.add(index, view); });
+  statisticsOf(stored.map, stored.rules,
+               [&](const BlockIndex& index, const BlockView& view) { drawing.add(index, view); });
   writePng(picture, drawing.draw(*stored.info.classes));
   std::cout << picture << ": " << numberText(stored.info.resolution * drawing.voxelsPerPixel())
             << " m a pixel\n";

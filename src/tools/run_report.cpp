@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "core/quantile.h"
 
 namespace bki_mapping::tools {
@@ -21,9 +21,9 @@ struct VoxelCounts {
   std::map<ClassId, std::size_t> by_class;
 };
 
-VoxelCounts countVoxels(const SemanticMap& map) {
+VoxelCounts countVoxels(const SemanticMapper& mapper) {
   VoxelCounts counts;
-  forEachKnownVoxel(map, [&](const VoxelIndex&, const VoxelView& view) {
+  forEachKnownVoxel(mapper.map(), mapper.rules(), [&](const VoxelIndex&, const VoxelView& view) {
     counts.free += view.state == VoxelState::kFree;
     counts.occluded += view.state == VoxelState::kOccluded;
     if (view.state == VoxelState::kOccupied) {
@@ -120,7 +120,7 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
   report["classes"] = mapper.classes().name();
   report["scans"] = Json::array();
   for (const ScanReport& scan : scans) report["scans"].push_back(scanJson(scan));
-  const VoxelCounts counts = countVoxels(mapper.map());
+  const VoxelCounts counts = countVoxels(mapper);
   report["voxels"] = {{"occupied", counts.occupied}, {"free", counts.free}, {"occluded", counts.occluded}};
   for (const SemanticClass& c : mapper.classes().classes()) {
     const auto found = counts.by_class.find(c.id);
@@ -135,7 +135,7 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
 }
 
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans) {
-  const VoxelCounts counts = countVoxels(mapper.map());
+  const VoxelCounts counts = countVoxels(mapper);
   std::ostringstream out;
   out << std::fixed << std::setprecision(1);
   const std::string left_out = leftOutText(scans, mapper.config());

@@ -1,19 +1,15 @@
 /// @file Evidence of a scan: which blocks it touches, and what it adds to them.
 #pragma once
 
-#include <bitset>
 #include <vector>
 
 #include "bki_mapping/map/semantic_map.h"
+#include "map/block_group.h"
 #include "parallel/thread_pool.h"
-#include "update/block_group.h"
 #include "update/sum_sink.h"
 #include "update/work_limit.h"
 
 namespace bki_mapping {
-
-/// A set of classes; may contain kFreeClass.
-using ClassSet = std::bitset<256>;
 
 /// A step of the update that works on blocks, group by group. Owns the working memory of each thread.
 class BlockTask {

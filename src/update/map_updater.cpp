@@ -267,7 +267,7 @@ void MapUpdater::finishGroup(const Group& group) {
 }
 
 MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, ThreadPool& pool,
-                                  const UpdateRules& rules, const UpdateLimits& limits) {
+                                  const ScanRules& rules, const UpdateLimits& limits) {
   MapUpdateStats stats;
   Stopwatch watch;
   touched_.clear();

@@ -6,11 +6,11 @@
 #include <memory>
 #include <vector>
 
+#include "map/blocks_by_group.h"
 #include "parallel/index_numbering.h"
-#include "update/blocks_by_group.h"
+#include "rules/void_search.h"
 #include "update/evidence.h"
 #include "update/sum_kernels.h"
-#include "update/void_search.h"
 
 namespace bki_mapping {
 
@@ -48,8 +48,7 @@ class MapUpdater {
   /// threads. Blocks that are empty afterwards are erased.
   /// @throws TooMuchWork or std::bad_alloc; the map is then unchanged.
   MapUpdateStats update(SemanticMap& map, const ScanEvidence& scan, ThreadPool& pool,
-                        const UpdateRules& rules = UpdateRules(),
-                        const UpdateLimits& limits = UpdateLimits());
+                        const ScanRules& rules = ScanRules(), const UpdateLimits& limits = UpdateLimits());
 
   /// The blocks that the last update may have changed, created or erased, each once.
   const std::vector<GridIndex>& touched() const { return touched_.members(); }
@@ -143,7 +142,7 @@ class MapUpdater {
   std::size_t task_count_ = 0;  ///< tasks of this scan; tasks_ may be longer to keep memory
   std::vector<Worker> workers_;
   // Of this scan:
-  UpdateRules rules_;
+  ScanRules rules_;
   bool withdraws_ = false;
   VoidSearch voids_;
   std::vector<BlockSeam> seams_;                                       ///< of the jobs

@@ -1,5 +1,4 @@
-/// @file The loops over the sums of a block, compiled for each instruction set: limits of a scan, and adding
-/// to a plane of evidence.
+/// @file The loops that add the sums of a block to a plane of evidence, compiled for each instruction set.
 #pragma once
 
 #include <cstddef>
@@ -41,14 +40,6 @@ struct SumKernels {
                     SumCounts& counts);
   bool (*withdraw_units)(const std::uint64_t* voxels, int layers, const EvidenceUnits* units,
                          EvidenceUnits* plane, SumCounts& counts);
-  /// Of sums >= 0, keeps what exceeds the threshold, and at most `most` of it. The threshold does not apply
-  /// to voxels above others whose sums were at least `most` before. What is not a number remains.
-  /// @param below which of the 64 voxels below the block reached `most`. @param[in,out] sums 512 of them.
-  /// @param[in,out] reached adds the voxels whose sums were at least `most` before, as LayerBits.
-  void (*limit)(float threshold, float most, std::uint64_t below, float* sums, std::uint64_t* reached);
-  /// Finds sums of at least `least`. @param sums 512 of them. @param layers those that may hold sums other
-  /// than 0. @param[in,out] found adds their voxels, as LayerBits.
-  void (*find)(const float* sums, Block::Layers layers, float least, std::uint64_t* found);
 };
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.

@@ -1,4 +1,4 @@
-/// @file Limiting sums, rounding them to units and adding these, over the vocabulary of simd/vec.h.
+/// @file Rounding sums to units and adding these, over the vocabulary of simd/vec.h.
 #pragma once
 
 #include "bki_mapping/map/block.h"
@@ -76,36 +76,9 @@ bool addUnits(const std::uint64_t* voxels, int layers, const EvidenceUnits* unit
   return AnyTrue(any != 0);
 }
 
-inline void limitSums(float threshold, float most, std::uint64_t below, float* sums, std::uint64_t* reached) {
-  constexpr int kLayer = kBlockEdge * kBlockEdge;
-  for (int layer = 0; layer < kBlockEdge; ++layer) {
-    std::uint64_t bits = 0;
-    for (int v = 0; v < kLayer; v += kLanes) {
-      const FloatVec sum = LoadU(sums + v);
-      const FloatVec excess = IfThenElse(MaskFromBits(below >> v), sum, sum - threshold);
-      const FloatVec positive = IfThenElse(excess < 0.0f, FloatVec{}, excess);
-      StoreU(IfThenElse(positive > most, Set(most), positive), sums + v);
-      bits |= BitsFromMask(sum >= most) << v;
-    }
-    reached[layer] |= bits;
-    below = bits;
-    sums += kLayer;
-  }
-}
-
-inline void findSums(const float* sums, Block::Layers layers, float least, std::uint64_t* found) {
-  constexpr int kLayer = kBlockEdge * kBlockEdge;
-  for (int layer = layers.begin; layer < layers.end; ++layer) {
-    std::uint64_t bits = 0;
-    for (int v = 0; v < kLayer; v += kLanes) {
-      bits |= BitsFromMask(LoadU(sums + layer * kLayer + v) >= least) << v;
-    }
-    found[layer] |= bits;
-  }
-}
-
-constexpr SumKernels kSumKernels = {kInstructionSet, addSums<false>, addSums<true>, addUnits<false>,
-                                    addUnits<true>,  limitSums,      findSums};
+constexpr SumKernels kSumKernels = {
+    kInstructionSet, addSums<false>, addSums<true>, addUnits<false>, addUnits<true>,
+};
 
 }  // namespace
 }  // namespace bki_mapping

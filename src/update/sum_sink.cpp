@@ -6,11 +6,11 @@ VoxelMask SumSink::applyRulesToFree(const GroupBlock& block) {
   const std::size_t slot = block.slot_;
   const VoxelMask& is_protected = work_.protected_[slot];
   if (!work_.rules_.asksBelow()) {
-    return applyToFree(work_.rules_, *work_.kernels_, is_protected, 0, work_.sums_, nullptr);
+    return applyToFree(work_.rules_, *work_.limits_, is_protected, 0, work_.sums_, nullptr);
   }
   const bool has_below = slot >= kSlotsOfLayer, has_above = slot + kSlotsOfLayer < kGroupBlocks;
   const std::uint64_t below = has_below ? work_.reached_top_[slot - kSlotsOfLayer] : 0;
-  const VoxelMask reached = applyToFree(work_.rules_, *work_.kernels_, is_protected, below, work_.sums_,
+  const VoxelMask reached = applyToFree(work_.rules_, *work_.limits_, is_protected, below, work_.sums_,
                                         has_below ? nullptr : block.seam_);
   work_.reached_top_[slot] = bitsOf(reached)[kBlockEdge - 1];
   if (!has_above) block.seam_->reached_top = work_.reached_top_[slot];
@@ -19,9 +19,9 @@ VoxelMask SumSink::applyRulesToFree(const GroupBlock& block) {
 
 void SumSink::addSums(const GroupBlock& to) {
   if (kind_ == Kind::kHits) {
-    applyToHits(work_.rules_, *work_.kernels_, work_.sums_, work_.protected_[to.slot_]);
+    applyToHits(work_.rules_, *work_.limits_, work_.sums_, work_.protected_[to.slot_]);
     if (work_.rules_.seeksVoids()) {
-      noteHits(work_.rules_, *work_.kernels_, work_.sums_, *to.seen_, work_.hit_[to.slot_]);
+      noteHits(work_.rules_, *work_.limits_, work_.sums_, *to.seen_, work_.hit_[to.slot_]);
     }
   } else {
     const VoxelMask reached = applyRulesToFree(to);

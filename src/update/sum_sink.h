@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "map/block_group.h"
 #include "parallel/thread_pool.h"
-#include "update/block_group.h"
+#include "rules/scan_rules.h"
 #include "update/sum_kernels.h"
-#include "update/update_rules.h"
 
 namespace bki_mapping {
 
@@ -44,7 +44,7 @@ class GroupBlock {
 class alignas(kThreadsApart) SumWorkspace {
  public:
   /// @param classes most classes for a block; their memory is allocated here.
-  void reserve(const UpdateRules& rules, std::size_t classes, bool withdraws) {
+  void reserve(const ScanRules& rules, std::size_t classes, bool withdraws) {
     rules_ = rules;
     withdraws_ = withdraws;
     counts_ = {};
@@ -57,7 +57,8 @@ class alignas(kThreadsApart) SumWorkspace {
   friend class SumSink;
 
   const SumKernels* kernels_ = &sumKernelsFor("");
-  UpdateRules rules_;
+  const LimitKernels* limits_ = &limitKernelsFor("");
+  ScanRules rules_;
   bool withdraws_ = false;
   BlockSums sums_;
   std::array<VoxelMask, kGroupBlocks> protected_;        ///< voxels that take no evidence for `free`, by slot

@@ -1,8 +1,8 @@
 // Occlusion equals brute force, and is right on scenes worked out by hand.
 #include <gtest/gtest.h>
 
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
 
@@ -57,7 +57,7 @@ Scan oneHit(float x) {
 }
 
 VoxelState stateAt(const SemanticMapper& mapper, double x) {
-  return viewPoint(mapper.map(), {x, 0.15, 0.15}).state;
+  return viewPoint(mapper.map(), mapper.rules(), {x, 0.15, 0.15}).state;
 }
 
 TEST(Occlusion, MarksBehindTheHitUntilABeamPasses) {

@@ -64,7 +64,7 @@ TEST(CloudEvaluation, IsTheSameFarFromTheOrigin) {
     }
     CloudEvaluation evaluation(std::nullopt, 0.005);
     evaluation.add(scan);
-    return evaluation.compare(map);
+    return evaluation.compare(map, StateRules());
   };
   const CloudQuality near = evaluate({0, 0, 0}), far = evaluate({208000, 1666000, 0});
   EXPECT_EQ(near.static_points, 40u + 40u);
@@ -116,7 +116,7 @@ TEST(CloudEvaluation, TakesThePointsInOccupiedVoxels) {
   CloudEvaluation evaluation(std::nullopt, 0.05);
   evaluation.add(scan);
   const CloudQuality quality =
-      evaluation.compare(mapOf({{10.5, 0, 0}, {13.5, 0, 0}, {70.0, 0, 0}, {10.0, 5.0, 0}}));
+      evaluation.compare(mapOf({{10.5, 0, 0}, {13.5, 0, 0}, {70.0, 0, 0}, {10.0, 5.0, 0}}), StateRules());
   EXPECT_EQ(quality.static_points, 3u) << "none beyond 50 m";
   EXPECT_EQ(quality.static_kept, 2u);
   EXPECT_EQ(quality.moving_points, 3u) << "with an unlabelled one at the car itself";

@@ -34,13 +34,13 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   evaluation.add(scanOf({{{9.5f, 0, 0}, 10}}), *classes);
   const SemanticMap map = mapOf({{0.5, 0, 0}, {7.5, 0, 0}, {9.5, 0, 0}});
   std::map<int, VoxelFate> fates;
-  for (const auto& [voxel, fate] : evaluation.fates(map)) fates[voxel.x] = fate;
+  for (const auto& [voxel, fate] : evaluation.fates(map, StateRules())) fates[voxel.x] = fate;
   EXPECT_EQ(fates, (std::map<int, VoxelFate>{{0, VoxelFate::kKept},
                                              {2, VoxelFate::kLost},
                                              {5, VoxelFate::kForgotten},
                                              {7, VoxelFate::kLeft},
                                              {9, VoxelFate::kKept}}));
-  const DynamicsQuality quality = evaluation.compare(map);
+  const DynamicsQuality quality = evaluation.compare(map, StateRules());
   EXPECT_EQ(quality.static_points, 4u);
   EXPECT_EQ(quality.static_kept, 3u);    // two at 0.5, one at 9.5; the voxel of 2.5 is not occupied
   EXPECT_EQ(quality.moving_points, 3u);  // at 5.5, 5.6, 7.5; 9.5 is hit late, 11.5 is not early
@@ -58,11 +58,12 @@ TEST(DynamicsQuality, CountsPointByPoint) {
 
   // A voxel that something is in at the end need not be cleared.
   const auto taken = [](const VoxelIndex& voxel) { return voxel.x == 7; };
-  const DynamicsQuality known = evaluation.compare(map, taken);
+  const DynamicsQuality known = evaluation.compare(map, StateRules(), taken);
   EXPECT_EQ(known.moving_points, 2u);
   EXPECT_EQ(known.moving_removed, 2u);
   EXPECT_EQ(known.static_kept, 3u);
-  for (const auto& [voxel, fate] : evaluation.fates(map, taken)) EXPECT_NE(fate, VoxelFate::kLeft) << voxel.x;
+  for (const auto& [voxel, fate] : evaluation.fates(map, StateRules(), taken))
+    EXPECT_NE(fate, VoxelFate::kLeft) << voxel.x;
   EXPECT_TRUE(evaluation.isStillThere({7, 0, 0}, taken));
   EXPECT_FALSE(evaluation.isStillThere({5, 0, 0}, taken));
 
@@ -84,7 +85,7 @@ TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
                          {{3.5f, 0, 0}, 20},
                          {{4.5f, 0, 0}, 30}}),
                  classes);
-  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}, {2.5, 0, 0}}));
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}, {2.5, 0, 0}}), StateRules());
   EXPECT_DOUBLE_EQ(quality.groundAccuracy(), 2.0 / 3.0);
   EXPECT_DOUBLE_EQ(quality.standingAccuracy(), 0.5);
   EXPECT_DOUBLE_EQ(quality.otherAccuracy(), 0.0);
@@ -110,7 +111,7 @@ TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
                  *classes);
   evaluation.add(scanOf({{shared, 10}}), *classes);
   const SemanticMap map = mapOf({shared.cast<double>(), unseen.cast<double>(), left.cast<double>()});
-  DynamicsQuality quality = evaluation.compare(map);
+  DynamicsQuality quality = evaluation.compare(map, StateRules());
   EXPECT_EQ(quality.moving_points, 5u);
   EXPECT_EQ(quality.moving_removed, 1u);
   EXPECT_EQ(quality.moving_shared, 1u);
@@ -123,7 +124,7 @@ TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
   evaluation.add(scanOf({{left, 20}, {seen, 20}}), *classes);
   evaluation.add(scanOf({{beyond(seen), 10}}), *classes);
   evaluation.add(scanOf({{{20.5f, 20.5f, 0.5f}, 10}}), *classes);
-  quality = evaluation.compare(map);
+  quality = evaluation.compare(map, StateRules());
   EXPECT_EQ(quality.moving_unseen, 3u);
   EXPECT_EQ(quality.decidable_points, 1u);
   EXPECT_DOUBLE_EQ(quality.decidableAccuracy(), 1.0);
@@ -131,7 +132,7 @@ TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
 
 TEST(DynamicsQuality, NothingToCountIsNoNumber) {
   const DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
-  const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}));
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}), StateRules());
   EXPECT_TRUE(std::isnan(quality.staticAccuracy()));
   EXPECT_TRUE(std::isnan(quality.accuracy()));
 }

@@ -36,7 +36,8 @@ TEST(Occupancy, IsJudgedByWhatStandsAndByWhatIsCrossed) {
   set(map, 5, 1);           // the standing car
   set(map, 6, 1);           // the moving car is still there: unknown, as beams do not cross it
   set(map, 7, 1);           // neither hit nor crossed: unknown
-  const Reliability quality = evaluation.compare(map, [](const VoxelIndex& voxel) { return voxel.x < 6; });
+  const Reliability quality =
+      evaluation.compare(map, StateRules(), [](const VoxelIndex& voxel) { return voxel.x < 6; });
   EXPECT_EQ(quality.bins()[0].count, 1u);
   EXPECT_EQ(quality.bins()[0].right, 0u);
   EXPECT_EQ(quality.bins()[9].count, 3u) << "voxels 1, 3 and 5";

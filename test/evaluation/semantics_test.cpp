@@ -65,7 +65,7 @@ TEST_F(Quality, ComparesWhatMapAndInputTell) {
   see(3, 30, 77, 2);  // predicted label of no class; unknown in the map
   set(0, 1, 1.0f);
   set(1, kFreeClass, 1.0f);
-  const SemanticQuality quality = evaluation_.compare(map_);
+  const SemanticQuality quality = evaluation_.compare(map_, StateRules());
   EXPECT_EQ(quality.map.count(1, 1), 4u);
   EXPECT_EQ(quality.map.count(2, kFreeClass), 2u);
   EXPECT_EQ(quality.map.count(3, kFreeClass), 2u);
@@ -89,7 +89,8 @@ TEST_F(Quality, WhatHasLeftDoesNotCountAsPresent) {
   set(3, 2, 1.0f);
   set(4, 2, 1.0f);
   const auto still_there = [](const VoxelIndex& voxel) { return voxel.x == 4; };
-  const SemanticQuality quality = evaluation_.compare(map_, still_there), all = evaluation_.compare(map_);
+  const SemanticQuality quality = evaluation_.compare(map_, StateRules(), still_there),
+                        all = evaluation_.compare(map_, StateRules());
   EXPECT_EQ(quality.map.count(2, kFreeClass), 4u) << "all points";
   EXPECT_EQ(quality.input.points(2), 15u);
   EXPECT_EQ(quality.map_of_present.points(1), 5u);
@@ -111,7 +112,7 @@ TEST_F(Quality, WrongVoxelsAreOccupiedByAClassThatNoPointHas) {
   set(0, 1, 1.0f);
   set(1, 1, 1.0f);           // wrong
   set(2, kFreeClass, 1.0f);  // free in the map: lost, but not of a wrong class
-  const auto wrong = evaluation_.wrongVoxels(map_);
+  const auto wrong = evaluation_.wrongVoxels(map_, StateRules());
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_EQ(wrong[0].x, 1);
 }
@@ -123,7 +124,7 @@ TEST_F(Quality, CalibrationComparesProbabilitiesWithWhatIsRight) {
   see(0, 20, 20, 1);  // 3 of 4 are correct at probability 0.8
   set(1, 2, 1.0f);
   see(1, 20, 20, 4);  // all are correct at probability 1
-  const SemanticQuality quality = evaluation_.compare(map_);
+  const SemanticQuality quality = evaluation_.compare(map_, StateRules());
   const auto& bins = quality.probability.bins();
   EXPECT_EQ(bins[8].count + bins[7].count, 4u);  // 0.8 may round either way
   EXPECT_EQ(bins[9].count, 4u);
@@ -137,7 +138,7 @@ TEST_F(Quality, EvidenceForFreeDilutesTheProbabilityAndNotTheClass) {
   set(0, 1, 0.6f);
   set(0, kFreeClass, 0.4f);
   see(0, 10, 10, 4);  // all are correct, at probability 0.6 and class probability 1
-  const SemanticQuality quality = evaluation_.compare(map_);
+  const SemanticQuality quality = evaluation_.compare(map_, StateRules());
   EXPECT_NEAR(quality.probability.error(), 0.4, 1e-5);
   EXPECT_NEAR(quality.class_probability.error(), 0.0, 1e-5);
 }
@@ -149,7 +150,7 @@ TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {
   see(0, 20, 20, 4);
   set(1, 1, 50.0f);
   see(1, 10, 10, 4);
-  EXPECT_NEAR(evaluation_.compare(map_).sparsification_error, 0.0, 1e-12);
+  EXPECT_NEAR(evaluation_.compare(map_, StateRules()).sparsification_error, 0.0, 1e-12);
   // Voxel 2: certain and wrong. By variance, voxel 0 is removed first, then 2, 1: error rates 8/12, 4/8, 0/4.
   // By errors, 0 and 2 are removed first, then 1: the same. Voxel 3, uncertain and correct, adds an error.
   set(3, 1, 0.6f);
@@ -159,7 +160,7 @@ TEST_F(Quality, VarianceThatRanksErrorsHasNoSparsificationError) {
   see(2, 20, 20, 4);
   // By variance: 0 (or 3) and 3 (or 0), then 2, then 1: error rates 8/16, 4/12, 4/8, 0/4 (or 8/12 second).
   const double best = (8.0 / 16 + 4.0 / 12 + 0 + 0) / 4;
-  const double error = evaluation_.compare(map_).sparsification_error;
+  const double error = evaluation_.compare(map_, StateRules()).sparsification_error;
   EXPECT_GT(error, 0.1);
   EXPECT_LE(error, (8.0 / 16 + 8.0 / 12 + 4.0 / 8 + 0) / 4 - best + 1e-12);
 }

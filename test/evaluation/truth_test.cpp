@@ -71,7 +71,7 @@ TEST_F(Truth, AFreeVoxelIsRightIfItIsMostlyEmpty) {
   const TruthEvaluation evaluation(truth(), classes_);
   SemanticMap map = emptyMap();
   for (const int z : {-4, -3, 0}) add(map, voxel(3, 0, z), kFreeClass);
-  const SpaceQuality space = evaluation.compare(map, 0.0).all;
+  const SpaceQuality space = evaluation.compare(map, StateRules(), 0.0).all;
   EXPECT_EQ(space.free_precision.total, 3u);
   EXPECT_EQ(space.free_precision.correct, 2u) << "three tenths of one are in the ground";
   EXPECT_EQ(space.free_empty.correct, 1u);
@@ -100,7 +100,7 @@ TEST_F(Truth, VoxelsAreComparedOneByOne) {
   add(map, voxel(0, 5, -2), idOf("road"));  // a pole: correctly occupied, but of another class
   add(map, voxel(0, 0, -1), kFreeClass);    // crossed, correct
   add(map, voxel(10, 0, -2), kFreeClass);   // the car is there: wrong
-  const TruthQuality quality = evaluation.compare(map, 1.0);
+  const TruthQuality quality = evaluation.compare(map, StateRules(), 1.0);
   EXPECT_EQ(quality.all.free_precision.total, 2u);
   EXPECT_EQ(quality.all.free_precision.correct, 1u);
   EXPECT_EQ(quality.all.free_empty.correct, 1u);
@@ -130,12 +130,12 @@ TEST_F(Truth, AVoxelIsAGhostHalfASecondAfterTheCar) {
   TruthEvaluation evaluation(truth(), classes_);
   SemanticMap map = emptyMap();
   add(map, voxel(20, 0, -2), idOf("car"));  // the rear of the car leaves the adjacent voxel at 0.24 s
-  EXPECT_TRUE(evaluation.ghosts(map, 0.3).empty());
-  EXPECT_TRUE(evaluation.ghosts(map, 0.6).empty());
-  EXPECT_EQ(evaluation.ghosts(map, 0.9).size(), 1u);
-  evaluation.countGhosts(map, 0.6);
-  evaluation.countGhosts(map, 0.9);
-  EXPECT_DOUBLE_EQ(evaluation.compare(map, 0.9).mean_ghosts, 0.5);
+  EXPECT_TRUE(evaluation.ghosts(map, StateRules(), 0.3).empty());
+  EXPECT_TRUE(evaluation.ghosts(map, StateRules(), 0.6).empty());
+  EXPECT_EQ(evaluation.ghosts(map, StateRules(), 0.9).size(), 1u);
+  evaluation.countGhosts(map, StateRules(), 0.6);
+  evaluation.countGhosts(map, StateRules(), 0.9);
+  EXPECT_DOUBLE_EQ(evaluation.compare(map, StateRules(), 0.9).mean_ghosts, 0.5);
 }
 
 TEST(DriveFile, GivesTheSameStreetAgain) {

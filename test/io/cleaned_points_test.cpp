@@ -9,7 +9,7 @@
 #include <cstring>
 #include <random>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
 
@@ -51,7 +51,7 @@ TEST(CleanedPoints, LieInOccupiedVoxels) {
     for (std::size_t p = 0; p < scan.points.size(); ++p) {
       const Eigen::Vector3d point = scan.origin + scan.points[p].cast<double>();
       if (!(point.norm() < 1e6)) continue;
-      const VoxelView view = viewPoint(map, point);
+      const VoxelView view = viewPoint(map, StateRules(), point);
       if (view.state != VoxelState::kOccupied) continue;
       expected.push_back({static_cast<float>(point.x()), static_cast<float>(point.y()),
                           static_cast<float>(point.z()), frame.remissions[p], frame.labels[p], view.label});
@@ -59,7 +59,7 @@ TEST(CleanedPoints, LieInOccupiedVoxels) {
   }
   std::vector<std::size_t> told;
   const CleanedCount count =
-      writeCleanedPoints(folder / "points.pcd", sequence, {0, 2}, map, [&](std::size_t n) {
+      writeCleanedPoints(folder / "points.pcd", sequence, {0, 2}, map, StateRules(), [&](std::size_t n) {
         told.push_back(n);
         return true;
       });
@@ -101,9 +101,9 @@ TEST(CleanedPoints, AreRelativeToTheViewpointFarFromTheOrigin) {
   for (const Eigen::Vector3f& relative : scan.points) {
     const Eigen::Vector3d point = scan.origin + relative.cast<double>();
     if (!((point - place).norm() < 1e6)) continue;
-    if (viewPoint(map, point).state == VoxelState::kOccupied) expected.push_back(point);
+    if (viewPoint(map, StateRules(), point).state == VoxelState::kOccupied) expected.push_back(point);
   }
-  writeCleanedPoints(folder / "points.pcd", sequence, {0}, map);
+  writeCleanedPoints(folder / "points.pcd", sequence, {0}, map, StateRules());
   pcl::PointCloud<pcl::PointXYZL> cloud;
   ASSERT_EQ(pcl::io::loadPCDFile(folder / "points.pcd", cloud), 0);
   EXPECT_EQ(cloud.sensor_origin_.head<3>(), Eigen::Vector3f(499000.0f, 3998000.0f, 0.0f));
@@ -119,9 +119,10 @@ TEST(CleanedPoints, AreRelativeToTheViewpointFarFromTheOrigin) {
 TEST(CleanedPoints, MayBeNone) {
   const TemporaryFolder folder;
   const Sequence sequence(writeSequence(folder));
-  EXPECT_EQ(writeCleanedPoints(folder / "points.pcd", sequence, {0}, infoOf().emptyMap()).kept, 0u);
+  EXPECT_EQ(writeCleanedPoints(folder / "points.pcd", sequence, {0}, infoOf().emptyMap(), StateRules()).kept,
+            0u);
   EXPECT_GT(std::filesystem::file_size(folder / "points.pcd"), 100u);
-  EXPECT_THROW(writeCleanedPoints(folder / "points.ply", sequence, {0}, infoOf().emptyMap()),
+  EXPECT_THROW(writeCleanedPoints(folder / "points.ply", sequence, {0}, infoOf().emptyMap(), StateRules()),
                std::invalid_argument);
 }
 

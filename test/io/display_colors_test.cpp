@@ -8,7 +8,7 @@
 #include <set>
 
 #include "bki_mapping/io/yaml.h"
-#include "map/voxel_color.h"
+#include "io/voxel_color.h"
 
 namespace bki_mapping {
 namespace {

@@ -63,13 +63,13 @@ TEST(GridExport, IsTheProjectedMap) {
   const ClassTable& classes = *table;
   for (const ColumnRules& rules : {ColumnRules(), ColumnRules{-9.0, -5.0, HeightReference::kMap},
                                    ColumnRules{0.2, 3.0, HeightReference::kGround}}) {
-    exportGrid(folder / "a map: \"1\".yaml", map, classes, rules);
+    exportGrid(folder / "a map: \"1\".yaml", map, StateRules(), classes, rules);
     const ServedMap served(folder / "a map: \"1\".yaml");
     ColumnMap columns;
     columns.start(rules);
     std::vector<GridIndex> blocks;
     for (const auto& [index, block] : map.entries()) blocks.push_back(index);
-    columns.update(map, classes, blocks);
+    columns.update(map, StateRules(), classes, blocks);
     std::set<int> seen;
     for (const auto& [stack, views] : columns.columns()) {
       for (int y = 0; y < kBlockEdge; ++y) {
@@ -92,11 +92,13 @@ TEST(GridExport, IsTheProjectedMap) {
 TEST(GridExport, RefusesImagesThatAreTooLargeOrEmpty) {
   const TemporaryFolder folder;
   SemanticMap map = infoOf().emptyMap();
-  EXPECT_THROW(exportGrid(folder / "a.yaml", map, *infoOf().classes, {}), std::invalid_argument);
+  EXPECT_THROW(exportGrid(folder / "a.yaml", map, StateRules(), *infoOf().classes, {}),
+               std::invalid_argument);
   const std::vector<EvidenceUnits> plane(kBlockVoxels, 9);
   map.getOrAllocate({{-(1 << 24), -(1 << 24), 0}}).add(40, plane.data());
   map.getOrAllocate({{1 << 24, 1 << 24, 0}}).add(40, plane.data());
-  EXPECT_THROW(exportGrid(folder / "a.yaml", map, *infoOf().classes, {}), std::invalid_argument);
+  EXPECT_THROW(exportGrid(folder / "a.yaml", map, StateRules(), *infoOf().classes, {}),
+               std::invalid_argument);
   EXPECT_EQ(folder.fileCount(), 0u);
 }
 

@@ -23,9 +23,10 @@ namespace {
 
 using nlohmann::json;
 
-SemanticMap mapWithGain(unsigned seed = 4) {
+const StateRules kRules = StateRules().withFreeGain(80, 0.1);
+
+SemanticMap someMap(unsigned seed = 4) {
   SemanticMap map = randomMap(seed, 60, 12);
-  map.setFreeGain(80, 0.1);
   Block::Occlusion marks;  // in a block of their own, whatever the random ones have
   marks.set(5).set(300);
   map.getOrAllocate({{20, -20, 3}}).setOcclusion(marks);
@@ -83,7 +84,7 @@ class HtmlExport : public testing::Test {
   }
   std::string exported(const SemanticMap& map, const ClassTable& classes) {
     const std::string path = folder_ / "map.html";
-    exportHtml(path, map, classes, options_);
+    exportHtml(path, map, kRules, classes, options_);
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
@@ -160,20 +161,20 @@ void expectSame(const VoxelView& view, const std::array<unsigned, 5>& found, con
 }
 
 TEST_F(HtmlExport, HasWhatTheMapSaysOfEachVoxel) {
-  const SemanticMap map = mapWithGain();
+  const SemanticMap map = someMap();
   const Page page = read(map);
   std::size_t known = 0, known_in_map = 0;
   std::map<std::string, std::size_t> states;
   forEachVoxel(page, [&](const VoxelIndex& voxel, const std::array<unsigned, 5>& found) {
     const Block* const block = map.find(GridGeometry::blockOf(voxel));
     ASSERT_NE(block, nullptr);
-    expectSame(viewWithoutEntropy(map, voxel), found, voxel);
+    expectSame(viewWithoutEntropy(map, kRules, voxel), found, voxel);
     known += found[0] != 0;
     ++states[std::array{"unknown", "free", "occupied", "occluded"}[found[0]]];
   });
   for (const auto& [index, block] : map.entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      known_in_map += viewVoxel(map, index, *block, v).state != VoxelState::kUnknown;
+      known_in_map += viewVoxel(map, kRules, index, *block, v).state != VoxelState::kUnknown;
     }
   }
   EXPECT_EQ(known, known_in_map);
@@ -184,11 +185,11 @@ TEST_F(HtmlExport, HasWhatTheMapSaysOfEachVoxel) {
 }
 
 TEST_F(HtmlExport, HasTheEvidenceToTheBit) {
-  const SemanticMap map = mapWithGain();
+  const SemanticMap map = someMap();
   SemanticMap expected = infoOf().emptyMap();
   for (const auto& [index, block] : map.entries()) {
     BlockView view;
-    readBlock(map, index, *block, BlockFields::kStates, view);
+    readBlock(map, kRules, index, *block, BlockFields::kStates, view);
     // Blocks without a known voxel are not in the page.
     if (std::any_of(view.state.begin(), view.state.end(),
                     [](VoxelState s) { return s != VoxelState::kUnknown; })) {
@@ -199,7 +200,7 @@ TEST_F(HtmlExport, HasTheEvidenceToTheBit) {
 }
 
 TEST_F(HtmlExport, LeavesOutStatesWithTheirEvidence) {
-  const SemanticMap map = mapWithGain();
+  const SemanticMap map = someMap();
   options_.states = {VoxelState::kOccupied};
   const Page page = read(map);
   const SemanticMap evidence = evidenceOf(page);
@@ -208,7 +209,7 @@ TEST_F(HtmlExport, LeavesOutStatesWithTheirEvidence) {
     const Block* const block = map.find(GridGeometry::blockOf(voxel));
     const Block* const kept = evidence.find(GridGeometry::blockOf(voxel));
     const int offset = GridGeometry::offsetInBlock(voxel);
-    const VoxelView view = viewWithoutEntropy(map, voxel);
+    const VoxelView view = viewWithoutEntropy(map, kRules, voxel);
     ASSERT_EQ(found[0], view.state == VoxelState::kOccupied ? 2u : 0u);
     occupied += found[0] == 2;
     for (const ClassId id : block->classes()) {
@@ -223,7 +224,7 @@ TEST_F(HtmlExport, LeavesOutStatesWithTheirEvidence) {
 }
 
 TEST_F(HtmlExport, CountsClassesAndBounds) {
-  const SemanticMap map = mapWithGain();
+  const SemanticMap map = someMap();
   const Page page = read(map);
   std::map<int, std::size_t> voxels;
   std::array<std::set<int>, 3> places;
@@ -255,7 +256,7 @@ TEST_F(HtmlExport, TextOfTheMapCannotBecomePartOfThePage) {
   options_.drives = {driveOf(hostile), driveOf("b")};
   options_.drives[0].name = hostile;
   options_.trajectories = {{hostile, {Eigen::Vector3d(1.0, 2.0, 3.0004)}}};
-  const Page page = read(mapWithGain(), ClassTable("t", classes));
+  const Page page = read(someMap(), ClassTable("t", classes));
   EXPECT_EQ(page.html.find("alert(1)</script>"), std::string::npos);
   EXPECT_EQ(page.html.find("</script><script>alert"), std::string::npos);
   const std::string shown = "</script><script>alert(1)</script><!-- & \xef\xbf\xbd\xe2\x80\xa8'\"";
@@ -339,7 +340,8 @@ std::string refusal(const std::function<void()>& call) {
 TEST_F(HtmlExport, RefusesWhatNoBrowserCanShow) {
   const std::string path = folder_ / "map.html";
   const auto refused = [&](const SemanticMap& map) {
-    return refusal<std::invalid_argument>([&] { exportHtml(path, map, *infoOf().classes, options_); });
+    return refusal<std::invalid_argument>(
+        [&] { exportHtml(path, map, kRules, *infoOf().classes, options_); });
   };
   EXPECT_EQ(refused(infoOf().emptyMap()), "there is no voxel to show; check --box and --include");
   SemanticMap wide = infoOf().emptyMap(), large = infoOf().emptyMap();
@@ -364,7 +366,7 @@ TEST_F(HtmlExport, SaysWhatToInstall) {
   options_.three_js = folder_ / "none.js";
   const std::string sentence = "three.js is not in " + options_.three_js;
   EXPECT_EQ(refusal<std::runtime_error>([&] { checkHtml(options_); }), sentence);
-  EXPECT_EQ(refusal<std::runtime_error>([&] { exported(mapWithGain(), *infoOf().classes); }), sentence);
+  EXPECT_EQ(refusal<std::runtime_error>([&] { exported(someMap(), *infoOf().classes); }), sentence);
   EXPECT_EQ(folder_.fileCount(), 1u);
 }
 

@@ -33,7 +33,7 @@ class MapExport : public testing::Test {
     mapper_->integrate(reference::nastyScenes()[0].scan);
   }
   void write(const std::string& path, const VoxelStates& states) {
-    exportMap(path, mapper_->map(), mapper_->classes(), states);
+    exportMap(path, mapper_->map(), mapper_->rules(), mapper_->classes(), states);
   }
   static std::string read(const std::string& path) {
     std::ifstream in(path, std::ios::binary);
@@ -49,7 +49,7 @@ TEST_F(MapExport, PlyHasOneVertexAVoxel) {
   const std::string bytes = read(folder_ / "map.ply");
   const std::string end = "end_header\n";
   const std::size_t header = bytes.find(end) + end.size();
-  const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), kAll);
+  const auto voxels = collectVoxels(mapper_->map(), mapper_->rules(), mapper_->classes(), kAll);
   ASSERT_GT(voxels.size(), 100u);
   EXPECT_EQ(bytes.size() - header, voxels.size() * 42);
   EXPECT_NE(bytes.find("format binary_little_endian 1.0\n"), std::string::npos);
@@ -76,7 +76,7 @@ TEST_F(MapExport, PclReadsBothFormats) {
   pcl::PointCloud<pcl::PointXYZRGB> ply, pcd;
   ASSERT_EQ(pcl::io::loadPLYFile(folder_ / "map.ply", ply), 0);
   ASSERT_EQ(pcl::io::loadPCDFile(folder_ / "map.pcd", pcd), 0);
-  const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), kAll);
+  const auto voxels = collectVoxels(mapper_->map(), mapper_->rules(), mapper_->classes(), kAll);
   ASSERT_EQ(ply.size(), voxels.size());
   ASSERT_EQ(pcd.size(), voxels.size());
   for (std::size_t i = 0; i < voxels.size(); ++i) {
@@ -98,7 +98,7 @@ class FarMapExport : public MapExport {
     scan.origin += kPlace;
     mapper_->integrate(scan);
     map_voxels_.clear();
-    forEachKnownVoxel(mapper_->map(), [&](const VoxelIndex& voxel, const VoxelView&) {
+    forEachKnownVoxel(mapper_->map(), mapper_->rules(), [&](const VoxelIndex& voxel, const VoxelView&) {
       const Eigen::Vector3d at = mapper_->map().geometry().voxelCentre(voxel);
       map_voxels_.insert({at.x(), at.y(), at.z()});
     });
@@ -144,7 +144,7 @@ TEST_F(FarMapExport, PcdIsRelativeToItsViewpoint) {
 
 TEST_F(FarMapExport, RecordsHoldDoubles) {
   std::set<Place> places;
-  for (const VoxelRecord& v : collectVoxels(mapper_->map(), mapper_->classes(), kAll)) {
+  for (const VoxelRecord& v : collectVoxels(mapper_->map(), mapper_->rules(), mapper_->classes(), kAll)) {
     places.insert({v.x, v.y, v.z});
   }
   EXPECT_EQ(places, map_voxels_);
@@ -166,12 +166,12 @@ TEST(FloatOrigin, IsZeroUntilFloatsAreTooCoarse) {
 TEST_F(MapExport, HoldsTheStatesAskedFor) {
   std::size_t sum = 0;
   for (const VoxelState state : {VoxelState::kOccupied, VoxelState::kFree, VoxelState::kOccluded}) {
-    const auto voxels = collectVoxels(mapper_->map(), mapper_->classes(), {state});
+    const auto voxels = collectVoxels(mapper_->map(), mapper_->rules(), mapper_->classes(), {state});
     EXPECT_GT(voxels.size(), 0u) << static_cast<int>(state);
     for (const VoxelRecord& v : voxels) EXPECT_EQ(v.state, static_cast<int>(state));
     sum += voxels.size();
   }
-  EXPECT_EQ(sum, collectVoxels(mapper_->map(), mapper_->classes(), kAll).size());
+  EXPECT_EQ(sum, collectVoxels(mapper_->map(), mapper_->rules(), mapper_->classes(), kAll).size());
   EXPECT_EQ(parseStates("occupied,free,occluded"), kAll);
   EXPECT_THROW(parseStates("occupied,fre"), std::invalid_argument);
 }

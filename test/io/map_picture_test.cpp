@@ -34,12 +34,12 @@ struct Inspected {
 
 Inspected inspect(const std::string& path) {
   MapFile file(path, MapFile::Access::kRead);
-  SemanticMap empty_map = emptyMapWithGains(path, file.info());
+  const StateRules rules = storedRules(path, file.info());
   Inspected result;
-  result.statistics = readStatistics(file, empty_map);
+  result.statistics = readStatistics(file, rules);
   MapPicture top(MapPicture::View::kTop, result.statistics.low, result.statistics.high),
       profile(MapPicture::View::kProfile, result.statistics.low, result.statistics.high);
-  readStatistics(file, empty_map, [&](const BlockIndex& index, const BlockView& view) {
+  readStatistics(file, rules, [&](const BlockIndex& index, const BlockView& view) {
     top.add(index, view);
     profile.add(index, view);
   });
@@ -57,27 +57,26 @@ SemanticMap markedMap(unsigned seed, int blocks, int extent) {
   return map;
 }
 
-/// The same evidence with the gains of infoWithGains().
-SemanticMap withGains(const SemanticMap& evidence) {
-  SemanticMap map = infoOf().emptyMap();
-  map.setGainPersistence(3.0);
-  map.setNeighbourhoodRatio(1.5, SemanticMap::Classes().set(40));
-  map.setFreeGain(0, 1.0);   // unlabelled
-  map.setFreeGain(40, 2.5);  // by its own gain
-  map.setFreeGain(80, 0.01);
-  map.add(evidence);
-  return map;
+/// The rules of infoWithGains().
+StateRules rulesWithGains() {
+  return StateRules()
+      .withPersistence(3.0)
+      .withNeighbourhood(1.5, ClassSet().set(40))
+      .withFreeGain(0, 1.0)   // unlabelled
+      .withFreeGain(40, 2.5)  // by its own gain
+      .withFreeGain(80, 0.01);
 }
 
 /// Compares the counts with a look at each voxel.
-void expectCounts(const MapStatistics& found, const SemanticMap& map) {
+void expectCounts(const MapStatistics& found, const SemanticMap& map,
+                  const StateRules& rules = rulesWithGains()) {
   MapStatistics expected;
   GridIndex low{1 << 30, 1 << 30, 1 << 30}, high{-(1 << 30), -(1 << 30), -(1 << 30)};
   std::size_t bytes = 0;
   for (const auto& [index, block] : map.entries()) {
     bytes += block->bytes();
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewVoxel(map, index, *block, v);
+      const VoxelView view = viewVoxel(map, rules, index, *block, v);
       expected.free += view.state == VoxelState::kFree;
       expected.occluded += view.state == VoxelState::kOccluded;
       expected.occupied += view.state == VoxelState::kOccupied;
@@ -109,7 +108,7 @@ TEST(MapStatistics, CountsVoxelsAsTheMapperSeesThem) {
   saveMap(path, infoWithGains(), {driveOf("a")}, markedMap(3, 60, 12));
   const MapStatistics found = inspect(path).statistics;
   EXPECT_GT(found.occluded, 0u);
-  expectCounts(found, withGains(markedMap(3, 60, 12)));
+  expectCounts(found, markedMap(3, 60, 12));
 }
 
 TEST(MapStatistics, SeesTheTilesBesideEachTile) {
@@ -131,7 +130,7 @@ TEST(MapStatistics, SeesTheTilesBesideEachTile) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
   saveMap(path, infoWithGains(), {driveOf("a")}, map);
-  expectCounts(inspect(path).statistics, withGains(map));
+  expectCounts(inspect(path).statistics, map);
 }
 
 /// Which coordinates a viewer sees to the right, up and towards himself: x 0, y 1, z 2; -1 - axis: reversed.
@@ -171,7 +170,7 @@ Picture drawn(const SemanticMap& map, const MapStatistics& found, const Axes& ax
   picture.pixels.assign(static_cast<std::size_t>(picture.width * picture.height), Color{255, 255, 255});
   const ClassTable shown = displayTable(*infoOf().classes);
   Nearest nearest;
-  forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
+  forEachKnownVoxel(map, rulesWithGains(), [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state == VoxelState::kOccluded) return;
     const int nearness = view.state == VoxelState::kFree ? far - 1 : coordinate(voxel, towards);
     const ClassId label = view.state == VoxelState::kFree ? kFreeClass : view.label;
@@ -213,7 +212,7 @@ TEST(MapPicture, ShowsWhatIsNearest) {
   const std::string path = folder / "map.bkm";
   saveMap(path, infoWithGains(), {}, markedMap(3, 60, 3));
   const Inspected inspected = inspect(path);
-  const SemanticMap map = withGains(markedMap(3, 60, 3));
+  const SemanticMap map = markedMap(3, 60, 3);
   const GridIndex &low = inspected.statistics.low, &high = inspected.statistics.high;
   const bool along_y = high.y - low.y > high.x - low.x;
   const int top_edge = std::max(high.x - low.x, high.y - low.y) + 1;
@@ -341,13 +340,12 @@ TEST(MapFileGains, RefusesParametersThatAreNone) {
   classes[1].living = false;  // so that its voxels ask their neighbourhood
   info.classes = std::make_shared<ClassTable>("a table", classes);
   info.parameters = "free_gain: {static: -1}";
-  EXPECT_NE(
-      sentenceOf([&] { emptyMapWithGains("FILE", info); }).find("the parameters in FILE cannot be used"),
-      std::string::npos);
+  EXPECT_NE(sentenceOf([&] { storedRules("FILE", info); }).find("the parameters in FILE cannot be used"),
+            std::string::npos);
   info.parameters = "[";
-  EXPECT_NE(sentenceOf([&] { emptyMapWithGains("FILE", info); }), "");
+  EXPECT_NE(sentenceOf([&] { storedRules("FILE", info); }), "");
   info.parameters = parameterYaml(MapperConfig());
-  EXPECT_EQ(sentenceOf([&] { emptyMapWithGains("FILE", info); }), "");
+  EXPECT_EQ(sentenceOf([&] { storedRules("FILE", info); }), "");
 }
 
 }  // namespace

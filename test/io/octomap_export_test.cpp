@@ -9,16 +9,17 @@
 #include <memory>
 #include <string>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
 
-SemanticMap mapWithGain() {
+const StateRules kRules = StateRules().withFreeGain(80, 0.1);
+
+SemanticMap someMap() {
   SemanticMap map = randomMap(4, 60, 3);
-  map.setFreeGain(80, 0.1);
   return map;
 }
 
@@ -52,7 +53,7 @@ void expectSame(const SemanticMap& map, const Tree& tree, Compare&& compare) {
   EXPECT_EQ(tree.getResolution(), map.geometry().resolution());
   std::uint64_t voxels = 0;
   int different = 0;
-  forEachKnownVoxel(map, [&](const VoxelIndex& voxel, const VoxelView& view) {
+  forEachKnownVoxel(map, kRules, [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state == VoxelState::kOccluded) return;
     ++voxels;
     const Eigen::Vector3d centre = map.geometry().voxelCentre(voxel);
@@ -67,8 +68,8 @@ void expectSame(const SemanticMap& map, const Tree& tree, Compare&& compare) {
 
 TEST(OctoMap, HoldsTheClassOfEachVoxel) {
   const TemporaryFolder folder;
-  const SemanticMap map = mapWithGain();
-  exportOctoMap(folder / "map.ot", map, *infoOf().classes);
+  const SemanticMap map = someMap();
+  exportOctoMap(folder / "map.ot", map, kRules, *infoOf().classes);
   const auto tree = open<octomap::ColorOcTree>(folder / "map.ot");
   ASSERT_TRUE(tree);
   std::size_t occupied = 0, agreeing = 0;
@@ -90,9 +91,9 @@ TEST(OctoMap, HoldsTheClassOfEachVoxel) {
 
 TEST(OctoMap, HoldsTheStateOfEachVoxel) {
   const TemporaryFolder folder;
-  const SemanticMap map = mapWithGain();
+  const SemanticMap map = someMap();
   testing::internal::CaptureStderr();
-  exportOctoMap(folder / "map.bt", map, *infoOf().classes);
+  exportOctoMap(folder / "map.bt", map, kRules, *infoOf().classes);
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   const auto tree = open<octomap::OcTree>(folder / "map.bt");
   ASSERT_TRUE(tree);
@@ -111,11 +112,11 @@ TEST(OctoMap, EndsWhereItsKeysEnd) {
       const std::string path = folder / name;
       std::filesystem::remove(path);
       if (!fits) {
-        EXPECT_THROW(exportOctoMap(path, map, *infoOf().classes), std::invalid_argument) << block;
+        EXPECT_THROW(exportOctoMap(path, map, kRules, *infoOf().classes), std::invalid_argument) << block;
         EXPECT_FALSE(std::filesystem::exists(path));
         continue;
       }
-      exportOctoMap(path, map, *infoOf().classes);
+      exportOctoMap(path, map, kRules, *infoOf().classes);
     }
     if (!fits) continue;
     const auto tree = open<octomap::ColorOcTree>(folder / "map.ot");
@@ -132,7 +133,7 @@ TEST(OctoMap, RefusesTheFirstVoxelBeyondItsKeys) {
   plane[0] = 9;
   SemanticMap map = infoOf().emptyMap();
   map.getOrAllocate({{0, 0, 4096}}).add(40, plane.data());
-  EXPECT_THROW(exportOctoMap(folder / "map.ot", map, *infoOf().classes), std::invalid_argument);
+  EXPECT_THROW(exportOctoMap(folder / "map.ot", map, kRules, *infoOf().classes), std::invalid_argument);
 }
 
 TEST(OctoMap, KeepsTheResolution) {
@@ -140,8 +141,8 @@ TEST(OctoMap, KeepsTheResolution) {
   const double resolution = 0.123456789012345678;
   SemanticMap map = infoOf(resolution).emptyMap();
   map.getOrAllocate({{1, 2, 3}}).add(40, std::vector<EvidenceUnits>(kBlockVoxels, 9).data());
-  exportOctoMap(folder / "map.ot", map, *infoOf().classes);
-  exportOctoMap(folder / "map.bt", map, *infoOf().classes);
+  exportOctoMap(folder / "map.ot", map, kRules, *infoOf().classes);
+  exportOctoMap(folder / "map.bt", map, kRules, *infoOf().classes);
   EXPECT_EQ(open<octomap::ColorOcTree>(folder / "map.ot")->getResolution(), resolution);
   EXPECT_EQ(open<octomap::OcTree>(folder / "map.bt")->getResolution(), resolution);
 }
@@ -149,10 +150,10 @@ TEST(OctoMap, KeepsTheResolution) {
 TEST(OctoMap, MayBeEmpty) {
   const TemporaryFolder folder;
   for (const char* name : {"map.ot", "map.bt"}) {
-    exportOctoMap(folder / name, infoOf().emptyMap(), *infoOf().classes);
+    exportOctoMap(folder / name, infoOf().emptyMap(), kRules, *infoOf().classes);
     EXPECT_TRUE(std::filesystem::exists(folder / name));
   }
-  EXPECT_THROW(exportOctoMap(folder / "map.oct", infoOf().emptyMap(), *infoOf().classes),
+  EXPECT_THROW(exportOctoMap(folder / "map.oct", infoOf().emptyMap(), kRules, *infoOf().classes),
                std::invalid_argument);
 }
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "reference/content.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
@@ -210,9 +210,9 @@ TEST(TilesAtPoints, ComeWithTheirNeighbourhood) {
     const std::string path = folder / "map.bkm";
     saveMap(path, info, {driveOf("a")}, map);
     TiledMap tiles(path);
-    const StoredMap read = tiles.readTilesAt({point});
+    const RuledMap read = tiles.readTilesAt({point});
     EXPECT_EQ(tiles.reading().tiles, asks ? 2u : 1u);
-    EXPECT_EQ(viewPoint(read.map, point).state, asks ? VoxelState::kFree : VoxelState::kOccupied);
+    EXPECT_EQ(viewPoint(read.map, read.rules, point).state, asks ? VoxelState::kFree : VoxelState::kOccupied);
   }
 }
 
@@ -230,7 +230,7 @@ TEST_F(City, NoOtherFileIsOpened) {
   const Eigen::AlignedBox3d column(low + Eigen::Vector3d(0.15, 0.15, -kInfinity),
                                    low + Eigen::Vector3d(edge - 0.15, edge - 0.15, kInfinity));
   Eigen::AlignedBox3d tall = column;
-  const StoredMap read = city.readBox(tall);
+  const RuledMap read = city.readBox(tall);
   EXPECT_EQ(contentOf(read.map),
             restricted(whole_, [&](const Eigen::Vector3d& c) { return tall.contains(c); }));
   EXPECT_GT(read.map.size(), 0u);

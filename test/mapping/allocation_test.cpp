@@ -135,7 +135,7 @@ void failEverywhere(const MapperConfig& config, const Scan& first, const Scan& s
   failing.integrate(first);
   const auto before = contentOf(failing.map());
   std::optional<SemanticMap> snapshot;
-  if (shared) snapshot = failing.snapshot();
+  if (shared) snapshot = failing.snapshot().map;
   whole.integrate(second);
   const auto after = contentOf(whole.map());
   ASSERT_NE(before, after);
@@ -191,8 +191,8 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.free_space.mode = mode;
       config.threads = 1;
       failEverywhere(config, fewPoints(0), fewPoints(1), on);
-      config.free_space.hits_before_misses = true;
-      config.free_space.evidence_before_misses = true;
+      config.scan_limit.hits_before_misses = true;
+      config.scan_limit.evidence_before_misses = true;
       config.scan_limit.hits = 0.2;
       config.scan_limit.free = 1e-3;
       config.scan_limit.free_threshold = 0.02;
@@ -251,7 +251,7 @@ TEST(Allocation, AFailureWhileAMapIsAddedLeavesBothAsTheyWere) {
     SemanticMapper mapper(config, reference::smallTable()), other(config, reference::smallTable());
     mapper.integrate(fewPoints(0));
     for (const Scan& scan : {fewPoints(1), far}) other.integrate(scan);
-    SemanticMap map = other.snapshot();
+    SemanticMap map = other.snapshot().map;
     const auto before = contentOf(mapper.map()), of_other = contentOf(map);
     std::ptrdiff_t failures = 0;
     for (bool succeeded = false; !succeeded; ++failures) {
@@ -283,7 +283,7 @@ TEST(Allocation, NoneInTheSteadyStateAfterASnapshotIsGone) {
   SemanticMapper mapper(config, reference::smallTable());
   for (int n = 0; n < 3; ++n) mapper.integrate(scan);
   {
-    const SemanticMap snapshot = mapper.snapshot();
+    const MapSnapshot snapshot = mapper.snapshot();
     EXPECT_GT(allocationsOf(mapper, scan), mapper.map().size()) << "blocks are copied";
   }
   EXPECT_EQ(allocationsOf(mapper, scan), 0u);

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <limits>
 
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "free_space/registry.h"
 #include "reference/scenes.h"
 
@@ -107,7 +107,7 @@ TEST(Bounds, AHitWithinTheDefaultReachIsMapped) {
   SemanticMapper mapper(MapperConfig(), reference::smallTable());
   const ScanStats stats = mapper.integrate(roomWithOnePointAt({299.0f, 0.0f, 1.0f}));
   EXPECT_EQ(stats.counts.used, 2000u);
-  EXPECT_EQ(viewPoint(mapper.map(), {299.0, 0.0, 1.0}).state, VoxelState::kOccupied);
+  EXPECT_EQ(viewPoint(mapper.map(), mapper.rules(), {299.0, 0.0, 1.0}).state, VoxelState::kOccupied);
 }
 
 TEST(Bounds, AScanOfTooManyBlocksIsRefusedAndTheNextIsMapped) {
@@ -265,7 +265,8 @@ TEST(Kernel, FollowsTheResolutionUnlessItIsSet) {
     mapper.integrate(scan);
     std::size_t occupied = 0;
     for (const Eigen::Vector3f& point : scan.points) {
-      occupied += viewPoint(mapper.map(), point.cast<double>()).state == VoxelState::kOccupied;
+      occupied +=
+          viewPoint(mapper.map(), mapper.rules(), point.cast<double>()).state == VoxelState::kOccupied;
     }
     EXPECT_EQ(occupied, scan.points.size()) << resolution;
   }
@@ -334,7 +335,7 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
   EXPECT_EQ(stats.counts.not_finite, std::size(bad));
   EXPECT_EQ(stats.counts.used, 1u);
   EXPECT_EQ(stats.not_finite, 0u);
-  forEachKnownVoxel(mapper.map(), [](const VoxelIndex&, const VoxelView& view) {
+  forEachKnownVoxel(mapper.map(), mapper.rules(), [](const VoxelIndex&, const VoxelView& view) {
     EXPECT_TRUE(std::isfinite(view.probability) && view.evidence > 0.0f);
   });
 }

@@ -102,7 +102,7 @@ TEST_P(EveryScene, HitsBeforeMissesEqualsBruteForce) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;
-      config.free_space.hits_before_misses = true;
+      config.scan_limit.hits_before_misses = true;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, " + mode);
       config.kernel.length = 0.2;  // may reach no voxel centre
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, short, " + mode);
@@ -185,7 +185,7 @@ TEST_P(EveryScene, SoftLabelsEqualBruteForce) {
       config.kernel.type = kernel;
       config.kernel.length = length;
       expectEqualsBruteForce(scan, config, scene_.name + ", soft labels");
-      config.free_space.hits_before_misses = true;
+      config.scan_limit.hits_before_misses = true;
       config.free_space.extent = FreeSpaceExtent::kMapped;
       config.downsample_resolution = 0.0;
       expectEqualsBruteForce(scan, config, scene_.name + ", soft labels, hits before misses");
@@ -199,7 +199,7 @@ TEST_P(EveryScene, EvidenceBeforeMissesEqualsBruteForce) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;
-      config.free_space.evidence_before_misses = true;
+      config.scan_limit.evidence_before_misses = true;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", evidence before misses, " + mode);
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
                              scene_.name + ", soft, evidence before misses");
@@ -245,8 +245,8 @@ TEST_P(EveryScene, HitsThatStayInTheirVoxelsEqualBruteForce) {
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", static hits stay", classes);
     expectEqualsBruteForce(withSoftLabels(scene_.scan), config, scene_.name + ", soft, static hits stay",
                            classes);
-    config.free_space.hits_before_misses = true;
-    config.free_space.evidence_before_misses = true;
+    config.scan_limit.hits_before_misses = true;
+    config.scan_limit.evidence_before_misses = true;
     config.scan_limit.hits = 0.05;
     config.scan_limit.free = 1e-3;
     config.scan_limit.free_threshold = 1.5e-3;
@@ -282,7 +282,7 @@ TEST_P(EveryScene, VoidsEqualBruteForce) {
     config.scan_limit.free_threshold = 5.0 * config.scan_limit.free;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, " + mode);
     config.scan_limit.free_threshold = 0.0;
-    config.free_space.evidence_before_misses = true;
+    config.scan_limit.evidence_before_misses = true;
     config.free_space.extent = FreeSpaceExtent::kMapped;
     if (scene_.name != "near the sensor") {
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,

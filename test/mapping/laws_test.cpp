@@ -8,8 +8,8 @@
 #include <set>
 #include <tuple>
 
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "free_space/registry.h"
 #include "reference/content.h"
 #include "reference/scenes.h"
@@ -103,8 +103,8 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     config.kernel.type = KernelType::kCounting;
     configs.emplace_back(mode + ", counting", config);
     config.kernel.type = KernelType::kSparse;
-    config.free_space.hits_before_misses = true;
-    config.free_space.evidence_before_misses = true;
+    config.scan_limit.hits_before_misses = true;
+    config.scan_limit.evidence_before_misses = true;
     config.scan_limit.hits = 0.05;
     config.scan_limit.free = 0.03;
     config.scan_limit.free_threshold = 0.002;
@@ -229,7 +229,8 @@ TEST(Laws, WithdrawingWhatIsNotThereIsCountedAndReadsAsNothing) {
   EXPECT_GT(mapper.withdraw(scans[0]).negative, 0u);
   for (const auto& entry : mapper.map().entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      ASSERT_EQ(viewVoxel(mapper.map(), entry.index, *entry.block, v).state, VoxelState::kUnknown);
+      ASSERT_EQ(viewVoxel(mapper.map(), mapper.rules(), entry.index, *entry.block, v).state,
+                VoxelState::kUnknown);
     }
   }
   mapper.integrate(scans[0]);
@@ -330,18 +331,24 @@ TEST(Laws, EveryBlockKnowsSomething) {
 }
 
 TEST(Laws, ProbabilitiesSumToOne) {
+  // The probability that is read, and those of all other classes and of free, by Equation 10.
   const SemanticMap map = mapOf(someScans(), configOf("line"));
+  std::size_t occupied = 0;
   for (const auto& entry : map.entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewVoxel(map, entry.index, *entry.block, v);
-      double sum = 0.0;
+      const VoxelView view = viewVoxel(map, StateRules(), entry.index, *entry.block, v);
+      double others = 0.0, sum = 0.0;
       for (const int label : {0, 1, 2, 3, 255}) {
         const EvidenceUnits* plane = entry.block->evidence(static_cast<ClassId>(label));
-        sum += (map.prior() + (plane ? evidenceOf(plane[v]) : 0.0f)) / (map.priorSum() + view.evidence);
+        const double alpha = map.prior() + (plane ? evidenceOf(plane[v]) : 0.0f);
+        if (label != view.label) others += alpha;
+        sum += alpha;
       }
-      ASSERT_NEAR(sum, 1.0, 1e-5);
+      ASSERT_NEAR(view.probability + others / sum, 1.0, 1e-5);
+      occupied += view.state == VoxelState::kOccupied;
     }
   }
+  EXPECT_GT(occupied, 100u);
 }
 
 TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
@@ -368,7 +375,7 @@ TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
   const std::vector<Scan> scans = someScans();
   MapperConfig other = configOf("linear");
   other.sensor_model.max_range = 2.0;
-  other.free_space.hits_before_misses = true;
+  other.scan_limit.hits_before_misses = true;
   SemanticMapper changed(configOf("line"), reference::smallTable()), made(other, reference::smallTable());
   changed.integrate(scans[0]);
   changed.reset();
@@ -435,12 +442,12 @@ TEST(Laws, NeighbourhoodsAreAskedByTheFlagsOfClasses) {
   config.free_gain.neighbourhood = 2.0;
   const auto asking = [&] {
     const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-    EXPECT_EQ(mapper.map().neighbourhoodRatio(), 2.0f);
+    EXPECT_EQ(mapper.rules().neighbourhoodRatio(), 2.0f);
     std::vector<int> asked;
     for (const SemanticClass& c : classes) {
-      if (mapper.map().asksNeighbourhood(c.id)) asked.push_back(c.id);
+      if (mapper.rules().asksNeighbourhood(c.id)) asked.push_back(c.id);
     }
-    return std::pair(asked, mapper.map().neighbourhoodIsBelow());
+    return std::pair(asked, mapper.rules().neighbourhoodIsBelow());
   };
   std::vector<int> labelled;
   for (std::size_t n = 1; n < classes.size(); ++n) labelled.push_back(classes[n].id);
@@ -458,30 +465,30 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   config.free_gain.dynamic_classes = 30.0;
   config.free_gain.static_classes = 0.1;
   const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-  EXPECT_EQ(mapper.map().freeGain(0, 5.0f), 1.0f);  // unlabelled
-  EXPECT_EQ(mapper.map().freeGain(1, 5.0f), 0.1f);
-  EXPECT_EQ(mapper.map().freeGain(2, 5.0f), 30.0f);
-  EXPECT_EQ(mapper.map().freeGain(kFreeClass, 5.0f), 1.0f);
+  EXPECT_EQ(mapper.rules().freeGain(0, 5.0f), 1.0f);  // unlabelled
+  EXPECT_EQ(mapper.rules().freeGain(1, 5.0f), 0.1f);
+  EXPECT_EQ(mapper.rules().freeGain(2, 5.0f), 30.0f);
+  EXPECT_EQ(mapper.rules().freeGain(kFreeClass, 5.0f), 1.0f);
   classes[2].living = true;
   const auto living = std::make_shared<ClassTable>("living", classes);
-  EXPECT_EQ(SemanticMapper(config, living).map().freeGain(2, 5.0f), 30.0f) << "by default that of dynamic";
+  EXPECT_EQ(SemanticMapper(config, living).rules().freeGain(2, 5.0f), 30.0f) << "by default that of dynamic";
   config.free_gain.living_classes = 500.0;
-  EXPECT_EQ(SemanticMapper(config, living).map().freeGain(2, 5.0f), 500.0f);
+  EXPECT_EQ(SemanticMapper(config, living).rules().freeGain(2, 5.0f), 500.0f);
   classes[2].free_gain = 7.0;
   const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_EQ(own.map().freeGain(2, 5.0f), 7.0f);
+  EXPECT_EQ(own.rules().freeGain(2, 5.0f), 7.0f);
   config.free_gain.persistence = 2.0;
   const SemanticMapper persistent(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_FLOAT_EQ(persistent.map().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
-  EXPECT_EQ(persistent.map().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
-  EXPECT_EQ(persistent.map().remainingGain(), 0.0f);
+  EXPECT_FLOAT_EQ(persistent.rules().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
+  EXPECT_EQ(persistent.rules().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
+  EXPECT_EQ(persistent.rules().remainingGain(), 0.0f);
   config.free_gain.remaining = 0.25;
   const SemanticMapper remaining(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_EQ(remaining.map().remainingGain(), 0.25f);
-  EXPECT_FALSE(remaining.map().isFixed(0)) << "what is unlabelled may move";
-  EXPECT_TRUE(remaining.map().isFixed(1));
-  EXPECT_FALSE(remaining.map().isFixed(2));
-  EXPECT_FALSE(remaining.map().isFixed(kFreeClass));
+  EXPECT_EQ(remaining.rules().remainingGain(), 0.25f);
+  EXPECT_FALSE(remaining.rules().isFixed(0)) << "what is unlabelled may move";
+  EXPECT_TRUE(remaining.rules().isFixed(1));
+  EXPECT_FALSE(remaining.rules().isFixed(2));
+  EXPECT_FALSE(remaining.rules().isFixed(kFreeClass));
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 #include <tuple>
 
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "free_space/registry.h"
 #include "other_value.h"
 #include "reference/scenes.h"
@@ -90,7 +90,7 @@ std::vector<std::tuple<int, int, int, VoxelState, ClassId, float, float>> knownA
     return {};  // a limit of the scan or of the map
   }
   std::vector<std::tuple<int, int, int, VoxelState, ClassId, float, float>> known;
-  forEachKnownVoxel(mapper.map(), [&](const VoxelIndex& v, const VoxelView& view) {
+  forEachKnownVoxel(mapper.map(), mapper.rules(), [&](const VoxelIndex& v, const VoxelView& view) {
     known.emplace_back(v.x, v.y, v.z, view.state, view.label, view.probability, view.evidence);
   });
   return known;

@@ -8,8 +8,8 @@
 
 #include "bki_mapping/io/sequence.h"
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "free_space/registry.h"
 #include "reference/reference.h"
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -76,19 +77,29 @@ TEST(Snapshot, IsAMapOfItsOwn) {
   EXPECT_EQ(one.find({{3, 0, 0}})->evidence(1)[7], 11);
 }
 
-TEST(Snapshot, KeepsGainsAndGeometry) {
+TEST(Snapshot, KeepsTheGeometry) {
   SemanticMap map(GridGeometry(0.25), 0.002, 3);
-  map.setFreeGain(1, 3.0);
-  map.setGainPersistence(2.0);
-  map.setRemainingGain(0.5, SemanticMap::Classes(0b100));
   const SemanticMap snapshot = map.snapshot();
   EXPECT_EQ(snapshot.geometry().resolution(), 0.25);
   EXPECT_EQ(snapshot.prior(), 0.002);
   EXPECT_EQ(snapshot.classCount(), 3u);
-  EXPECT_EQ(snapshot.freeGain(1, 1.0f), map.freeGain(1, 1.0f));
-  EXPECT_NE(snapshot.freeGain(1, 1.0f), 1.0f);
-  EXPECT_EQ(snapshot.remainingGain(), 0.5f);
-  EXPECT_TRUE(snapshot.isFixed(2) && !snapshot.isFixed(1));
+}
+
+TEST(Snapshot, KeepsTheRulesOfItsTime) {
+  MapperConfig config;
+  config.free_gain.static_classes = 3.0;
+  config.free_gain.persistence = 2.0;
+  config.free_gain.remaining = 0.5;
+  SemanticMapper mapper(config, reference::smallTable());
+  const MapSnapshot snapshot = mapper.snapshot();
+  EXPECT_TRUE(snapshot.rules.decidesAs(mapper.rules()));
+  config.free_gain.static_classes = 4.0;
+  config.free_gain.remaining = 0.0;
+  mapper.reconfigure(config);
+  EXPECT_FLOAT_EQ(snapshot.rules.freeGain(1, 2.0f), 1.0f + 2.0f * std::exp(-1.0f));
+  EXPECT_EQ(snapshot.rules.remainingGain(), 0.5f);
+  EXPECT_TRUE(snapshot.rules.isFixed(1) && !snapshot.rules.isFixed(0)) << "what is unlabelled may move";
+  EXPECT_FALSE(snapshot.rules.decidesAs(mapper.rules()));
 }
 
 std::vector<Scan> someScans() {
@@ -106,7 +117,7 @@ TEST(Snapshot, OfAMapperIsTheMapOfTheScansUntilThen) {
     for (const Scan& scan : someScans()) {
       mapper.integrate(scan);
       plain.integrate(scan);
-      snapshots.emplace_back(mapper.snapshot(), contentOf(plain.map()));
+      snapshots.emplace_back(mapper.snapshot().map, contentOf(plain.map()));
       ASSERT_EQ(mapper.mapBytes(), mapper.map().bytes());
     }
     mapper.withdraw(someScans()[0]);
@@ -137,7 +148,7 @@ TEST(Snapshot, IsReadInOtherThreadsWhileTheMapperWrites) {
   SemanticMapper mapper(config, reference::smallTable());
   mapper.integrate(scans[0]);
   std::mutex mutex;
-  auto latest = std::make_shared<const SemanticMap>(mapper.snapshot());
+  auto latest = std::make_shared<const SemanticMap>(mapper.snapshot().map);
   std::atomic<bool> done{false};
   std::atomic<int> read{0};
   const auto reader = [&] {
@@ -156,7 +167,7 @@ TEST(Snapshot, IsReadInOtherThreadsWhileTheMapperWrites) {
   for (std::size_t n = 0; n < 150 || read < 20; ++n) {
     mapper.integrate(scans[n % scans.size()]);
     if (n % 5 == 4) mapper.eraseBlocks([&](const BlockIndex& block) { return block.x % 3 == 0; });
-    auto snapshot = std::make_shared<const SemanticMap>(mapper.snapshot());
+    auto snapshot = std::make_shared<const SemanticMap>(mapper.snapshot().map);
     const std::lock_guard<std::mutex> lock(mutex);
     latest = std::move(snapshot);
   }

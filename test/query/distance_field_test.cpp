@@ -16,7 +16,7 @@ namespace bki_mapping {
 namespace {
 
 bool isObstacle(const SemanticMap& map, const VoxelIndex& voxel, const ObstacleRules& rules) {
-  const VoxelView view = viewWithoutEntropy(map, voxel);
+  const VoxelView view = viewWithoutEntropy(map, queryRules(), voxel);
   if (view.state == VoxelState::kOccupied) return rules.classes.contains(view.label);
   return rules.unknown && view.state != VoxelState::kFree;
 }
@@ -75,7 +75,7 @@ TEST(DistanceField, EqualsBruteForce) {
     QueryMapKind kind;
     kind.occupied = occupied;
     const SemanticMap map = queryMap(41, kind);
-    const StateMap states(map, 2);
+    const StateMap states(map, queryRules(), 2);
     for (const Eigen::AlignedBox3d& box :
          {boxOf(-3.1, -2.3, -1.2, 7.6, 4.7, 1.9), boxOf(-1, -6, -4, 1.3, 7.1, 6.2),
           boxOf(0, 0, 0, 4, 0.1, 0.1), boxOf(1, 2, -3, 0.1, 3, 0.1), boxOf(-5, -5, -5, 0.1, 0.1, 6),
@@ -89,7 +89,7 @@ TEST(DistanceField, EqualsBruteForce) {
 
 TEST(DistanceField, OfAnotherBoxEqualsANewOne) {
   const SemanticMap map = queryMap(49);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   DistanceField field(states, boxOf(-2, -3, -2, 3, 4, 3));
   for (const Eigen::AlignedBox3d& box :
        {boxOf(-1, -3, 0, 2, 2, 2), boxOf(-4, -3, -2, 7, 6, 5), boxOf(0, 0, 0, 0.1, 5, 2)}) {
@@ -103,7 +103,7 @@ TEST(DistanceField, OfAnotherBoxEqualsANewOne) {
 
 TEST(DistanceField, IsInfiniteWithoutObstaclesAndWithNothingElse) {
   const SemanticMap map = queryMap(42);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const Eigen::AlignedBox3d box = boxOf(-2, -2, -2, 3, 3, 3);
   const DistanceField none(states, box, {{}, false});
   for (const float distance : none.distances()) ASSERT_EQ(distance, static_cast<float>(kInfinity));
@@ -121,7 +121,7 @@ TEST(DistanceField, IsExactFarAway) {
   std::vector<EvidenceUnits> plane(kBlockVoxels);
   plane[0] = unitsOf(1.0);
   map.getOrAllocate({{0, 0, 0}}).add(2, plane.data());
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::AlignedBox3d box = boxOf(-0.9, -0.9, -0.9, 2, 2, 2);
     box.max()[axis] = 4000.0;
@@ -184,7 +184,7 @@ TEST(DistanceField, UpdatedEqualsNew) {
   const Eigen::AlignedBox3d box = boxOf(-3.9, -5.1, -2.2, 9.1, 8.3, 5.0);
   for (const ObstacleRules& rules : {ObstacleRules{}, ObstacleRules{{3}, true}}) {
     std::mt19937 random(45);
-    const StateMap before(map, 2);
+    const StateMap before(map, queryRules(), 2);
     DistanceField field(before, box, rules);
     for (int round = 0; round < 12; ++round) {
       std::vector<GridIndex> changed;
@@ -201,13 +201,13 @@ TEST(DistanceField, UpdatedEqualsNew) {
         map.getOrAllocate(index).add(random() % 2 == 0 ? ClassId{3} : kFreeClass, plane.data());
       }
       const SemanticMap snapshot = map.snapshot();
-      const StateMap states(snapshot, 2);
+      const StateMap states(snapshot, queryRules(), 2);
       field.update(states, changed);
       ASSERT_EQ(copyOf(field), copyOf(DistanceField(states, box, rules))) << round;
     }
     field.update(before, {});
     const SemanticMap other(GridGeometry(0.3), 0.001, 3);
-    EXPECT_THROW(field.update(StateMap(other), {}), std::invalid_argument);
+    EXPECT_THROW(field.update(StateMap(other, queryRules()), {}), std::invalid_argument);
   }
 }
 
@@ -215,7 +215,7 @@ TEST(DistanceField, InterpolatesBetweenCentres) {
   QueryMapKind kind;
   kind.occupied = 0.01;
   const SemanticMap map = queryMap(46, kind);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const DistanceField field(states, boxOf(-3, -3, -3, 6, 6, 6));
   for (const VoxelIndex& voxel : voxelsOf(field)) {
     const auto value = field.interpolate(map.geometry().voxelCentre(voxel));
@@ -247,7 +247,7 @@ TEST(DistanceField, InterpolatesBetweenCentres) {
 
 TEST(DistanceField, RefusesImpossibleRegions) {
   const SemanticMap map = queryMap(48);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   expectRefused("the region is inside out; give a min below its max",
                 [&] { DistanceField(states, boxOf(0, 0, 0, -1, 1, 1)); });
   expectRefused("the region has a coordinate that is not finite; give finite ones",

@@ -23,7 +23,7 @@ TEST(DistanceField, AgreesWithDynamicEdt3d) {
   kind.blocks = 7;
   kind.occupied = 0.01;
   const SemanticMap map = queryMap(51, kind);
-  const StateMap states(map, 1);
+  const StateMap states(map, queryRules(), 1);
   DistanceField(states, {Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1)});
   auto begin = std::chrono::steady_clock::now();
   const DistanceField field(states, {Eigen::Vector3d(-14, -13, -6), Eigen::Vector3d(13, 14, 6)});

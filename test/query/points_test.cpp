@@ -41,13 +41,13 @@ std::vector<Eigen::Vector3d> randomPoints(std::size_t count, double extent, unsi
 
 template <typename Point>
 void compare(const SemanticMap& map, const std::vector<Point>& points, int threads) {
-  const StateMap states(map, threads);
+  const StateMap states(map, queryRules(), threads);
   Answers answers(points.size());
   readPoints(states, points, answers.values());
   for (std::size_t n = 0; n < points.size(); ++n) {
     const Eigen::Vector3d point = points[n].template cast<double>();
-    const VoxelView expected =
-        map.geometry().contains(point) ? viewPoint(map, point) : viewPoint(map, {1e6, 0, 0});
+    const VoxelView expected = map.geometry().contains(point) ? viewPoint(map, queryRules(), point)
+                                                              : viewPoint(map, queryRules(), {1e6, 0, 0});
     ASSERT_EQ(answers.states[n], expected.state) << n;
     ASSERT_EQ(answers.labels[n], expected.label) << n;
     ASSERT_EQ(answers.occupancy[n], expected.occupancy) << n;
@@ -81,7 +81,7 @@ TEST(ReadPoints, OnFacesAndBeyondTheGrid) {
 
 TEST(ReadPoints, FillsOnlyWhatIsWanted) {
   const SemanticMap map = queryMap(7);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const auto points = randomPoints(100, 5.0, 8);
   Answers all(100), some(100);
   readPoints(states, points, all.values());
@@ -104,19 +104,19 @@ TEST(ReadPoints, OfAnEmptyMapAreUnknown) {
 TEST(ReadPoints, ASnapshotAnswersAsBefore) {
   SemanticMap map = queryMap(10);
   const SemanticMap before = queryMap(10), snapshot = map.snapshot();
-  const StateMap states(snapshot);
+  const StateMap states(snapshot, queryRules());
   map.clear();
   const auto points = randomPoints(2000, 8.0, 11);
   Answers answers(points.size());
   readPoints(states, points, answers.values());
   for (std::size_t n = 0; n < points.size(); ++n) {
-    ASSERT_EQ(answers.states[n], viewPoint(before, points[n]).state);
+    ASSERT_EQ(answers.states[n], viewPoint(before, queryRules(), points[n]).state);
   }
 }
 
 TEST(ReadPoints, NamesThePointThatIsNotFinite) {
   const SemanticMap map = queryMap(12);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   auto points = randomPoints(40000, 8.0, 13);
   points[39000].y() = std::numeric_limits<double>::infinity();
   points[123].z() = std::numeric_limits<double>::quiet_NaN();
@@ -131,8 +131,8 @@ TEST(ReadPoints, NamesThePointThatIsNotFinite) {
 
 TEST(StateMap, RefusesImpossibleThreads) {
   const SemanticMap map = queryMap(14);
-  EXPECT_THROW(StateMap(map, -1), std::invalid_argument);
-  EXPECT_THROW(StateMap(map, 100000), std::invalid_argument);
+  EXPECT_THROW(StateMap(map, queryRules(), -1), std::invalid_argument);
+  EXPECT_THROW(StateMap(map, queryRules(), 100000), std::invalid_argument);
 }
 
 }  // namespace

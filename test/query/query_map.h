@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -38,14 +38,18 @@ struct QueryMapKind {
   GridIndex centre = {0, 0, 0};  ///< [blocks]
 };
 
+/// Rules by which voxels depend on those around.
+inline const StateRules& queryRules() {
+  static const StateRules rules =
+      StateRules().withFreeGain(7, 2.0).withPersistence(3.0).withNeighbourhood(0.15, 0b10001000);
+  return rules;
+}
+
 /// Classes 0, 3 and 7, all three states, occlusion marks, and negative evidence.
 inline SemanticMap queryMap(unsigned seed, const QueryMapKind& kind = {}) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   SemanticMap map(GridGeometry(kind.resolution), 0.001, 8);
-  map.setFreeGain(7, 2.0);
-  map.setGainPersistence(3.0);
-  map.setNeighbourhoodRatio(0.15, 0b10001000);
   for (int z = -kind.blocks; z < kind.blocks; ++z) {
     for (int y = -kind.blocks; y < kind.blocks; ++y) {
       for (int x = -kind.blocks; x < kind.blocks; ++x) {

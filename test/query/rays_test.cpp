@@ -167,7 +167,7 @@ RayHit slowlyCast(const SemanticMap& map, const Ray& ray, const RayStops& stops)
   hit.length = ray.length;
   for (const Crossed& crossed :
        crossedBy(ray.origin / resolution, direction, ray.length / resolution, 1e-9)) {
-    const VoxelView view = viewWithoutEntropy(map, crossed.voxel);
+    const VoxelView view = viewWithoutEntropy(map, queryRules(), crossed.voxel);
     const double length = crossed.part.begin * resolution;
     const bool unknown = view.state == VoxelState::kUnknown || view.state == VoxelState::kOccluded;
     if (unknown) hit.first_unknown = std::min(hit.first_unknown, length);
@@ -203,7 +203,7 @@ std::vector<Ray> randomRays(int count, double extent, double most, unsigned seed
 
 void expectSlowlyCast(const QueryMapKind& kind, const RayStops& stops, unsigned seed, int count) {
   const SemanticMap map = queryMap(seed, kind);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   const double extent = extentOf(kind) * kind.resolution;
   const std::vector<Ray> rays = randomRays(count, extent, extent, seed + 1);
   std::vector<RayHit> hits(rays.size());
@@ -249,7 +249,7 @@ TEST(CastRay, FromOneOccupiedVoxelToAnother) {
   plane[0] = unitsOf(1.0);
   map.getOrAllocate({{0, 0, 0}}).add(2, plane.data());
   map.getOrAllocate({{-3, 0, 0}}).add(1, plane.data());
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   RayHit hit = castRay(states, {{5.0, 0.25, 0.25}, {-2.0, 0.0, 0.0}, 20.0});
   EXPECT_EQ(hit.label, 2);
   EXPECT_DOUBLE_EQ(hit.length, 4.5);
@@ -274,7 +274,7 @@ TEST(CastRay, MayBeInfiniteAndStartFarAway) {
   std::vector<EvidenceUnits> plane(kBlockVoxels);
   plane[0] = unitsOf(1.0);
   map.getOrAllocate({{1000, 1000, -1000}}).add(2, plane.data());
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const Eigen::Vector3d target = map.geometry().voxelCentre({{8000, 8000, -8000}});
   for (const Eigen::Vector3d& origin : {Eigen::Vector3d(-1e8, 3e7, 2.0), Eigen::Vector3d(0, 0, 0)}) {
     const RayHit hit = castRay(states, {origin, target - origin, kInfinity});
@@ -284,15 +284,16 @@ TEST(CastRay, MayBeInfiniteAndStartFarAway) {
     EXPECT_EQ(castRay(states, {origin, origin - target, kInfinity}).end, RayEnd::kNothing);
   }
   const SemanticMap nothing(GridGeometry(0.5), 0.001, 3);
-  const RayHit hit = castRay(StateMap(nothing), {{1, 1, 1}, {1, 2, 3}, kInfinity});
+  const RayHit hit = castRay(StateMap(nothing, queryRules()), {{1, 1, 1}, {1, 2, 3}, kInfinity});
   EXPECT_EQ(hit.end, RayEnd::kNothing);
   EXPECT_EQ(hit.first_unknown, 0.0);
-  EXPECT_EQ(castRay(StateMap(nothing), {{1, 1, 1}, {1, 2, 3}, 5.0}, {{}, true}).end, RayEnd::kUnknown);
+  EXPECT_EQ(castRay(StateMap(nothing, queryRules()), {{1, 1, 1}, {1, 2, 3}, 5.0}, {{}, true}).end,
+            RayEnd::kUnknown);
 }
 
 void expectRayRefused(const Ray& ray, const std::string& sentence) {
   const SemanticMap map = queryMap(21);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const std::vector<Ray> rays = {{{0, 0, 0}, {1, 0, 0}, 1.0}, ray};
   std::vector<RayHit> hits(2);
   try {
@@ -315,7 +316,7 @@ TEST(CastRay, RefusesWhatIsNoRay) {
   expectRayRefused({{1e12, 0, 0}, {1, 0, 0}, 1}, "starts beyond the map's grid; start it within the map");
   const SemanticMap map = queryMap(22);
   std::vector<RayHit> hits(3);
-  EXPECT_THROW(castRays(StateMap(map), std::vector<Ray>(2), {}, hits), std::invalid_argument);
+  EXPECT_THROW(castRays(StateMap(map, queryRules()), std::vector<Ray>(2), {}, hits), std::invalid_argument);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ SpaceContent slowContent(const SemanticMap& map, const QueryMapKind& kind, Overl
   SpaceContent content;
   forEachVoxel(kind, [&](const VoxelIndex& voxel) {
     if (!overlaps(voxel)) return;
-    const VoxelView view = viewWithoutEntropy(map, voxel);
+    const VoxelView view = viewWithoutEntropy(map, queryRules(), voxel);
     content.free += view.state == VoxelState::kFree;
     content.occupied += view.state == VoxelState::kOccupied;
     content.unknown += view.state == VoxelState::kUnknown || view.state == VoxelState::kOccluded;
@@ -101,7 +101,7 @@ class Shapes : public testing::Test {
 
 TEST_F(Shapes, BoxesEqualLookingAtEveryVoxel) {
   const SemanticMap map = queryMap(31, kind_);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   for (int n = 0; n < 100; ++n) {
     Eigen::Vector3d low(coordinate(), coordinate(), coordinate()), size_of(size(), size(), size());
     if (n % 4 == 0) low = (low * 4).array().round() / 4;  // faces between voxels
@@ -120,7 +120,7 @@ TEST_F(Shapes, BoxesEqualLookingAtEveryVoxel) {
 
 TEST_F(Shapes, SpheresEqualLookingAtEveryVoxel) {
   const SemanticMap map = queryMap(32, kind_);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   for (int n = 0; n < 100; ++n) {
     const Sphere sphere = {{coordinate(), coordinate(), coordinate()}, size()};
     const auto overlaps = [&](const VoxelIndex& voxel) {
@@ -133,7 +133,7 @@ TEST_F(Shapes, SpheresEqualLookingAtEveryVoxel) {
 
 TEST_F(Shapes, OrientedBoxesEqualLookingAtEveryVoxel) {
   const SemanticMap map = queryMap(33, kind_);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   std::vector<Eigen::Isometry3d> poses;
   const OrientedBox vehicle = {Eigen::Isometry3d(Eigen::Translation3d(0.3, 0.0, 0.1)), {0.9, 0.4, 0.3}};
   std::normal_distribution<double> normal;
@@ -161,7 +161,7 @@ TEST_F(Shapes, OrientedBoxesEqualLookingAtEveryVoxel) {
 
 TEST_F(Shapes, ManyAtOnceEqualOneByOne) {
   const SemanticMap map = queryMap(37, kind_);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   std::vector<Eigen::AlignedBox3d> boxes;
   std::vector<Sphere> spheres;
   for (int n = 0; n < 200; ++n) {
@@ -190,7 +190,7 @@ TEST(SpaceContent, NamesTheWorstClass) {
 
 TEST_F(Shapes, RefusesWhatIsNoShape) {
   const SemanticMap map = queryMap(34, kind_);
-  const StateMap states(map);
+  const StateMap states(map, queryRules());
   const auto box = [&](Eigen::Vector3d low, Eigen::Vector3d high) {
     contentOf(states, Eigen::AlignedBox3d(low, high));
   };
@@ -234,10 +234,10 @@ TEST(NearestObstacle, EqualsLookingAtEveryVoxel) {
     QueryMapKind kind;
     kind.occupied = occupied;
     const SemanticMap map = queryMap(35, kind);
-    const StateMap states(map);
+    const StateMap states(map, queryRules());
     std::vector<std::pair<VoxelIndex, ClassId>> obstacles;
     forEachVoxel(kind, [&](const VoxelIndex& voxel) {
-      const VoxelView view = viewWithoutEntropy(map, voxel);
+      const VoxelView view = viewWithoutEntropy(map, queryRules(), voxel);
       if (view.state == VoxelState::kOccupied) obstacles.emplace_back(voxel, view.label);
     });
     std::mt19937 random(36);
@@ -293,7 +293,7 @@ void expectShows(const Section& section, const SemanticMap& map) {
   ASSERT_EQ(section.labels.size(), section.states.size());
   for (std::size_t row = 0; row < section.height; ++row) {
     for (std::size_t column = 0; column < section.width; ++column) {
-      const VoxelView view = viewPoint(map, section.centreOf(column, row));
+      const VoxelView view = viewPoint(map, queryRules(), section.centreOf(column, row));
       ASSERT_EQ(section.states[row * section.width + column], view.state);
       ASSERT_EQ(section.labels[row * section.width + column], view.label);
     }
@@ -302,7 +302,7 @@ void expectShows(const Section& section, const SemanticMap& map) {
 
 TEST(Section, ShowsTheVoxelsAtItsCells) {
   const SemanticMap map = queryMap(37);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   const Section horizontal =
       horizontalSection(states, -0.6, {Eigen::Vector2d(-7.1, -5), Eigen::Vector2d(6.6, 7)});
   EXPECT_EQ(horizontal.width, 56u);  // from -7.25 to 6.75
@@ -348,7 +348,7 @@ TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
   kind.blocks = 2;
   kind.unknown = 0.04;
   const SemanticMap map = queryMap(39, kind);
-  const StateMap states(map, 2);
+  const StateMap states(map, queryRules(), 2);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> coordinate(-5.0, 5.0);
   int boxes_with_any = 0;
@@ -362,7 +362,7 @@ TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
     rules.box = box;
     const auto found = frontiers(states, rules);
     boxes_with_any += !found.empty();
-    EXPECT_EQ(clustersOf(found), slowFrontiers(map, [&](const VoxelIndex& v) {
+    EXPECT_EQ(clustersOf(found), slowFrontiers(map, queryRules(), [&](const VoxelIndex& v) {
                 const Eigen::Array3d low = 0.25 * Eigen::Array3d(v.x, v.y, v.z), high = low + 0.25;
                 return (high > box.min().array()).all() && (low < box.max().array()).all();
               }));
@@ -379,7 +379,7 @@ TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
 
 TEST(Frontiers, RefuseBoxesThatAreNone) {
   const SemanticMap map = queryMap(39);
-  const StateMap states(map, 1);
+  const StateMap states(map, queryRules(), 1);
   const auto sentence = [&](const Eigen::Vector3d& min, const Eigen::Vector3d& max) -> std::string {
     FrontierRules rules;
     rules.box.emplace(min, max);
@@ -406,7 +406,7 @@ TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
     kind.unknown = unknown;
     kind.occupied = 0.01;
     const SemanticMap map = queryMap(38, kind);
-    const StateMap states(map, 2);
+    const StateMap states(map, queryRules(), 2);
     const auto found = frontiers(states);
     FrontierRules without_voxels;
     without_voxels.with_voxels = false;
@@ -426,7 +426,7 @@ TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
                   (before.size() == voxels.size() && before.front() < voxels.front()));
     }
     EXPECT_EQ(clusters.size(), found.size());
-    EXPECT_EQ(clusters, slowFrontiers(map));
+    EXPECT_EQ(clusters, slowFrontiers(map, queryRules()));
     const auto large = frontiers(states, 5);
     EXPECT_EQ(large.size(), std::size_t(std::count_if(found.begin(), found.end(),
                                                       [](const auto& f) { return f.voxels.size() >= 5; })));

@@ -5,17 +5,17 @@
 #include <set>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/query/queries.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
 /// Clusters of frontier voxels, found voxel by voxel. @param counts whether a voxel counts.
 inline std::set<std::set<GridIndex>> slowFrontiers(
-    const SemanticMap& map,
+    const SemanticMap& map, const StateRules& rules,
     const std::function<bool(const VoxelIndex&)>& counts = [](const VoxelIndex&) { return true; }) {
   const auto stateOf = [&](int x, int y, int z) {
-    return viewWithoutEntropy(map, VoxelIndex{{x, y, z}}).state;
+    return viewWithoutEntropy(map, rules, VoxelIndex{{x, y, z}}).state;
   };
   const auto unknown = [&](int x, int y, int z) {
     return stateOf(x, y, z) == VoxelState::kUnknown || stateOf(x, y, z) == VoxelState::kOccluded;

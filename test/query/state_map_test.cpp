@@ -22,9 +22,9 @@ namespace {
 
 /// A snapshot with its states.
 struct Snapshot {
-  explicit Snapshot(SemanticMap of_map) : map(std::move(of_map)), states(map, 1) {}
-  Snapshot(SemanticMap of_map, const Snapshot& earlier)
-      : map(std::move(of_map)), states(map, earlier.states, 1) {}
+  explicit Snapshot(MapSnapshot taken) : map(std::move(taken.map)), states(map, taken.rules, 1) {}
+  Snapshot(MapSnapshot taken, const Snapshot& earlier)
+      : map(std::move(taken.map)), states(map, taken.rules, earlier.states, 1) {}
 
   SemanticMap map;
   StateMap states;
@@ -36,7 +36,7 @@ void expectSameStates(const StateMap& states) {
     ASSERT_EQ(found.block, block);
     bool any_occupied = false, any_free = false, all_free = true;
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
-      const VoxelView view = viewWithoutEntropy(states.map(), index, *block, offset);
+      const VoxelView view = viewWithoutEntropy(states.map(), states.rules(), index, *block, offset);
       ASSERT_EQ(found.state(offset), view.state);
       ASSERT_EQ(found.labels[static_cast<std::size_t>(offset)], view.label);
       any_occupied |= view.state == VoxelState::kOccupied;
@@ -46,14 +46,14 @@ void expectSameStates(const StateMap& states) {
     ASSERT_EQ(found.any_occupied, any_occupied);
     ASSERT_EQ(found.any_free, any_free);
     ASSERT_EQ(found.all_free, all_free);
-    const auto glance = states.region(SemanticMap::regionOf(index))->glance(states.map(), index);
+    const auto glance = states.region(SemanticMap::regionOf(index))->glance(states, index);
     ASSERT_EQ(glance.any_occupied, any_occupied);
     ASSERT_EQ(glance.all_free, all_free);
   }
 }
 
 void expectSameFrontiers(const StateMap& states) {
-  const StateMap fresh(states.map(), 1);
+  const StateMap fresh(states.map(), states.rules(), 1);
   const std::vector<Frontier> found = frontiers(states), expected = frontiers(fresh);
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t f = 0; f < found.size(); ++f) {
@@ -70,6 +70,9 @@ class RandomChanges {
 
   SemanticMap emptyMap() const { return {GridGeometry(0.25), 0.001, 8}; }
   std::size_t draw(std::size_t below) { return random_() % below; }
+  /// The present rules, which changes may replace.
+  const StateRules& rules() const { return rules_; }
+  MapSnapshot snapshotOf(SemanticMap& map) const { return {map.snapshot(), rules_}; }
 
   void change(SemanticMap& map) {
     switch (draw(12)) {
@@ -92,12 +95,12 @@ class RandomChanges {
         break;
       }
       case 3:
-        map.setFreeGain(static_cast<ClassId>(3 * draw(2)), 0.2 + 3.0 * unit());
+        rules_ = rules_.withFreeGain(static_cast<ClassId>(3 * draw(2)), 0.2 + 3.0 * unit());
         break;
       case 4:
-        map.setGainPersistence(draw(2) == 0 ? 0.0 : 3.0 * unit());
-        map.setRemainingGain(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
-        map.setNeighbourhoodRatio(draw(3) == 0 ? 0.0 : 3.0 * unit(), draw(3) == 0 ? 0b1000 : 0b1001);
+        rules_ = rules_.withPersistence(draw(2) == 0 ? 0.0 : 3.0 * unit());
+        rules_ = rules_.withRemaining(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
+        rules_ = rules_.withNeighbourhood(draw(3) == 0 ? 0.0 : 3.0 * unit(), draw(3) == 0 ? 0b1000 : 0b1001);
         break;
       case 5:
         if (draw(15) == 0) map.clear();
@@ -144,6 +147,7 @@ class RandomChanges {
   }
 
   std::mt19937 random_;
+  StateRules rules_;
 };
 
 TEST(StateMap, TakesOverWhatItWouldDecideItself) {
@@ -151,7 +155,7 @@ TEST(StateMap, TakesOverWhatItWouldDecideItself) {
     RandomChanges changes(seed);
     SemanticMap map = changes.emptyMap();
     for (int n = 0; n < 20; ++n) changes.change(map);
-    auto last = std::make_unique<Snapshot>(map.snapshot());
+    auto last = std::make_unique<Snapshot>(changes.snapshotOf(map));
     std::unique_ptr<Snapshot> before_last;
     for (int step = 0; step < 60; ++step) {
       // Some snapshots are asked for everything, some for a part, some for nothing.
@@ -164,7 +168,7 @@ TEST(StateMap, TakesOverWhatItWouldDecideItself) {
       }
       for (std::size_t n = changes.draw(3); n-- > 0;) changes.change(map);
       if (step == 59) changes.scan(map);
-      auto next = std::make_unique<Snapshot>(map.snapshot(), *last);
+      auto next = std::make_unique<Snapshot>(changes.snapshotOf(map), *last);
       if (changes.draw(2) == 0) before_last = std::move(last);  // else it is freed, before or after the next
       last = std::move(next);
       if (changes.draw(2) == 0) before_last = nullptr;
@@ -177,7 +181,7 @@ TEST(StateMap, TakesOverWhatItWouldDecideItself) {
       ASSERT_NO_FATAL_FAILURE(expectSameFrontiers(before_last->states));
     }
     ASSERT_GT(map.size(), 20u);
-    EXPECT_EQ(clustersOf(frontiers(last->states)), slowFrontiers(map));
+    EXPECT_EQ(clustersOf(frontiers(last->states)), slowFrontiers(map, changes.rules()));
   }
 }
 
@@ -235,11 +239,12 @@ SemanticMap rowOfRegions() {
 
 TEST(StateMap, DecidesUnchangedBlocksOnce) {
   SemanticMap map = rowOfRegions();
-  Snapshot first(map.snapshot());
+  StateRules rules;
+  Snapshot first({map.snapshot(), rules});
   frontiers(first.states);
   const std::vector<EvidenceUnits> plane(kBlockVoxels, unitsOf(1.0));
   map.getOrAllocate({{0, 0, 0}}).add(3, plane.data());
-  const Snapshot second(map.snapshot(), first);
+  const Snapshot second({map.snapshot(), rules}, first);
   EXPECT_NE(second.states.find({{0, 0, 0}}), first.states.find({{0, 0, 0}}));
   EXPECT_EQ(second.states.find({{Region::kEdge - 1, 0, 0}}), first.states.find({{Region::kEdge - 1, 0, 0}}));
   const auto kept = [](const Snapshot& snapshot, int region) {
@@ -250,20 +255,20 @@ TEST(StateMap, DecidesUnchangedBlocksOnce) {
   EXPECT_EQ(kept(second, 1), nullptr) << "its neighbour has changed";
   EXPECT_NE(kept(second, 2), nullptr);
   EXPECT_EQ(kept(second, 2), kept(first, 2));
-  map.setFreeGain(7, 2.0);
-  const Snapshot third(map.snapshot(), second);
-  EXPECT_EQ(kept(third, 2), nullptr) << "gains have changed";
+  rules = rules.withFreeGain(7, 2.0);
+  const Snapshot third({map.snapshot(), rules}, second);
+  EXPECT_EQ(kept(third, 2), nullptr) << "the rules have changed";
   EXPECT_NE(third.states.find({{16, 0, 0}}), second.states.find({{16, 0, 0}}));
 }
 
 TEST(StateMap, KeepsNoEarlierOne) {
   SemanticMap map = rowOfRegions();
-  auto last = std::make_unique<Snapshot>(map.snapshot());
+  auto last = std::make_unique<Snapshot>(MapSnapshot{map.snapshot(), {}});
   frontiers(last->states);
   const std::weak_ptr<const RegionFrontiers> of_first = last->states.keptFrontiers(map.positionOf({0, 0, 0}));
   const std::vector<EvidenceUnits> plane(kBlockVoxels, unitsOf(1.0));
   map.getOrAllocate({{0, 0, 0}}).add(3, plane.data());
-  auto next = std::make_unique<Snapshot>(map.snapshot(), *last);
+  auto next = std::make_unique<Snapshot>(MapSnapshot{map.snapshot(), {}}, *last);
   last = std::move(next);
   EXPECT_TRUE(of_first.expired());
 }
@@ -273,7 +278,7 @@ TEST(StateMap, IsAskedAndTakenOverAtOnce) {
   SemanticMap map = changes.emptyMap();
   for (int n = 0; n < 20; ++n) changes.change(map);
   using Shared = std::shared_ptr<const Snapshot>;
-  Shared last = std::make_shared<const Snapshot>(map.snapshot());
+  Shared last = std::make_shared<const Snapshot>(changes.snapshotOf(map));
   std::atomic<bool> done{false};
   const auto ask = [&](bool whole) {
     while (!done) {
@@ -288,7 +293,7 @@ TEST(StateMap, IsAskedAndTakenOverAtOnce) {
   std::thread searching([&] { ask(true); }), reading([&] { ask(false); });
   for (int step = 0; step < 300; ++step) {
     changes.change(map);
-    std::atomic_store(&last, std::make_shared<const Snapshot>(map.snapshot(), *last));
+    std::atomic_store(&last, std::make_shared<const Snapshot>(changes.snapshotOf(map), *last));
   }
   done = true;
   searching.join();
@@ -301,11 +306,11 @@ TEST(Frontiers, PreparedInWholeOrInPartEqualLookingAtEveryVoxel) {
   RandomChanges changes(4);
   SemanticMap map = changes.emptyMap();
   for (int n = 0; n < 80; ++n) changes.change(map);
-  const auto all = slowFrontiers(map);
+  const auto all = slowFrontiers(map, changes.rules());
   const std::size_t regions = map.regionCount();
   ASSERT_GT(regions, 3u);
   for (const std::size_t most : {std::size_t{0}, regions / 2, regions}) {
-    const StateMap states(map, 1);
+    const StateMap states(map, changes.rules(), 1);
     std::size_t prepared = 0;
     prepareFrontiers(states, [&] { return prepared++ < most; });
     std::size_t kept = 0;
@@ -314,7 +319,7 @@ TEST(Frontiers, PreparedInWholeOrInPartEqualLookingAtEveryVoxel) {
     EXPECT_EQ(clustersOf(frontiers(states)), all);
   }
   for (int n = 0; n < 20; ++n) {
-    const StateMap states(map, 1);
+    const StateMap states(map, changes.rules(), 1);
     std::thread ahead([&] { prepareFrontiers(states, [] { return true; }); });
     const auto found = clustersOf(frontiers(states));
     ahead.join();
@@ -326,13 +331,14 @@ TEST(Frontiers, OfManyRegionsEqualLookingAtEveryVoxel) {
   RandomChanges changes(3);
   SemanticMap map = changes.emptyMap();
   for (int n = 0; n < 80; ++n) changes.change(map);
-  const auto all = slowFrontiers(map);
+  const auto all = slowFrontiers(map, changes.rules());
   // Boxes that contain some regions, and cut others: a region has an edge of 16 m.
   for (const double low : {-17.0, -16.0, -0.25, 3.1}) {
     FrontierRules rules;
     rules.box.emplace(Eigen::Vector3d(low, -16.0, -16.0), Eigen::Vector3d(24.0, 16.0, 16.0));
-    const StateMap states(map, 2);
-    const auto in_box = slowFrontiers(map, [&](const VoxelIndex& v) { return 0.25 * (v.x + 1) > low; });
+    const StateMap states(map, changes.rules(), 2);
+    const auto in_box =
+        slowFrontiers(map, changes.rules(), [&](const VoxelIndex& v) { return 0.25 * (v.x + 1) > low; });
     EXPECT_EQ(clustersOf(frontiers(states, rules)), in_box);
     EXPECT_EQ(clustersOf(frontiers(states)), all);
     EXPECT_EQ(clustersOf(frontiers(states, rules)), in_box) << "although all are kept";

@@ -28,7 +28,7 @@ class KeptCity : public testing::Test {
     SemanticMapper maker(configOf(), reference::smallTable());
     std::uint64_t stamp = 1000;
     for (double x = -150.0; x <= 350.0; x += 12.0) maker.integrate(scanAt(x, 8.0, ++stamp));
-    whole_.emplace(maker.snapshot());
+    whole_.emplace(maker.snapshot().map);
     info_ = infoOfMapper(maker);
     info_.frame = "map";
     info_.parameters = "";
@@ -124,7 +124,7 @@ class KeptCity : public testing::Test {
     for (const GridIndex& tile : tiles) mapper.addMap(city.takeRegion(tile));
     if (!cleared.isEmpty()) mapper.clearBox(cleared);
     for (const Scan& scan : scans) mapper.integrate(scan);
-    return mapper.snapshot();
+    return mapper.snapshot().map;
   }
 
   TemporaryFolder folder_{memoryFolder()};

@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "ros/cloud_conversion.h"
 #include "spinning_lidar.h"
 
@@ -319,7 +319,7 @@ std::pair<std::size_t, std::size_t> freeVoxels(const Scan& scan, float max_range
   EXPECT_EQ(counts.points, scan.points.size() + scan.no_returns.size());
   EXPECT_EQ(counts.no_returns + counts.no_direction, scan.no_returns.size());
   std::size_t all = 0, hidden = 0;
-  forEachKnownVoxel(mapper.map(), [&](const VoxelIndex& voxel, const VoxelView& view) {
+  forEachKnownVoxel(mapper.map(), mapper.rules(), [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state != VoxelState::kFree) return;
     const Eigen::Vector3f centre = mapper.map().geometry().voxelCentre(voxel).cast<float>();
     const float range = centre.norm();

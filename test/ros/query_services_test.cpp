@@ -44,7 +44,7 @@ SemanticMap rowOfClasses(std::size_t last) {
 
 CheckSpace::Response check(std::size_t last, const std::vector<std::string>& worst_first) {
   const ClassTable classes = table();
-  const QueriedMap map(std_msgs::Header(), rowOfClasses(last), classes);
+  const QueriedMap map(std_msgs::Header(), {rowOfClasses(last), {}}, classes);
   CheckSpace::Request asked;
   asked.poses.resize(1);
   asked.poses[0].position.x = 4.0;
@@ -76,7 +76,7 @@ TEST(CheckSpace, TheWorstClassIsTheOneThatLives) {
 
 TEST(CheckSpace, AllShapesOfACallCountTogether) {
   const ClassTable classes = table();
-  const QueriedMap map(std_msgs::Header(), rowOfClasses(0), classes);
+  const QueriedMap map(std_msgs::Header(), {rowOfClasses(0), {}}, classes);
   CheckSpace::Request asked;
   asked.radii = {120.0};  // some 1.4e7 voxels in the box about it
   asked.poses.resize(1);
@@ -99,7 +99,7 @@ TEST(GetNearestObstacles, ACallEndsInTime) {
     block.add(2, much.data());
     block.add(3, little.data());
   }
-  const QueriedMap queried(std_msgs::Header(), std::move(map), classes);
+  const QueriedMap queried(std_msgs::Header(), {std::move(map), {}}, classes);
   GetNearestObstacles::Request asked;
   GetNearestObstacles::Response answer;
   asked.points.resize(GetNearestObstacles::Request::MOST_POINTS);
@@ -127,7 +127,7 @@ TEST(GetFrontiers, ListedVoxelsAreLimited) {
   const std::vector<EvidenceUnits> plane(kBlockVoxels, unitsOf(1.0));
   constexpr int kBlocks = 3500, kSurface = 8 * 8 * 8 - 6 * 6 * 6;
   for (int n = 0; n < kBlocks; ++n) map.getOrAllocate({{2 * n, 0, 0}}).add(kFreeClass, plane.data());
-  const QueriedMap queried(std_msgs::Header(), std::move(map), classes);
+  const QueriedMap queried(std_msgs::Header(), {std::move(map), {}}, classes);
   GetFrontiers::Request asked;
   GetFrontiers::Response answer;
   query(queried, asked, answer);

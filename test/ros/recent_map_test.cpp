@@ -14,8 +14,11 @@ class RecentMapTest : public testing::Test {
   RecentMap::Shared take(const QueriedMap* earlier) {
     if (no_memory_) throw std::bad_alloc();
     ++taken_;
-    if (!earlier) return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_);
-    return std::make_shared<const QueriedMap>(std_msgs::Header(), map_.snapshot(), classes_, *earlier);
+    if (!earlier)
+      return std::make_shared<const QueriedMap>(std_msgs::Header(),
+                                                bki_mapping::MapSnapshot{map_.snapshot(), {}}, classes_);
+    return std::make_shared<const QueriedMap>(
+        std_msgs::Header(), bki_mapping::MapSnapshot{map_.snapshot(), {}}, classes_, *earlier);
   }
   void mapScan(RecentMap& recent) {
     map_.getOrAllocate({{scans_++, 0, 0}});

@@ -9,8 +9,8 @@
 #include <tuple>
 
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "cloud_maker.h"
 #include "ros/pose_conversion.h"
 #include "ros/scan_reader.h"
@@ -532,7 +532,7 @@ void expectShares(const SoftLabels& soft) {
 void expectSaneEvidence(const SemanticMap& map) {
   for (const auto& entry : map.entries()) {
     for (int v = 0; v < kBlockVoxels; ++v) {
-      const VoxelView view = viewWithoutEntropy(map, entry.index, *entry.block, v);
+      const VoxelView view = viewWithoutEntropy(map, StateRules(), entry.index, *entry.block, v);
       ASSERT_TRUE(std::isfinite(view.probability) && std::isfinite(view.variance));
       for (const ClassId id : entry.block->classes()) {
         ASSERT_GE(entry.block->evidence(id)[v], 0) << "class " << int{id};

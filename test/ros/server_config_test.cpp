@@ -179,7 +179,7 @@ TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
   LiveSettings::take(config, server, mapper);
   EXPECT_EQ(mapper.free_space.mode, "linear");
   EXPECT_EQ(mapper.sensor_model.max_range, 40.0);
-  EXPECT_TRUE(mapper.free_space.hits_before_misses);
+  EXPECT_TRUE(mapper.scan_limit.hits_before_misses);
   EXPECT_EQ(server.color_mode, ColorMode::kHeight);
   config.resolution = 0.1;
   config.view_range = 7.0;

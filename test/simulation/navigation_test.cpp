@@ -254,9 +254,9 @@ class DrivingRobot {
   /// Scans, and decides where to go.
   void look(const planner::Pose& goal) {
     scan();
-    const SemanticMap map = mapper_->snapshot();
+    const MapSnapshot now = mapper_->snapshot();
     const Eigen::AlignedBox3d area(Eigen::Vector3d(-5.0, -9.0, -2.5), Eigen::Vector3d(45.0, 12.0, 1.0));
-    const planner::Street street(map, mapper_->classes(), area);
+    const planner::Street street(now.map, now.rules, mapper_->classes(), area);
     if (isStillGood(street)) return;
     way_.clear();
     try {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bki_mapping/io/yaml.h"
-#include "bki_mapping/map/voxel_state.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "simulation/lidar.h"
 
 namespace bki_mapping::simulation {
@@ -71,7 +71,7 @@ Kept map(const std::string& preset, std::size_t warnings) {
   const auto occupied = [&](const std::vector<Eigen::Vector3d>& points) {
     std::size_t count = 0;
     for (const Eigen::Vector3d& point : points) {
-      count += viewPoint(mapper.map(), point).state == VoxelState::kOccupied;
+      count += viewPoint(mapper.map(), mapper.rules(), point).state == VoxelState::kOccupied;
     }
     return static_cast<double>(count) / static_cast<double>(points.size());
   };

@@ -179,7 +179,7 @@ TEST(MapKeeper, AddsMapsAndForgetsThem) {
   const auto mapOf = [](const std::vector<Scan>& some) {
     SemanticMapper mapper(configOf(), reference::smallTable());
     for (const Scan& scan : some) mapper.integrate(scan);
-    return mapper.snapshot();
+    return mapper.snapshot().map;
   };
   Kept kept(path, "a");
   for (const Scan& scan : first) kept.integrate(scan);

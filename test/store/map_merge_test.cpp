@@ -11,7 +11,7 @@
 #include <new>
 #include <sstream>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "reference/content.h"
 #include "store/drive_overlap.h"
 #include "store/grid_transform.h"

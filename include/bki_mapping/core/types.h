@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -13,6 +14,8 @@ using ClassId = std::uint8_t;
 constexpr std::size_t kMaxClasses = 254;
 /// Stands for `free` wherever a class id is stored; never an id of a class table.
 constexpr ClassId kFreeClass = 255;
+/// A set of classes; may contain kFreeClass.
+using ClassSet = std::bitset<256>;
 
 /// Edge of a block [voxels] and the number of voxels in it.
 constexpr int kBlockEdge = 8;

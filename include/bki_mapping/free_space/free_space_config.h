@@ -16,8 +16,6 @@ struct FreeSpaceConfig {
   BeamWeight weight = BeamWeight::kBilinear;            ///< mode line
   FreeSpaceExtent extent = FreeSpaceExtent::kObserved;  ///< mode line
   BeamIndexType beam_index = BeamIndexType::kTable;     ///< mode line, and occlusion
-  bool hits_before_misses = false;      ///< a voxel with a hit takes no evidence for `free` from its scan
-  bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
 };
 
 }  // namespace bki_mapping

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -22,15 +22,15 @@ struct [[gnu::packed]] VoxelRecord {
 VoxelStates parseStates(const std::string& list);
 
 /// The voxels in the given states, blocks in sorted order.
-std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const ClassTable& classes,
-                                       const VoxelStates& states);
+std::vector<VoxelRecord> collectVoxels(const SemanticMap& map, const StateRules& rules,
+                                       const ClassTable& classes, const VoxelStates& states);
 
 /// Exports a map; the file appears complete or not at all. The extension, .ply or .pcd, chooses the format
 /// (both binary). Coordinates are float32; far from the origin, they are float64 in a PLY file, and in a PCD
 /// file relative to its VIEWPOINT.
 /// @throws std::invalid_argument on another extension, std::runtime_error if the file cannot be written.
-void exportMap(const std::string& path, const SemanticMap& map, const ClassTable& classes,
-               const VoxelStates& states);
+void exportMap(const std::string& path, const SemanticMap& map, const StateRules& rules,
+               const ClassTable& classes, const VoxelStates& states);
 /// The origin of the coordinates in a PCD file of a map, which the file has as its VIEWPOINT: zero or, far
 /// from it, a place in the map in whole kilometres [m].
 Eigen::Vector3d pcdOrigin(const SemanticMap& map);

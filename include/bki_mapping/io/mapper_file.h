@@ -20,13 +20,19 @@ MapInfo mapInfoOf(const SemanticMapper& mapper, const std::string& frame);
 /// with both values, if the file has another frame, resolution, unit, prior or class table than the mapper.
 StoredMap loadMapFor(const SemanticMapper& mapper, const std::string& path, const std::string& frame);
 
-/// An empty map as MapInfo::emptyMap, with the gains that a file's parameters and class table set, so that
-/// voxels have the states that the mapper gave them. Parameters that this version does not know are ignored.
-/// @param path of the file, for errors. @throws MapFileError if the parameters are not YAML.
-SemanticMap emptyMapWithGains(const std::string& path, const MapInfo& info);
+/// The rules that a file's parameters and class table set, so that voxels have the states that the mapper
+/// gave them. Parameters that this version does not know are ignored.
+/// @param path of the file, for errors. @throws MapFileError if the parameters are not YAML, or not
+/// allowed.
+StateRules storedRules(const std::string& path, const MapInfo& info);
 
-/// Reads a whole map as loadMap, into the map that emptyMapWithGains gives, to be asked. TiledMap reads a
-/// part of one, or of a city. DriveRecord::part is as in the file. @throws as these.
-StoredMap loadMapWithGains(const std::string& path);
+/// A stored map with the rules that say what its voxels are.
+struct RuledMap : StoredMap {
+  StateRules rules;
+};
+
+/// Reads a whole map as loadMap, with its rules. TiledMap reads a part of one, or of a city.
+/// DriveRecord::part is as in the file. @throws as loadMap and storedRules.
+RuledMap loadRuledMap(const std::string& path);
 
 }  // namespace bki_mapping

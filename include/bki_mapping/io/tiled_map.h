@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_file.h"
 
 namespace bki_mapping {
@@ -63,19 +64,18 @@ class TiledMap {
   /// The map file, or nullptr for a city.
   MapFile* file();
 
-  /// Reads the voxels whose centres lie in a box; all others are unknown. The map has the gains of
-  /// emptyMapWithGains.
+  /// Reads the voxels whose centres lie in a box; all others are unknown. The rules are those of storedRules.
   /// @param box map frame [m], faces included; may be infinite. @param memory_limit for the map [bytes]; 0:
   /// no limit. @throws MapFileError also if the tiles take more memory, and then before it is allocated;
   /// std::invalid_argument if a corner of the box is not a number.
   /// @return DriveRecord::part is as in the file; of a city, the drives are those of the regions that the box
   /// touches.
-  StoredMap readBox(const Eigen::AlignedBox3d& box, std::size_t memory_limit = 0);
+  RuledMap readBox(const Eigen::AlignedBox3d& box, std::size_t memory_limit = 0);
   /// Reads whole tiles; those that the map lacks stay unknown. @throws as readBox.
-  StoredMap readTiles(const std::vector<GridIndex>& tiles, std::size_t memory_limit = 0);
+  RuledMap readTiles(const std::vector<GridIndex>& tiles, std::size_t memory_limit = 0);
   /// Reads the tiles that contain points. @param points map frame [m]; those beyond the grid are skipped.
   /// @throws as readBox; std::invalid_argument if a coordinate is not finite.
-  StoredMap readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit = 0);
+  RuledMap readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit = 0);
   /// The tiles with voxels in a box that the map has, sorted by file. Reads no content of tiles.
   std::vector<TileEntry> tilesIn(const Eigen::AlignedBox3d& box);
   /// The files that may have tiles of a box, as positions in regions(); 0 for a map file. Opens none of them.

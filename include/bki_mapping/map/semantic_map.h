@@ -1,15 +1,11 @@
-/// @file The map: a sparse grid of blocks, shared with its snapshots and copied when written. (The state of a
-/// voxel: voxel_state.h.) clearBox() erases a part of it.
+/// @file The map: a sparse grid of blocks, shared with its snapshots and copied when written. It holds
+/// evidence and decides nothing. (The state of a voxel: rules/voxel_state.h.) clearBox() erases a part of it.
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <bitset>
-#include <cmath>
 #include <cstddef>
-#include <limits>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/core/grid_geometry.h"
@@ -33,9 +29,7 @@ class SemanticMap {
   /// @param prior concentration alpha0 of each class before any scan, > 0.
   /// @param class_count number of classes in the table, `free` not counted, 1 to 254.
   SemanticMap(const GridGeometry& geometry, double prior, std::size_t class_count)
-      : geometry_(geometry), prior_(prior), class_count_(class_count) {
-    free_gains_.fill(1.0f);
-  }
+      : geometry_(geometry), prior_(prior), class_count_(class_count) {}
   // Copies would not know that they share blocks: snapshot() makes one.
   SemanticMap(const SemanticMap&) = delete;
   SemanticMap& operator=(const SemanticMap&) = delete;
@@ -47,58 +41,6 @@ class SemanticMap {
   std::size_t classCount() const { return class_count_; }
   /// Sum of a voxel's concentrations before any scan.
   double priorSum() const { return prior_ * static_cast<double>(class_count_ + 1); }
-
-  /// Gain on the evidence for `free` when the state of a voxel is decided; 1 unless set. With a persistence
-  /// P > 0, a gain above 1 decays towards 1 as 1 + (gain - 1) exp(-hits / P), so that an object that is hit
-  /// scan after scan stays occupied even if its class can move (Equation 12 in docs/method.md).
-  /// @param id of the class with the most evidence. @param hits the evidence for that class.
-  float freeGain(ClassId id, float hits) const {
-    const float gain = free_gains_[id];
-    if (gain <= 1.0f || gain_persistence_ <= 0.0f) return gain;
-    return 1.0f + (gain - 1.0f) * std::exp(-hits / gain_persistence_);
-  }
-  void setFreeGain(ClassId id, double gain) { free_gains_[id] = finite(gain); }
-  /// @param persistence in units of evidence; 0: gains do not decay.
-  void setGainPersistence(double persistence) { gain_persistence_ = static_cast<float>(persistence); }
-
-  using Classes = std::bitset<256>;
-  /// Gain by which the likeliest of the fixed classes, those that cannot move, holds a voxel that its
-  /// likeliest class does not; 0, the default: such a voxel is free (Equation 12a in docs/method.md).
-  float remainingGain() const { return remaining_gain_; }
-  bool isFixed(ClassId id) const { return fixed_[id]; }
-  void setRemainingGain(double gain, const Classes& fixed) {
-    constexpr double kLeast = std::numeric_limits<float>::min();  // 0 would switch the rule off
-    remaining_gain_ = gain > 0.0 ? finite(std::max(gain, kLeast)) : 0.0f;
-    fixed_ = fixed;
-  }
-  /// The ratio of evidence at which its neighbourhood keeps a voxel whose likeliest class asks it; 0, the
-  /// default: each voxel decides by itself (Equation 12b in docs/method.md).
-  float neighbourhoodRatio() const { return neighbourhood_ratio_; }
-  bool asksNeighbourhood(ClassId id) const { return asking_[id]; }
-  /// Whether the neighbourhood of a voxel includes voxels below it.
-  bool neighbourhoodIsBelow() const { return neighbourhood_is_below_; }
-  /// @param is_below false where floors ask, too: they would keep whatever moves on them.
-  void setNeighbourhoodRatio(double ratio, const Classes& asking, bool is_below = true) {
-    neighbourhood_ratio_ = finite(ratio);
-    asking_ = asking;
-    neighbourhood_is_below_ = is_below;
-  }
-  /// The most that one voxel counts for in a neighbourhood [units].
-  EvidenceUnits mostVote() const {
-    constexpr float kPersistences = 8.0f, kMost = kMostVote * kEvidenceUnit;
-    if (!(gain_persistence_ > 0.0f)) return kMostVote;
-    return std::max(unitsOf(std::min(kPersistences * gain_persistence_, kMost)), 1);
-  }
-  /// The same without a persistence, or with one above 16; sums over a neighbourhood then still fit 32 bits.
-  static constexpr EvidenceUnits kMostVote = 1 << 23;
-  /// Whether equal blocks of both maps, with equal blocks around, have the same states and labels.
-  bool decidesAs(const SemanticMap& other) const {
-    return free_gains_ == other.free_gains_ && gain_persistence_ == other.gain_persistence_ &&
-           (neighbourhood_ratio_ == 0.0f ||
-            (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_)) &&
-           neighbourhood_ratio_ == other.neighbourhood_ratio_ && remaining_gain_ == other.remaining_gain_ &&
-           (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
-  }
 
   /// All blocks, in unspecified order: a range for `for (const auto& [index, block] : map.entries())`.
   Entries entries() const;
@@ -147,7 +89,8 @@ class SemanticMap {
     const std::uint32_t position = positionOf(region);
     return position == kNoPosition ? nullptr : regions_[position].region.get();
   }
-  /// Moves the blocks of a region to a map of their own, which has the same settings. Copies no block.
+  /// Moves the blocks of a region to a map of their own, which has the same grid, prior and number of
+  /// classes. Copies no block.
   /// @return an empty map if this one has no such region. @throws std::bad_alloc; the map is then unchanged.
   SemanticMap takeRegion(const GridIndex& region);
 
@@ -190,12 +133,6 @@ class SemanticMap {
   std::size_t indexBytes() const;
 
  private:
-  /// Not infinite, whose product with no evidence would be no number.
-  static float finite(double gain) {
-    constexpr double kMost = 1e30;  // its product with the largest evidence is finite, too
-    return static_cast<float>(std::min(gain, kMost));
-  }
-
   /// Regions are never empty.
   struct SharedRegion {
     std::shared_ptr<Region> region;
@@ -214,16 +151,12 @@ class SemanticMap {
   void reserveRegions(std::size_t regions, std::size_t blocks);
   /// Adds a region that the map lacks.
   void attach(SharedRegion region) noexcept;
-  /// A map with the same settings, and no blocks.
+  /// A map with the same grid, prior and number of classes, and no blocks.
   SemanticMap emptyLikeThis() const;
 
   GridGeometry geometry_;
   double prior_;
   std::size_t class_count_;
-  std::array<float, 256> free_gains_;
-  float gain_persistence_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
-  Classes fixed_, asking_;
-  bool neighbourhood_is_below_ = true;
   std::vector<SharedRegion> regions_;
   GridTable region_position_;  ///< of each region in regions_
   std::size_t size_ = 0;       ///< number of blocks
@@ -283,6 +216,9 @@ class SemanticMap::Entries {
 inline SemanticMap::Entries SemanticMap::entries() const {
   return Entries(regions_);
 }
+
+/// All blocks, sorted by index (z, then y, then x), so that output does not depend on the order of creation.
+std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map);
 
 /// Erases all evidence and occlusion marks of the voxels whose centres lie in a box or on its faces. They are
 /// then unknown, as if no scan had reached them. Planes and blocks that become empty are erased.

@@ -10,8 +10,8 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/free_space/free_space_config.h"
 #include "bki_mapping/kernel/kernel_config.h"
-#include "bki_mapping/map/free_gain_config.h"
-#include "bki_mapping/update/scan_limit_config.h"
+#include "bki_mapping/rules/free_gain_config.h"
+#include "bki_mapping/rules/scan_limit_config.h"
 
 namespace bki_mapping {
 

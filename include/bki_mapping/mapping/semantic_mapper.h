@@ -9,6 +9,7 @@
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/scan_stats.h"
+#include "bki_mapping/rules/state_rules.h"
 
 namespace bki_mapping {
 
@@ -49,7 +50,7 @@ class SemanticMapper {
   /// Clears a box of the map (bki_mapping::clearBox). @return the blocks that changed.
   std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
 
-  /// Replaces the settings. The map stays; the states of its voxels follow the new gains.
+  /// Replaces the settings. The map stays; the states of its voxels follow the new rules.
   /// @throws std::invalid_argument if a setting is not allowed, or differs but can change only at the start
   /// (Changes::kAtStart); the settings are then unchanged.
   void reconfigure(const MapperConfig& config);
@@ -72,8 +73,9 @@ class SemanticMapper {
     return erased;
   }
 
-  /// A copy of the map as it is now, which other threads may read (SemanticMap::snapshot).
-  SemanticMap snapshot() { return map_.snapshot(); }
+  /// The map as it is now with the rules that say what its voxels are, for other threads to read
+  /// (SemanticMap::snapshot).
+  MapSnapshot snapshot() { return {map_.snapshot(), state_rules_}; }
 
   /// The blocks that the last integrate() or withdraw() may have changed, created or erased, each once.
   const std::vector<GridIndex>& touchedBlocks() const;
@@ -81,6 +83,8 @@ class SemanticMapper {
   std::size_t mapBytes() const { return block_bytes_ + map_.indexBytes(); }
 
   const SemanticMap& map() const { return map_; }
+  /// What decides the states of the map's voxels.
+  const StateRules& rules() const { return state_rules_; }
   const ClassTable& classes() const { return *classes_; }
   const std::shared_ptr<const ClassTable>& sharedClasses() const { return classes_; }
   const MapperConfig& config() const { return config_; }
@@ -98,11 +102,11 @@ class SemanticMapper {
   /// Adds a map, and counts the memory that it takes.
   template <typename Map>
   void addCounting(Map&& other);
-  void setGains();
 
   MapperConfig config_;
   std::shared_ptr<const ClassTable> classes_;
   SemanticMap map_;
+  StateRules state_rules_;
   std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<Pipeline> pipeline_;  ///< nullptr between a failure and the next scan
   std::vector<GridIndex> no_blocks_;

@@ -1,5 +1,5 @@
 /// @file The states of a map's voxels, kept once they have been read: what all queries work on. (How a state
-/// is decided: map/voxel_state.h.)
+/// is decided: rules/voxel_state.h.)
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -69,19 +69,24 @@ class StateMap {
   /// Takes microseconds. @param map which must outlive this and not change meanwhile: a snapshot.
   /// @param threads that batches of queries use, the caller's among them; 0: all cores.
   /// @throws std::invalid_argument if `threads` is negative or above 1024.
-  explicit StateMap(const SemanticMap& map, int threads = 0);
+  StateMap(const SemanticMap& map, const StateRules& rules, int threads = 0);
+  explicit StateMap(const MapSnapshot& snapshot, int threads = 0)
+      : StateMap(snapshot.map, snapshot.rules, threads) {}
   /// The same, but shares with another StateMap what that one has decided of the blocks that both maps share.
   /// Where both maps have the same whole region, also what either of them will decide. All queries give the
   /// same answers as without. Takes some 20 ns for each shared block in regions that have changed.
-  /// @param earlier which need not outlive the call; queries may be asked of it meanwhile. If its map decides
-  /// states by other gains, nothing is taken over. Any other map is allowed, but pays only if it shares
+  /// @param earlier which need not outlive the call; queries may be asked of it meanwhile. If its rules
+  /// decide otherwise, nothing is taken over. Any other map is allowed, but pays only if it shares
   /// blocks: an earlier snapshot of the same map.
-  StateMap(const SemanticMap& map, const StateMap& earlier, int threads = 0);
+  StateMap(const SemanticMap& map, const StateRules& rules, const StateMap& earlier, int threads = 0);
+  StateMap(const MapSnapshot& snapshot, const StateMap& earlier, int threads = 0)
+      : StateMap(snapshot.map, snapshot.rules, earlier, threads) {}
   ~StateMap();
   StateMap(const StateMap&) = delete;
   StateMap& operator=(const StateMap&) = delete;
 
   const SemanticMap& map() const { return map_; }
+  const StateRules& rules() const { return rules_; }
   const GridGeometry& geometry() const { return map_.geometry(); }
 
   /// The blocks of one region, by Region::numberOf.
@@ -126,6 +131,7 @@ class StateMap {
   void takeOver(const StateMap& earlier);
 
   const SemanticMap& map_;
+  StateRules rules_;
   int threads_;
   GridBounds bounds_{{1, 1, 1}, {0, 0, 0}};
   mutable std::vector<Known> regions_;  ///< by their positions in the map
@@ -150,17 +156,17 @@ class StateMap::RegionStates {
   };
 
   /// @param index in this region.
-  Glance glance(const SemanticMap& map, const BlockIndex& index) const {
+  Glance glance(const StateMap& states, const BlockIndex& index) const {
     const std::uintptr_t known = slot(index).load(std::memory_order_acquire);
-    return glanceOf(known != kNotRead ? known : read(map, index));
+    return glanceOf(known != kNotRead ? known : read(states, index));
   }
   /// As StateMap::find. @param index in this region.
-  const BlockStates* find(const SemanticMap& map, const BlockIndex& index) const {
-    return glance(map, index).block;
+  const BlockStates* find(const StateMap& states, const BlockIndex& index) const {
+    return glance(states, index).block;
   }
   void prefetch(const BlockIndex& index) const { __builtin_prefetch(&slot(index)); }
   /// Decides all blocks, which takes three quarters of the time that it takes one by one.
-  void readAll(const SemanticMap& map) const;
+  void readAll(const StateMap& states) const;
 
  private:
   friend class StateMap;
@@ -177,7 +183,7 @@ class StateMap::RegionStates {
     return blocks_[static_cast<std::size_t>(Region::numberOf(index))];
   }
   /// Decides a block. Threads that do so at once get the same result; one of them keeps it. @return the slot.
-  std::uintptr_t read(const SemanticMap& map, const BlockIndex& index) const;
+  std::uintptr_t read(const StateMap& states, const BlockIndex& index) const;
 
   OwnerCount owners_;
   const Region* region_;  ///< exists as long as a map of which a StateMap owns this
@@ -201,7 +207,7 @@ class BlockReader {
   }
   const BlockStates* find(const BlockIndex& index) {
     const StateMap::RegionStates* const in = region(index);
-    return in ? in->find(states_.map(), index) : nullptr;
+    return in ? in->find(states_, index) : nullptr;
   }
 
  private:

@@ -6,7 +6,7 @@
 
 #include "beams/beams.h"
 #include "beams/raster/beam_slicing.h"
-#include "update/block_group.h"
+#include "map/block_group.h"
 
 namespace bki_mapping {
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "core/float_origin.h"
-#include "map/voxel_color.h"
+#include "io/voxel_color.h"
 #include "ros/map_publisher.h"
 #include "streamed_markers.h"
 
@@ -209,7 +209,7 @@ class CellMarkers : public MapPublisher {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
       const Block* block = snapshot.map.find(index);
       if (!block) continue;
-      readBlock(snapshot.map, index, *block, BlockFields::kStates, view);
+      readBlock(snapshot.map, snapshot.rules, index, *block, BlockFields::kStates, view);
       bool any = false;
       forEachShown(index, view, snapshot, [&](std::size_t v, double) {
         ++cells.of_label[view.label[v]];
@@ -256,7 +256,7 @@ class CellMarkers : public MapPublisher {
     const ColorMode mode = snapshot.config.color_mode;
     const double edge = snapshot.map.geometry().resolution();
     BlockView view;
-    readBlock(snapshot.map, index, block, fieldsOf(mode), view);
+    readBlock(snapshot.map, snapshot.rules, index, block, fieldsOf(mode), view);
     double x[kBlockEdge], y[kBlockEdge];
     for (int n = 0; n < kBlockEdge; ++n) {
       x[n] = (index.x * kBlockEdge + n + 0.5) * edge - origin.x();

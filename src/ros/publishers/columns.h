@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/map/column_map.h"
+#include "bki_mapping/query/column_map.h"
 #include "ros/map_publisher.h"
 #include "ros/sentence_throttle.h"
 
@@ -58,10 +58,10 @@ class ColumnPublisher : public MapPublisher {
   std::set<ColumnMap::StackIndex> look(const MapSnapshot& snapshot, bool& all) {
     const SemanticMap& map = snapshot.map;
     all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
-    if (!all) return columns_.update(map, snapshot.classes, changed.blocks());
+    if (!all) return columns_.update(map, snapshot.rules, snapshot.classes, changed.blocks());
     columns_.start(rulesOf(snapshot.config));
     known_ = true;
-    return columns_.update(map, snapshot.classes);
+    return columns_.update(map, snapshot.rules, snapshot.classes);
   }
 
   /// Calls write(index in the rectangle's arrays, view) for every known column in a rectangle of whole

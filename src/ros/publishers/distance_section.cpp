@@ -37,7 +37,7 @@ class DistanceSection : public MapPublisher {
     const GridGeometry& geometry = snapshot.map.geometry();
     const std::optional<SectionRegion> region = regionOf(config, geometry, snapshot.sensor);
     if (!region) return field_.reset();  // it would miss what changes meanwhile
-    const StateMap states(snapshot.map, snapshot.threadsFor(snapshot.map.size()));
+    const StateMap states(snapshot.map, snapshot.rules, snapshot.threadsFor(snapshot.map.size()));
     bring(states, region->field, obstaclesOf(config, snapshot.classes));
     publisher_.publish(message(snapshot, states, *region));
   }

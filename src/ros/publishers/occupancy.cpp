@@ -9,7 +9,7 @@ namespace {
 template <typename Message>
 void fillMap(const MapSnapshot& snapshot, Message& message) {
   for (const SemanticClass& c : snapshot.classes.classes()) message.classes.push_back(toMessage(c));
-  message.blocks = {&snapshot.map, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
+  message.blocks = {&snapshot, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
 }
 
 class Occupancy : public MapPublisher {
@@ -39,7 +39,7 @@ class OccupancyUpdates : public UpdatePublisher<StreamedUpdate> {
   }
   void fillChanges(const MapSnapshot& snapshot, StreamedUpdate& message) const override {
     const SemanticMap& map = snapshot.map;
-    message.blocks.map = &map;
+    message.blocks.map = &snapshot;
     message.blocks.threads = snapshot.threadsFor(changed.blocks().size());
     message.blocks.blocks.reserve(changed.blocks().size());
     for (const GridIndex& index : changed.blocks()) {

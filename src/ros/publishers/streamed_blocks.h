@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
@@ -26,7 +26,7 @@ struct StreamedBlocks {
     });
   }
 
-  const SemanticMap* map = nullptr;
+  const bki_mapping::MapSnapshot* map = nullptr;
   std::vector<std::pair<BlockIndex, const Block*>> blocks;
   int threads = 1;  ///< that write
 
@@ -36,7 +36,7 @@ struct StreamedBlocks {
 
   void write(const BlockIndex& index, const Block& block, std::uint8_t* to) const {
     BlockView view;
-    readBlock(*map, index, block, BlockFields::kAllButEntropy, view);
+    readBlock(map->map, map->rules, index, block, BlockFields::kAllButEntropy, view);
     OccupancyBlock message;
     message.x = index.x;
     message.y = index.y;

@@ -37,7 +37,7 @@ class StreamedPoints {
   struct Content {
     Content(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
         : pool(snapshot.threadsFor(blocks.size())),
-          points(snapshot.map, snapshot.classes, selection, std::move(blocks), pool) {}
+          points(snapshot.map, snapshot.rules, snapshot.classes, selection, std::move(blocks), pool) {}
 
     ThreadPool pool;
     VoxelPoints points;

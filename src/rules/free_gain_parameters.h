@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/map/free_gain_config.h"
+#include "bki_mapping/rules/free_gain_config.h"
 
 namespace bki_mapping {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "bki_mapping/map/column_map.h"
+#include "bki_mapping/query/column_map.h"
 
 namespace bki_mapping {
 namespace {
@@ -49,11 +49,12 @@ class Columns : public testing::Test {
   ColumnView column(const ColumnRules& rules = {}) const {
     ColumnMap columns;
     columns.start(rules);
-    columns.update(map_, classes_);
+    columns.update(map_, rules_, classes_);
     return *columns.find({{0, 0, 0}});
   }
 
   SemanticMap map_;
+  StateRules rules_;
   ClassTable classes_ = table();
 };
 
@@ -158,7 +159,7 @@ TEST_F(Columns, CostWhatTheirGroundCosts) {
 }
 
 /// The cost, from the definition: of the class at the top of the lowest uninterrupted run of ground.
-int costOf(const SemanticMap& map, const ClassTable& classes, const ColumnView& view,
+int costOf(const SemanticMap& map, const StateRules& rules, const ClassTable& classes, const ColumnView& view,
            const ColumnMap::StackIndex& stack, int cell) {
   if (view.occupancy != Occupancy::kFree) return static_cast<int>(view.occupancy);
   int cost = 0;
@@ -166,7 +167,7 @@ int costOf(const SemanticMap& map, const ClassTable& classes, const ColumnView& 
   for (int z = -24; z < 24; ++z) {
     const VoxelIndex voxel{
         {kBlockEdge * stack.first + cell % kBlockEdge, kBlockEdge * stack.second + cell / kBlockEdge, z}};
-    const VoxelView voxel_view = viewPoint(map, map.geometry().voxelCentre(voxel));
+    const VoxelView voxel_view = viewPoint(map, rules, map.geometry().voxelCentre(voxel));
     const bool ground = voxel_view.state == VoxelState::kOccupied && classes.find(voxel_view.label)->ground;
     if (in_ground && !ground) break;
     if (ground) cost = classes.find(voxel_view.label)->cost;
@@ -179,9 +180,9 @@ TEST_F(Columns, BlocksErasedWithoutNoticeDoNoHarm) {
   add({{0, 0, 1}}, kRoad);
   add({{0, 0, 9}}, kCar);
   ColumnMap kept;
-  kept.update(map_, classes_);
+  kept.update(map_, rules_, classes_);
   map_.erase(GridGeometry::blockOf({{0, 0, 1}}));
-  kept.update(map_, classes_, {GridGeometry::blockOf({{0, 0, 9}})});
+  kept.update(map_, rules_, classes_, {GridGeometry::blockOf({{0, 0, 9}})});
   ASSERT_TRUE(kept.find({{0, 0, 0}}));
   EXPECT_TRUE(std::isnan(kept.find({{0, 0, 0}})->ground)) << "the road is still there";
 }
@@ -192,8 +193,8 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
     return static_cast<int>(random() % static_cast<unsigned>(2 * edge)) - edge;
   };
   ColumnMap kept;
-  map_.setFreeGain(kCar, 3.0);
-  map_.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kCar));
+  rules_ = rules_.withFreeGain(kCar, 3.0);
+  rules_ = rules_.withNeighbourhood(2.0, ClassSet().set(kCar));
   for (int round = 0; round < 30; ++round) {
     std::vector<GridIndex> changed;
     for (int i = 0; i < 20; ++i) {
@@ -210,9 +211,9 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
         }
       }
     }
-    kept.update(map_, classes_, changed);
+    kept.update(map_, rules_, classes_, changed);
     ColumnMap fresh;
-    fresh.update(map_, classes_, allBlocks());
+    fresh.update(map_, rules_, classes_, allBlocks());
     ASSERT_EQ(kept.columns().size(), fresh.columns().size());
     for (const VoxelIndex& voxel :
          {VoxelIndex{{-20, 19, 3}}, VoxelIndex{{7, -8, -99}}, VoxelIndex{{80, 0, 0}}}) {
@@ -227,7 +228,7 @@ TEST_F(Columns, UpdatesEqualARecomputation) {
         const ColumnView &a = columns[c], &b = kept.columns().at(stack)[c];
         ASSERT_TRUE(same(a.ground, b.ground) && same(a.clearance, b.clearance) && a.occluded == b.occluded &&
                     a.occupancy == b.occupancy && a.ground_class == b.ground_class && a.cost == b.cost);
-        ASSERT_EQ(a.cost, costOf(map_, classes_, a, stack, static_cast<int>(c)));
+        ASSERT_EQ(a.cost, costOf(map_, rules_, classes_, a, stack, static_cast<int>(c)));
       }
     }
   }

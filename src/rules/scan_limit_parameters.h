@@ -4,10 +4,24 @@
 #include <vector>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/update/scan_limit_config.h"
+#include "bki_mapping/rules/scan_limit_config.h"
 
 namespace bki_mapping {
 
+/// Those below `free_space/`: which evidence for free a scan leaves out.
+inline std::vector<NamedParameter<ScanLimitConfig>> missParameters() {
+  using C = ScanLimitConfig;
+  return {
+      truthParameter("hits_before_misses", &C::hits_before_misses, Changes::kWhileMapping,
+                     "Ignore a scan's evidence for free in voxels that contain one of its hits after "
+                     "down-sampling. Set true to keep surfaces and thin objects that beams graze."),
+      truthParameter("evidence_before_misses", &C::evidence_before_misses, Changes::kWhileMapping,
+                     "Ignore a scan's evidence for free in all voxels that one of its hits adds evidence to. "
+                     "Set true to keep the voxels next to a hit as well."),
+  };
+}
+
+/// Those below `scan_limit/`.
 inline std::vector<NamedParameter<ScanLimitConfig>> scanLimitParameters() {
   using C = ScanLimitConfig;
   const NumberRange evidence = NumberRange::atLeast(0.0).upTo(kMostEvidence).slider(0.0, 1e6);

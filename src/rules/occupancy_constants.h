@@ -1,5 +1,5 @@
-/// @file The constants of the occupancy, Equation 13 in docs/method.md, which were fitted to drives whose
-/// truth is known (docs/tuning.md).
+/// @file The constants of the occupancy, Equation 13 in docs/method.md, which is not in the paper. They were
+/// fitted to drives whose truth is known (docs/tuning.md).
 #pragma once
 
 namespace bki_mapping {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bki_mapping/map/block.h"
-#include "update/voxel_mask.h"
+#include "map/voxel_mask.h"
 
 namespace bki_mapping {
 

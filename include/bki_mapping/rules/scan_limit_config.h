@@ -1,12 +1,16 @@
-/// @file Limits of what one scan may add to the map; update/update_rules.cpp applies those of evidence.
+/// @file Settings of what one scan may add to the map; rules/scan_rules.h has the rules. The paper has none
+/// of them, and by default none applies.
 #pragma once
 
 #include <cstdint>
 
 namespace bki_mapping {
 
-/// Largest evidence that one scan adds to a voxel; 0: no limit.
+/// What one scan may add to a voxel; by default all of it.
 struct ScanLimitConfig {
+  bool hits_before_misses = false;      ///< a voxel with a hit takes no evidence for `free` from its scan
+  bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
+  // The largest evidence that a scan adds; 0: no limit.
   double hits = 0.0;  ///< for all classes together; larger sums are scaled down
   double free = 0.0;  ///< for `free`; larger sums are cut off
   /// Evidence for `free` that one scan must exceed in a voxel: only the excess counts, and is limited. It

@@ -1,8 +1,8 @@
-#include "bki_mapping/map/column_map.h"
+#include "bki_mapping/query/column_map.h"
 
 #include <algorithm>
 
-#include "map/neighbourhood.h"
+#include "rules/neighbourhood.h"
 
 namespace bki_mapping {
 namespace {
@@ -64,10 +64,11 @@ ColumnView viewColumn(const Cells& cells, const ClassTable& classes, const Colum
 
 }  // namespace
 
-std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const ClassTable& classes,
+std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const StateRules& rules,
+                                                  const ClassTable& classes,
                                                   const std::vector<GridIndex>& changed) {
   std::set<StackIndex> stacks;
-  for (const GridIndex& index : withDependents(map, {changed.data(), changed.size()})) {
+  for (const GridIndex& index : withDependents(map, rules, {changed.data(), changed.size()})) {
     const StackIndex stack(index.x, index.y);
     stacks.insert(stack);
     if (map.find({index})) {
@@ -90,7 +91,7 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
       const BlockIndex index{{stack.first, stack.second, z}};
       const Block* const block = map.find(index);
       if (!block) continue;  // erased, but not among the changed blocks
-      readBlock(map, index, *block, BlockFields::kStates, view);
+      readBlock(map, rules, index, *block, BlockFields::kStates, view);
       for (std::size_t v = 0; v < kBlockVoxels; ++v) {
         if (view.state[v] == VoxelState::kUnknown) continue;
         const auto layer = static_cast<std::int32_t>(v / cells.size());
@@ -105,10 +106,11 @@ std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const 
   return stacks;
 }
 
-std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const ClassTable& classes) {
+std::set<ColumnMap::StackIndex> ColumnMap::update(const SemanticMap& map, const StateRules& rules,
+                                                  const ClassTable& classes) {
   std::vector<GridIndex> blocks;
   for (const auto& entry : map.entries()) blocks.push_back(entry.index);
-  return update(map, classes, blocks);
+  return update(map, rules, classes, blocks);
 }
 
 const ColumnView* ColumnMap::find(const VoxelIndex& voxel) const {

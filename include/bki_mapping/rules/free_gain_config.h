@@ -1,4 +1,5 @@
-/// @file Settings of the gains that decide the state of a voxel.
+/// @file Settings of what a voxel is; rules/state_rules.h has the rules. The paper has none of them, and by
+/// default none applies.
 #pragma once
 
 namespace bki_mapping {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "bki_mapping/core/grid_geometry.h"
-#include "update/void_search.h"
+#include "rules/void_search.h"
 
 namespace bki_mapping {
 namespace {

@@ -2,9 +2,9 @@
 /// the same for one voxel, in double precision.
 #pragma once
 
-#include "map/occupancy_constants.h"
-#include "map/vec_log_inl.h"
-#include "map/view_kernels.h"
+#include "rules/occupancy_constants.h"
+#include "rules/vec_log_inl.h"
+#include "rules/view_kernels.h"
 
 namespace bki_mapping {
 namespace {
@@ -94,7 +94,7 @@ template <bool kPosterior>
   StoreU(found.gain, gain);
   for (int lane = 0; lane < kLanes; ++lane) {
     if (decays[lane])
-      gain[lane] = decayedGain(*planes.map, static_cast<ClassId>(found.label[lane]), hits[lane]);
+      gain[lane] = decayedGain(*planes.rules, static_cast<ClassId>(found.label[lane]), hits[lane]);
   }
   found.gain = LoadU(gain);
 }
@@ -119,7 +119,7 @@ template <bool kPosterior>
 /// What holds it becomes what was found. @return the voxels that are occupied.
 [[gnu::always_inline]] inline Mask keepRemaining(const BlockPlanes& planes, IntVec free, int v,
                                                  Mask is_occupied, Likeliest& found) {
-  const float gain = planes.map->remainingGain();
+  const float gain = planes.rules->remainingGain();
   const Mask left = ~is_occupied & (found.best > 0);
   if (!(gain > 0.0f) || !AnyTrue(left)) return is_occupied;
   Likeliest fixed = {{}, Set(kFreeClass), Set(gain), {}, {{}, {}}, {{}, {}}};

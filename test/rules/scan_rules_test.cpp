@@ -5,8 +5,9 @@
 
 #include <random>
 
-#include "update/blocks_by_group.h"
-#include "update/update_rules.h"
+#include "map/blocks_by_group.h"
+#include "rules/scan_rules.h"
+#include "update/sum_kernels.h"
 
 namespace bki_mapping {
 namespace {
@@ -14,25 +15,24 @@ namespace {
 constexpr int kVoxelsOfLayer = kBlockEdge * kBlockEdge;
 
 /// The units that a block gets from sums.
-std::vector<EvidenceUnits> unitsAfter(const UpdateRules& rules, const std::vector<float>& sums,
+std::vector<EvidenceUnits> unitsAfter(const ScanRules& rules, const std::vector<float>& sums,
                                       const VoxelMask& is_protected, std::uint64_t below, BlockSeam* seam) {
   BlockSums free;
   free.reserve(1);
   BlockSums::Plane& plane = free.open(kFreeClass);
   std::copy(sums.begin(), sums.end(), plane.values);
-  const SumKernels& kernels = sumKernelsFor("");
-  applyToFree(rules, kernels, is_protected, below, free, seam);
+  applyToFree(rules, limitKernelsFor(""), is_protected, below, free, seam);
   std::vector<EvidenceUnits> units(kBlockVoxels, 0);
   SumCounts counts;
-  kernels.add(plane.values, {}, units.data(), counts);
+  sumKernelsFor("").add(plane.values, {}, units.data(), counts);
   return units;
 }
 
-TEST(UpdateRules, GiveBackWhatTheThresholdHasTakenAboveCrossedVoxels) {
+TEST(ScanRules, GiveBackWhatTheThresholdHasTakenAboveCrossedVoxels) {
   std::mt19937 random(7);
   std::size_t held_back = 0, given_back = 0;
   for (int n = 0; n < 400; ++n) {
-    UpdateRules rules;
+    ScanRules rules;
     const float scale = std::exp2(static_cast<float>(n % 17 - 8));
     rules.free_threshold = scale * std::uniform_real_distribution<float>(0.01f, 1.0f)(random);
     rules.most_free = scale * std::uniform_real_distribution<float>(0.01f, 1.0f)(random);

@@ -2,19 +2,25 @@
 /// memory: UpdateLimits in map_updater.h.)
 #pragma once
 
-#include <bitset>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
-#include "update/block_sums.h"
-#include "update/sum_kernels.h"
-#include "update/void_search.h"
+#include "bki_mapping/core/class_table.h"
+#include "bki_mapping/rules/scan_limit_config.h"
+#include "rules/block_sums.h"
+#include "rules/limit_kernels.h"
+#include "rules/void_search.h"
 
 namespace bki_mapping {
 
-/// What one scan may add to a voxel. The rules apply to the whole scan, whatever kind its evidence is.
-struct UpdateRules {
+/// What one scan may add to a voxel: Equations 14 and 14a in docs/method.md, and which evidence for `free`
+/// counts. The paper has none of these rules; by default none applies. They apply to the whole scan, whatever
+/// kind its evidence is.
+struct ScanRules {
+  ScanRules() = default;
+  ScanRules(const ScanLimitConfig& config, const ClassTable& classes);
+
   bool hits_before_misses = false;      ///< a voxel that contains a hit takes no evidence for `free`
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
   float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
@@ -23,7 +29,7 @@ struct UpdateRules {
   /// voxel below reaches most_free.
   float free_threshold = 0.0f;
   float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
-  std::bitset<256> fixed;      ///< the classes that cannot move, for VoidSearch
+  ClassSet fixed;              ///< the classes that cannot move
 
   bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
   /// Whether the threshold depends on the voxel below.
@@ -41,24 +47,24 @@ struct BlockSeam {
 
 /// Applies the rules to the hits of one block. Sums above the limit are scaled by one factor for all classes.
 /// @param[out] is_protected adds the voxels that take no evidence for `free` from this scan.
-void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
+void applyToHits(const ScanRules& rules, const LimitKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected);
 
 /// Applies the rules to the free space of one block. @param below which of the 64 voxels below the block
 /// reached most_free. @param[out] seam for a block above another group, whose voxels are not known yet: what
 /// the threshold has taken; nullptr for others. @return the block's voxels whose evidence reaches most_free,
 /// whether or not it exceeds the threshold, if voids are sought or the threshold needs them.
-VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
+VoxelMask applyToFree(const ScanRules& rules, const LimitKernels& kernels, const VoxelMask& is_protected,
                       std::uint64_t below, BlockSums& free, BlockSeam* seam);
 
 /// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
 EvidenceUnits roundedUnits(float sum);
 
 /// The units that the threshold has taken from a sum >= 0 of a voxel, but would not above a crossed one.
-EvidenceUnits heldBack(const UpdateRules& rules, float sum);
+EvidenceUnits heldBack(const ScanRules& rules, float sum);
 
 /// Notes what the hits of one block say of its voxels. @param[out] hit voxels to which hits add evidence.
-void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
+void noteHits(const ScanRules& rules, const LimitKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
               VoxelMask& hit);
 
 }  // namespace bki_mapping

@@ -1,13 +1,14 @@
-/// @file Finds the voxels that a scan sees empty together with their neighbours.
+/// @file Finds the voxels that a scan sees empty together with their neighbours: Equation 14a in
+/// docs/method.md, which is not in the paper.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "map/blocks_by_group.h"
 #include "parallel/thread_pool.h"
-#include "update/block_sums.h"
-#include "update/blocks_by_group.h"
+#include "rules/block_sums.h"
 
 namespace bki_mapping {
 

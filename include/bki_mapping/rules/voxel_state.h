@@ -1,4 +1,5 @@
-/// @file How the state of a voxel is decided, and its posterior.
+/// @file How the state of a voxel is decided, and its posterior. The paper has the posterior (10) and, with a
+/// gain of 1, the state (11).
 #pragma once
 
 #include <array>
@@ -6,15 +7,15 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/rules/state_rules.h"
 
 namespace bki_mapping {
 
 /// The state of a voxel. Files and messages use these values.
 enum class VoxelState : std::uint8_t {
   kUnknown = 0,   ///< no evidence
-  kFree = 1,      ///< `free` has more evidence, times the class's gain, than any class
-  kOccupied = 2,  ///< otherwise; with a gain of 1, some class has the largest alpha
+  kFree = 1,      ///< there is evidence, and StateRules do not keep the voxel occupied
+  kOccupied = 2,  ///< StateRules keep it occupied; by default, if some class has the largest alpha (11)
   kOccluded = 3,  ///< no evidence; the last scan to reach it saw it only beyond the ends of beams
 };
 
@@ -77,32 +78,31 @@ enum class BlockFields {
 
 /// Reads all voxels of a block, many times as fast as one by one. States and labels are those of viewVoxel;
 /// the other fields differ from them by at most 1e-6 of their value.
-/// @param map that the block is part of: with SemanticMap::neighbourhoodRatio, states depend on the blocks
+/// @param map that the block is part of: with StateRules::neighbourhoodRatio, states depend on the blocks
 /// around.
-void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockFields fields,
-               BlockView& view);
+void readBlock(const SemanticMap& map, const StateRules& rules, const BlockIndex& index, const Block& block,
+               BlockFields fields, BlockView& view);
 
 /// The state and posterior of a voxel. @param map that the block is part of. @param offset of the voxel in
 /// its block.
-VoxelView viewVoxel(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset);
+VoxelView viewVoxel(const SemanticMap& map, const StateRules& rules, const BlockIndex& index,
+                    const Block& block, int offset);
 /// The same with entropy 0, which is much faster: the logarithms take most of the time.
-VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, const BlockIndex& index,
+                             const Block& block, int offset);
 /// The same for a voxel by index; unknown if the map has no block there.
-VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel);
 /// viewVoxel for the voxel that contains a point. @param point in the map frame [m].
-VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point);
-
-/// All blocks, sorted by index (z, then y, then x), so that output does not depend on the order of creation.
-std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map);
+VoxelView viewPoint(const SemanticMap& map, const StateRules& rules, const Eigen::Vector3d& point);
 
 /// Calls visit(const VoxelIndex&, const VoxelView&) for every voxel that is not unknown, in sorted order. The
 /// views have entropy 0.
 template <typename Visit>
-void forEachKnownVoxel(const SemanticMap& map, Visit&& visit) {
+void forEachKnownVoxel(const SemanticMap& map, const StateRules& rules, Visit&& visit) {
   BlockView view;
   view.entropy.fill(0.0f);
   for (const auto& [index, block] : sortedBlocks(map)) {
-    readBlock(map, index, *block, BlockFields::kAllButEntropy, view);
+    readBlock(map, rules, index, *block, BlockFields::kAllButEntropy, view);
     for (int offset = 0; offset < kBlockVoxels; ++offset) {
       const VoxelView voxel = view.at(offset);
       if (voxel.state != VoxelState::kUnknown) visit(GridGeometry::voxelOf(index, offset), voxel);

@@ -1,13 +1,13 @@
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
-#include "map/neighbourhood.h"
-#include "map/occupancy_constants.h"
-#include "map/view_kernels.h"
+#include "rules/neighbourhood.h"
+#include "rules/occupancy_constants.h"
+#include "rules/view_kernels.h"
 
 namespace bki_mapping {
 namespace {
@@ -29,7 +29,7 @@ struct OwnEvidence {
   bool holds = false;                              ///< (11)
 };
 
-OwnEvidence ownEvidence(const SemanticMap& map, const Block& block, int offset) {
+OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset) {
   // Units are whole numbers, of which doubles hold the sum over all classes exactly.
   OwnEvidence own;
   const auto& classes = block.classes();
@@ -44,18 +44,18 @@ OwnEvidence ownEvidence(const SemanticMap& map, const Block& block, int offset) 
       own.best = units;
       own.label = classes[i];
     }
-    if (units > own.fixed_best && map.isFixed(classes[i])) {
+    if (units > own.fixed_best && rules.isFixed(classes[i])) {
       own.fixed_best = units;
       own.fixed = classes[i];
     }
   }
-  own.gain = map.freeGain(own.label, kEvidenceUnit * static_cast<float>(own.best));
+  own.gain = rules.freeGain(own.label, kEvidenceUnit * static_cast<float>(own.best));
   own.holds = isOccupied(own.best, own.gain, own.free);
   return own;
 }
 
 /// Equation 12b: what the voxels around say of one that asks them.
-VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
+VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel) {
   constexpr int kReach = kNeighbourhoodReach;
   static_assert(2 * kReach < kBlockEdge, "they are in at most two blocks along each axis");
   const BlockIndex first = GridGeometry::blockOf({{voxel.x - kReach, voxel.y - kReach, voxel.z - kReach}});
@@ -65,8 +65,8 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
         map.find({{first.x + (n & 1), first.y + (n >> 1 & 1), first.z + (n >> 2)}});
   }
   VoteSums sums;
-  const EvidenceUnits most = map.mostVote();
-  for (int z = map.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
+  const EvidenceUnits most = rules.mostVote();
+  for (int z = rules.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
@@ -74,8 +74,8 @@ VoteSums votesAround(const SemanticMap& map, const VoxelIndex& voxel) {
         const int n = index.x - first.x + 2 * (index.y - first.y) + 4 * (index.z - first.z);
         const Block* const block = blocks[static_cast<std::size_t>(n)];
         if (!block) continue;
-        const OwnEvidence own = ownEvidence(map, *block, GridGeometry::offsetInBlock(at));
-        if (own.best == 0 || !map.asksNeighbourhood(own.label)) continue;
+        const OwnEvidence own = ownEvidence(rules, *block, GridGeometry::offsetInBlock(at));
+        if (own.best == 0 || !rules.asksNeighbourhood(own.label)) continue;
         (own.holds ? sums.kept : sums.cleared) += std::min(own.best, most);
         sums.keeping += own.holds;
       }
@@ -111,14 +111,15 @@ bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free) {
   return best >= static_cast<double>(gain) * free;
 }
 
-float decayedGain(const SemanticMap& map, ClassId id, float hits) {
-  return map.freeGain(id, hits);
+float decayedGain(const StateRules& rules, ClassId id, float hits) {
+  return rules.freeGain(id, hits);
 }
 
-BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
+BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Block& block) {
   BlockPlanes planes;
   planes.map = &map;
-  planes.most_vote = map.mostVote();
+  planes.rules = &rules;
+  planes.most_vote = rules.mostVote();
   planes.free = kNoEvidence;
   for (std::size_t p = 0; p < block.classes().size(); ++p) {
     const ClassId id = block.classes()[p];
@@ -127,22 +128,22 @@ BlockPlanes planesOf(const SemanticMap& map, const Block& block) {
       planes.has_free = true;
       continue;
     }
-    const float gain = map.freeGain(id, 0.0f);
-    const bool decays = gain > 1.0f && map.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
-    planes.planes[planes.count++] = {block.plane(p),           id, gain, decays, map.isFixed(id),
-                                     map.asksNeighbourhood(id)};
+    const float gain = rules.freeGain(id, 0.0f);
+    const bool decays = gain > 1.0f && rules.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
+    planes.planes[planes.count++] = {
+        block.plane(p), id, gain, decays, rules.isFixed(id), rules.asksNeighbourhood(id)};
   }
   return planes;
 }
 
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
-               const Block& block, BlockFields fields, BlockView& view) {
+void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+               const BlockIndex& index, const Block& block, BlockFields fields, BlockView& view) {
   const auto read = fields == BlockFields::kStates          ? kernels.states
                     : fields == BlockFields::kAllButEntropy ? kernels.posterior
                                                             : kernels.all;
-  BlockPlanes planes = planesOf(map, block);
+  BlockPlanes planes = planesOf(map, rules, block);
   Overruled overruled;
-  if (findOverruled(kernels, map, index, block, overruled)) planes.overruled = &overruled;
+  if (findOverruled(kernels, map, rules, index, block, overruled)) planes.overruled = &overruled;
   read(planes, view);
   const Block::Occlusion& marks = block.occlusion();
   if (marks.none()) return;
@@ -151,32 +152,32 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIn
   }
 }
 
-void readBlock(const SemanticMap& map, const BlockIndex& index, const Block& block, BlockFields fields,
-               BlockView& view) {
+void readBlock(const SemanticMap& map, const StateRules& rules, const BlockIndex& index, const Block& block,
+               BlockFields fields, BlockView& view) {
   static const ViewKernels* const fastest = &viewKernelsFor("");
-  readBlock(*fastest, map, index, block, fields, view);
+  readBlock(*fastest, map, rules, index, block, fields, view);
 }
 
-VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, const Block& block,
-                             int offset) {
-  OwnEvidence own = ownEvidence(map, block, offset);
+VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, const BlockIndex& index,
+                             const Block& block, int offset) {
+  OwnEvidence own = ownEvidence(rules, block, offset);
   bool holds = own.holds, restored = false, has_left = false;
-  if (map.neighbourhoodRatio() > 0.0f && own.best > 0 && map.asksNeighbourhood(own.label)) {
-    const VoteSums sums = votesAround(map, GridGeometry::voxelOf(index, offset));
+  if (rules.neighbourhoodRatio() > 0.0f && own.best > 0 && rules.asksNeighbourhood(own.label)) {
+    const VoteSums sums = votesAround(map, rules, GridGeometry::voxelOf(index, offset));
     const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
-    holds = own.holds ? areKept(map, sums)
-                      : is_doubtful && isRestored(map, std::min(own.best, map.mostVote()), sums);
+    holds = own.holds ? areKept(rules, sums)
+                      : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
     restored = holds && !own.holds;
     has_left = !holds && own.holds;
   }
-  if (!holds && map.remainingGain() > 0.0f && own.fixed != own.label &&
+  if (!holds && rules.remainingGain() > 0.0f && own.fixed != own.label &&
       own.fixed_best > (own.best - 1) >> kRemainingShift &&
-      isOccupied(own.fixed_best, map.remainingGain(), own.free)) {
+      isOccupied(own.fixed_best, rules.remainingGain(), own.free)) {
     holds = true;
     has_left = false;
     own.best = own.fixed_best;
     own.label = own.fixed;
-    own.gain = map.remainingGain();
+    own.gain = rules.remainingGain();
   }
   VoxelView view;
   if (own.best > 0 || own.free > 0) {
@@ -202,8 +203,9 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const BlockIndex& index, co
   return view;
 }
 
-VoxelView viewVoxel(const SemanticMap& map, const BlockIndex& index, const Block& block, int offset) {
-  VoxelView view = viewWithoutEntropy(map, index, block, offset);
+VoxelView viewVoxel(const SemanticMap& map, const StateRules& rules, const BlockIndex& index,
+                    const Block& block, int offset) {
+  VoxelView view = viewWithoutEntropy(map, rules, index, block, offset);
   const auto classes = block.classes().size(), all = map.classCount() + 1;
   double total = 0.0;
   for (std::size_t i = 0; i < classes; ++i) total += std::max(block.plane(i)[offset], 0);
@@ -218,26 +220,19 @@ VoxelView viewVoxel(const SemanticMap& map, const BlockIndex& index, const Block
   return view;
 }
 
-VoxelView viewWithoutEntropy(const SemanticMap& map, const VoxelIndex& voxel) {
+VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel) {
   const BlockIndex index = GridGeometry::blockOf(voxel);
   const Block* block = map.find(index);
-  return block ? viewWithoutEntropy(map, index, *block, GridGeometry::offsetInBlock(voxel)) : VoxelView();
+  return block ? viewWithoutEntropy(map, rules, index, *block, GridGeometry::offsetInBlock(voxel))
+               : VoxelView();
 }
 
-VoxelView viewPoint(const SemanticMap& map, const Eigen::Vector3d& point) {
+VoxelView viewPoint(const SemanticMap& map, const StateRules& rules, const Eigen::Vector3d& point) {
   const VoxelIndex voxel = map.geometry().voxelAt(point);
   const BlockIndex index = GridGeometry::blockOf(voxel);
   const Block* block = map.find(index);
   const int offset = GridGeometry::offsetInBlock(voxel);
-  return block ? viewVoxel(map, index, *block, offset) : viewVoxel(map, index, Block(), offset);
-}
-
-std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap& map) {
-  std::vector<std::pair<BlockIndex, const Block*>> blocks;
-  blocks.reserve(map.size());
-  for (const auto& [index, block] : map.entries()) blocks.emplace_back(index, block);
-  std::sort(blocks.begin(), blocks.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  return blocks;
+  return block ? viewVoxel(map, rules, index, *block, offset) : viewVoxel(map, rules, index, Block(), offset);
 }
 
 }  // namespace bki_mapping

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "bki_mapping/map/voxel_state.h"
-#include "map/neighbourhood.h"
+#include "bki_mapping/rules/voxel_state.h"
+#include "rules/neighbourhood.h"
 
 namespace bki_mapping {
 namespace {
@@ -42,12 +42,13 @@ bool holds(const SemanticMap& map, const VoxelIndex& voxel, ClassId id) {
 }
 
 /// The class that occupies a voxel, from the definitions; kFreeClass if none does.
-ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel) {
+/// @param asks_below whether voxels below are asked, too.
+ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel, bool asks_below) {
   const double free = evidenceFor(map, voxel, kFreeClass), road = evidenceFor(map, voxel, kRoad);
   const ClassId best = likeliest(map, voxel);
   if (evidenceFor(map, voxel, best) == 0.0) return kFreeClass;
   double kept = 0.0, cleared = 0.0, keeping = 0.0;
-  for (int z = map.neighbourhoodIsBelow() ? -2 : 0; z <= 2; ++z) {
+  for (int z = asks_below ? -2 : 0; z <= 2; ++z) {
     for (int y = -2; y <= 2; ++y) {
       for (int x = -2; x <= 2; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
@@ -70,15 +71,20 @@ ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel) {
   return road >= kRemaining * free && 4.0 * road >= evidenceFor(map, voxel, best) ? kRoad : kFreeClass;
 }
 
+StateRules rulesOfAll(bool asks_below = true) {
+  StateRules rules = StateRules()
+                         .withPersistence(kPersistence)
+                         .withNeighbourhood(kRatio, ClassSet().set(kCar).set(kTruck), asks_below)
+                         .withRemaining(kRemaining, ClassSet(0b1));
+  for (const ClassId id : {kCar, kTruck, kWalker}) rules = rules.withFreeGain(id, kGain);
+  return rules;
+}
+
 /// A map of 3 x 3 x 2 blocks of which some are missing: clusters of all classes, some of them crossed.
-SemanticMap randomMap(unsigned seed, bool asks_below = true) {
+SemanticMap randomMap(unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   SemanticMap map(GridGeometry(0.3), kPrior, 4);
-  for (const ClassId id : {kCar, kTruck, kWalker}) map.setFreeGain(id, kGain);
-  map.setGainPersistence(kPersistence);
-  map.setNeighbourhoodRatio(kRatio, SemanticMap::Classes().set(kCar).set(kTruck), asks_below);
-  map.setRemainingGain(kRemaining, SemanticMap::Classes(0b1));
   for (int z = -1; z < 1; ++z) {
     for (int y = -1; y < 2; ++y) {
       for (int x = -1; x < 2; ++x) {
@@ -99,19 +105,18 @@ SemanticMap randomMap(unsigned seed, bool asks_below = true) {
 TEST(Neighbours, DecideAsByLookingAtEachOfThem) {
   std::size_t labels[256] = {}, restored = 0, cleared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
-    SemanticMap map = randomMap(seed, seed % 2 == 0);
-    SemanticMap alone = map.snapshot();
-    alone.setNeighbourhoodRatio(0.0, {});
+    const SemanticMap map = randomMap(seed);
+    const StateRules rules = rulesOfAll(seed % 2 == 0), alone = rules.withNeighbourhood(0.0, {});
     BlockView view;
     for (const auto& [index, block] : map.entries()) {
-      readBlock(map, index, *block, BlockFields::kAllButEntropy, view);
+      readBlock(map, rules, index, *block, BlockFields::kAllButEntropy, view);
       for (int v = 0; v < kBlockVoxels; ++v) {
         const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
-        const ClassId expected = slowLabel(map, voxel);
+        const ClassId expected = slowLabel(map, voxel, rules.neighbourhoodIsBelow());
         ASSERT_EQ(view.at(v).label, expected) << seed;
-        ASSERT_EQ(viewWithoutEntropy(map, voxel).label, expected) << seed;
+        ASSERT_EQ(viewWithoutEntropy(map, rules, voxel).label, expected) << seed;
         ++labels[expected];
-        const VoxelView own = viewWithoutEntropy(alone, voxel);
+        const VoxelView own = viewWithoutEntropy(map, alone, voxel);
         restored += own.label != expected && asks(expected);
         cleared += asks(own.label) && own.label != expected;
         // Nothing else but the state and what follows from it depends on the neighbours.
@@ -130,9 +135,6 @@ TEST(Neighbours, DecideAsByLookingAtEachOfThem) {
 /// A row of voxels along x from (0, 0, 0), each with evidence for the car and for `free`.
 SemanticMap rowOfCar(const std::vector<std::pair<double, double>>& evidence) {
   SemanticMap map(GridGeometry(0.3), kPrior, 3);
-  map.setFreeGain(kCar, 1000.0);
-  map.setGainPersistence(0.05);
-  map.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kCar));
   for (std::size_t n = 0; n < evidence.size(); ++n) {
     const VoxelIndex voxel{{static_cast<int>(n), 0, 0}};
     for (const auto& [id, value] : {std::pair{kCar, evidence[n].first}, {kFreeClass, evidence[n].second}}) {
@@ -144,8 +146,15 @@ SemanticMap rowOfCar(const std::vector<std::pair<double, double>>& evidence) {
   return map;
 }
 
-VoxelView viewAt(const SemanticMap& map, int x) {
-  return viewWithoutEntropy(map, VoxelIndex{{x, 0, 0}});
+StateRules rulesOfCars() {
+  return StateRules()
+      .withFreeGain(kCar, 1000.0)
+      .withPersistence(0.05)
+      .withNeighbourhood(2.0, ClassSet().set(kCar));
+}
+
+VoxelView viewAt(const SemanticMap& map, int x, const StateRules& rules = rulesOfCars()) {
+  return viewWithoutEntropy(map, rules, VoxelIndex{{x, 0, 0}});
 }
 
 TEST(Neighbours, ClearWhatIsLeftOfACar) {
@@ -186,16 +195,15 @@ TEST(Neighbours, CountForAtMostEightPersistences) {
   };
   EXPECT_TRUE(kept(0.4));
   EXPECT_TRUE(kept(40.0));
-  SemanticMap map = rowOfCar({{0.1, 0.0}, {40.0, 0.0}, {0.0625, 0.1}});
-  map.setGainPersistence(5.0);
-  EXPECT_EQ(viewAt(map, 2).state, VoxelState::kFree);
+  const SemanticMap map = rowOfCar({{0.1, 0.0}, {40.0, 0.0}, {0.0625, 0.1}});
+  EXPECT_EQ(viewAt(map, 2, rulesOfCars().withPersistence(5.0)).state, VoxelState::kFree);
 }
 
 TEST(Neighbours, BelowAreNotAskedWhereFloorsVote) {
   // A row of cars that have left, above a floor of the same class.
   for (const bool asks_below : {true, false}) {
     SemanticMap map = rowOfCar({});
-    map.setNeighbourhoodRatio(0.5, SemanticMap::Classes().set(kCar), asks_below);
+    const StateRules rules = rulesOfCars().withNeighbourhood(0.5, ClassSet().set(kCar), asks_below);
     std::vector<EvidenceUnits> hits(kBlockVoxels), misses(kBlockVoxels);
     for (int x = 0; x < kBlockEdge; ++x) {
       const auto at = [x](int z) {
@@ -208,7 +216,7 @@ TEST(Neighbours, BelowAreNotAskedWhereFloorsVote) {
     Block& block = map.getOrAllocate({{0, 0, 0}});
     block.add(kCar, hits.data());
     block.add(kFreeClass, misses.data());
-    const auto state = [&](int z) { return viewWithoutEntropy(map, VoxelIndex{{4, 0, z}}).state; };
+    const auto state = [&](int z) { return viewWithoutEntropy(map, rules, VoxelIndex{{4, 0, z}}).state; };
     EXPECT_EQ(state(0), VoxelState::kOccupied);
     EXPECT_EQ(state(1), asks_below ? VoxelState::kOccupied : VoxelState::kFree);
   }
@@ -223,15 +231,16 @@ TEST(Neighbours, AreAskedAcrossBlocksUpToTwoVoxelsAway) {
 }
 
 TEST(Neighbours, OfOtherClassesAreNotAsked) {
-  SemanticMap map = rowOfCar({{0.1, 0.1}, {0.08, 0.0}, {0.1, 0.1}});
+  const SemanticMap map = rowOfCar({{0.1, 0.1}, {0.08, 0.0}, {0.1, 0.1}});
   EXPECT_EQ(viewAt(map, 1).state, VoxelState::kFree);
-  map.setNeighbourhoodRatio(2.0, SemanticMap::Classes().set(kTruck));
-  EXPECT_EQ(viewAt(map, 1).state, VoxelState::kOccupied);
+  const StateRules rules = rulesOfCars().withNeighbourhood(2.0, ClassSet().set(kTruck));
+  EXPECT_EQ(viewAt(map, 1, rules).state, VoxelState::kOccupied);
 }
 
 TEST(Neighbours, DependentsAreAllWhoseStatesChange) {
   std::mt19937 random(3);
   SemanticMap map = randomMap(9);
+  const StateRules rules = rulesOfAll();
   std::size_t elsewhere = 0;
   for (int round = 0; round < 20; ++round) {
     const SemanticMap before = map.snapshot();
@@ -243,12 +252,12 @@ TEST(Neighbours, DependentsAreAllWhoseStatesChange) {
       map.getOrAllocate(changed).add(random() % 2 == 0 ? kCar : kFreeClass, plane.data());
     }
     const std::vector<GridIndex> touched = {changed},
-                                 all = withDependents(map, {touched.data(), touched.size()});
+                                 all = withDependents(map, rules, {touched.data(), touched.size()});
     for (const auto& [index, block] : map.entries()) {
       if (!before.find(index)) continue;
       BlockView now, then;
-      readBlock(map, index, *block, BlockFields::kStates, now);
-      readBlock(before, index, *before.find(index), BlockFields::kStates, then);
+      readBlock(map, rules, index, *block, BlockFields::kStates, now);
+      readBlock(before, rules, index, *before.find(index), BlockFields::kStates, then);
       const bool same = now.state == then.state && now.label == then.label;
       elsewhere += !same && index != changed;
       EXPECT_TRUE(same || std::find(all.begin(), all.end(), index) != all.end());

@@ -5,11 +5,11 @@
 #include <cstring>
 #include <random>
 
-#include "map/view_kernels.h"
+#include "rules/view_kernels.h"
 #include "simd/instruction_sets.h"
 #include "simd/vec_generic.h"
 
-#include "map/vec_log_inl.h"
+#include "rules/vec_log_inl.h"
 
 namespace bki_mapping {
 namespace {
@@ -59,7 +59,8 @@ void fillBlock(const Kind& kind, std::mt19937& random, Block& block) {
   }
 }
 
-SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
+MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
+  StateRules rules;
   SemanticMap map(GridGeometry(0.3), kind.prior, kind.classes);
   Block& block = map.getOrAllocate({{0, 0, 0}});
   fillBlock(kind, random, block);
@@ -68,9 +69,10 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
     if (n != 13 && random() % 4 != 0) fillBlock(kind, random, map.getOrAllocate(index));
   }
   if (kind.neighbours) {
-    SemanticMap::Classes asking;
+    ClassSet asking;
     for (std::size_t id = 0; id < kind.classes; ++id) asking[id] = random() % 2 == 0;
-    map.setNeighbourhoodRatio(std::exp2(static_cast<double>(random() % 5) - 2.0), asking, random() % 2 == 0);
+    rules = rules.withNeighbourhood(std::exp2(static_cast<double>(random() % 5) - 2.0), asking,
+                                    random() % 2 == 0);
   }
   if (kind.occlusion) {
     Block::Occlusion marks;
@@ -79,15 +81,15 @@ SemanticMap randomMap(const Kind& kind, std::mt19937& random) {
   }
   constexpr double kGains[] = {1.0, 0.1, 0.5, 2.0, 8.0, 1e-6, 1e6, 1e300};
   for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
-    map.setFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
+    rules = rules.withFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
   }
   if (kind.gains) {
-    SemanticMap::Classes fixed;
+    ClassSet fixed;
     for (std::size_t id = 0; id < kind.classes; ++id) fixed[id] = random() % 2 == 0;
-    map.setRemainingGain(random() % 4 == 0 ? 0.0 : kGains[random() % std::size(kGains)], fixed);
+    rules = rules.withRemaining(random() % 4 == 0 ? 0.0 : kGains[random() % std::size(kGains)], fixed);
   }
-  if (kind.persistence) map.setGainPersistence(std::exp2(static_cast<double>(random() % 20) - 10.0));
-  return map;
+  if (kind.persistence) rules = rules.withPersistence(std::exp2(static_cast<double>(random() % 20) - 10.0));
+  return {std::move(map), rules};
 }
 
 void expectNear(float value, float expected, const char* field, const std::string& where) {
@@ -95,22 +97,23 @@ void expectNear(float value, float expected, const char* field, const std::strin
 }
 
 /// Compares every voxel of the map's block with viewVoxel.
-void compare(const SemanticMap& map, const std::string& set, const std::string& what) {
+void compare(const SemanticMap& map, const StateRules& rules, const std::string& set,
+             const std::string& what) {
   constexpr BlockIndex kOrigin{{0, 0, 0}};
   const Block& block = *map.find(kOrigin);
   BlockView view, states, posterior;
   std::memset(static_cast<void*>(&view), 0x55, sizeof(view));
   states = posterior = view;
   const ViewKernels& kernels = viewKernelsFor(set);
-  readBlock(kernels, map, kOrigin, block, BlockFields::kAll, view);
-  readBlock(kernels, map, kOrigin, block, BlockFields::kStates, states);
-  readBlock(kernels, map, kOrigin, block, BlockFields::kAllButEntropy, posterior);
+  readBlock(kernels, map, rules, kOrigin, block, BlockFields::kAll, view);
+  readBlock(kernels, map, rules, kOrigin, block, BlockFields::kStates, states);
+  readBlock(kernels, map, rules, kOrigin, block, BlockFields::kAllButEntropy, posterior);
   EXPECT_EQ(states.state, view.state) << set << ", " << what;
   EXPECT_EQ(states.label, view.label) << set << ", " << what;
   posterior.entropy = view.entropy;
   EXPECT_EQ(std::memcmp(&posterior, &view, sizeof(view)), 0) << set << ", " << what;
   for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    const VoxelView got = view.at(offset), expected = viewVoxel(map, kOrigin, block, offset);
+    const VoxelView got = view.at(offset), expected = viewVoxel(map, rules, kOrigin, block, offset);
     const std::string where = set + ", " + what + ", voxel " + std::to_string(offset);
     ASSERT_EQ(got.state, expected.state) << where;
     ASSERT_EQ(got.label, expected.label) << where;
@@ -150,8 +153,9 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
           for (const auto& [classes, planes] : {std::pair{3, 0}, {1, 2}, {3, 6}, {20, 8}, {254, 1200}}) {
             const Kind kind{
                 static_cast<std::size_t>(classes), planes, prior, evidence, gains, persistence, n % 2 == 0};
-            const SemanticMap map = randomMap(kind, random);
-            for (const std::string& set : instructionSets()) compare(map, set, "map " + std::to_string(n));
+            const MapSnapshot made = randomMap(kind, random);
+            for (const std::string& set : instructionSets())
+              compare(made.map, made.rules, set, "map " + std::to_string(n));
             if (HasFatalFailure()) return;
             ++n;
           }
@@ -176,8 +180,9 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOneAmongOtherBlocks) {
                           persistence,
                           n % 2 == 0,
                           true};
-          const SemanticMap map = randomMap(kind, random);
-          for (const std::string& set : instructionSets()) compare(map, set, "map " + std::to_string(n));
+          const MapSnapshot made = randomMap(kind, random);
+          for (const std::string& set : instructionSets())
+            compare(made.map, made.rules, set, "map " + std::to_string(n));
           if (HasFatalFailure()) return;
           ++n;
         }
@@ -193,8 +198,8 @@ TEST(ReadBlock, DecidesByTheLastUnit) {
         SemanticMap map(GridGeometry(0.3), 0.001, 3);
         // The class holds the voxel itself, or remains of another, with the same gain.
         const bool remains = round == 1;
-        map.setFreeGain(remains ? 0 : 1, remains ? 1e6 : gain);
-        if (remains) map.setRemainingGain(gain, SemanticMap::Classes(0b10));
+        StateRules rules = StateRules().withFreeGain(remains ? 0 : 1, remains ? 1e6 : gain);
+        if (remains) rules = rules.withRemaining(gain, ClassSet(0b10));
         Block& block = map.getOrAllocate({{0, 0, 0}});
         std::vector<EvidenceUnits> hits(kBlockVoxels), free(kBlockVoxels);
         for (int v = 0; v < kBlockVoxels; ++v) {
@@ -206,7 +211,7 @@ TEST(ReadBlock, DecidesByTheLastUnit) {
         block.add(kFreeClass, free.data());
         for (EvidenceUnits& units : hits) ++units;
         if (remains) block.add(0, hits.data());
-        compare(map, set, "gain " + std::to_string(gain));
+        compare(map, rules, set, "gain " + std::to_string(gain));
       }
     }
   }
@@ -215,8 +220,7 @@ TEST(ReadBlock, DecidesByTheLastUnit) {
 TEST(ReadBlock, WhatRemainsIsAQuarterOfWhatHasLeft) {
   for (const std::string& set : instructionSets()) {
     SemanticMap map(GridGeometry(0.3), 0.001, 3);
-    map.setFreeGain(0, 1e12);
-    map.setRemainingGain(1e-6, SemanticMap::Classes(0b10));
+    const StateRules rules = StateRules().withFreeGain(0, 1e12).withRemaining(1e-6, ClassSet(0b10));
     std::vector<EvidenceUnits> left(kBlockVoxels), remains(kBlockVoxels);
     const std::vector<EvidenceUnits> free(kBlockVoxels, 1);
     for (int v = 0; v < kBlockVoxels; ++v) {
@@ -229,7 +233,7 @@ TEST(ReadBlock, WhatRemainsIsAQuarterOfWhatHasLeft) {
     block.add(1, remains.data());
     block.add(kFreeClass, free.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, {{0, 0, 0}}, block, BlockFields::kStates, view);
+    readBlock(viewKernelsFor(set), map, rules, {{0, 0, 0}}, block, BlockFields::kStates, view);
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const bool holds = left[v] <= 4 * remains[v];
       EXPECT_EQ(view.label[v], holds ? 1 : kFreeClass) << set << ' ' << left[v] << ' ' << remains[v];
@@ -244,7 +248,8 @@ TEST(ReadBlock, ATinyPriorIsANumberStill) {
     hits[0] = 1;
     map.getOrAllocate({{0, 0, 0}}).add(1, hits.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll, view);
+    readBlock(viewKernelsFor(set), map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll,
+              view);
     for (std::size_t v = 0; v < 2; ++v) {
       EXPECT_NEAR(view.probability[v], v == 0 ? 1.0 : 0.25, 1e-6);
       EXPECT_NEAR(view.occupancy[v], v == 0 ? 1.0 / 1.1 : 0.2 / (1.1 * 0.2 + 6.0), 1e-6);

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "map/block_group.h"
 #include "parallel/index_numbering.h"
-#include "update/block_group.h"
 
 namespace bki_mapping {
 

@@ -1,4 +1,4 @@
-#include "map/neighbourhood.h"
+#include "rules/neighbourhood.h"
 
 #include <algorithm>
 #include <array>
@@ -38,7 +38,7 @@ void copyPart(const std::array<EvidenceUnits, kBlockVoxels>& from, const Part& x
 /// Sums over the window of each voxel of the block, one axis after the other. @param first_layer of the
 /// window, along z.
 void sumWindows(const Votes& votes, std::size_t first_layer, std::array<EvidenceUnits, kBlockVoxels>& sums) {
-  static_assert(std::int64_t{SemanticMap::kMostVote} * kWindow * kWindow * kWindow <= kMostUnits,
+  static_assert(std::int64_t{StateRules::kMostVote} * kWindow * kWindow * kWindow <= kMostUnits,
                 "sums do not overflow");
   static_assert(kWindow == 5, "as many terms");
   constexpr std::size_t kInner = kBlockEdge, kRows = kEdge;
@@ -68,28 +68,29 @@ void sumWindows(const Votes& votes, std::size_t first_layer, std::array<Evidence
 
 }  // namespace
 
-bool mayAskNeighbourhood(const SemanticMap& map, const Block& block) {
+bool mayAskNeighbourhood(const StateRules& rules, const Block& block) {
   const auto& classes = block.classes();
-  return map.neighbourhoodRatio() > 0.0f &&
-         std::any_of(classes.begin(), classes.end(), [&](ClassId id) { return map.asksNeighbourhood(id); });
+  return rules.neighbourhoodRatio() > 0.0f &&
+         std::any_of(classes.begin(), classes.end(), [&](ClassId id) { return rules.asksNeighbourhood(id); });
 }
 
-bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
-                   const Block& block, Overruled& overruled) {
-  if (!mayAskNeighbourhood(map, block)) return false;
+bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+                   const BlockIndex& index, const Block& block, Overruled& overruled) {
+  if (!mayAskNeighbourhood(rules, block)) return false;
   BlockVotes own;
-  if (!kernels.votes(planesOf(map, block), {}, own)) return false;
+  if (!kernels.votes(planesOf(map, rules, block), {}, own)) return false;
   Votes kept{}, cleared{}, keeping{};
   BlockVotes beside;
-  for (int z = map.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
+  for (int z = rules.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
     const Part layers(z);
     for (int y = -1; y <= 1; ++y) {
       for (int x = -1; x <= 1; ++x) {
         const BlockVotes* votes = &own;
         if (x != 0 || y != 0 || z != 0) {
           const Block* const neighbour = map.find({{index.x + x, index.y + y, index.z + z}});
-          if (!neighbour || !mayAskNeighbourhood(map, *neighbour) ||
-              !kernels.votes(planesOf(map, *neighbour), {layers.from, layers.from + layers.count}, beside))
+          if (!neighbour || !mayAskNeighbourhood(rules, *neighbour) ||
+              !kernels.votes(planesOf(map, rules, *neighbour), {layers.from, layers.from + layers.count},
+                             beside))
             continue;
           votes = &beside;
         }
@@ -100,20 +101,21 @@ bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const Blo
     }
   }
   std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums, keeping_sums;
-  const std::size_t first_layer = map.neighbourhoodIsBelow() ? 0 : kReach;
+  const std::size_t first_layer = rules.neighbourhoodIsBelow() ? 0 : kReach;
   sumWindows(kept, first_layer, kept_sums);
   sumWindows(cleared, first_layer, cleared_sums);
   sumWindows(keeping, first_layer, keeping_sums);
   for (std::size_t v = 0; v < overruled.size(); ++v) {
     const VoteSums sums{kept_sums[v], cleared_sums[v], keeping_sums[v]};
     overruled[v] = kNotOverruled;
-    if (own.kept[v] > 0 && !areKept(map, sums)) overruled[v] = kCleared;
-    if (own.doubtful[v] > 0 && isRestored(map, own.doubtful[v], sums)) overruled[v] = kKept;
+    if (own.kept[v] > 0 && !areKept(rules, sums)) overruled[v] = kCleared;
+    if (own.doubtful[v] > 0 && isRestored(rules, own.doubtful[v], sums)) overruled[v] = kKept;
   }
   return true;
 }
 
-std::vector<GridIndex> withDependents(const SemanticMap& map, Span<const GridIndex> blocks) {
+std::vector<GridIndex> withDependents(const SemanticMap& map, const StateRules& rules,
+                                      Span<const GridIndex> blocks) {
   std::vector<GridIndex> all;
   GridTable known;
   const auto insert = [&](const GridIndex& index) {
@@ -121,14 +123,14 @@ std::vector<GridIndex> withDependents(const SemanticMap& map, Span<const GridInd
     if (known.insert(index, fresh) == fresh) all.push_back(index);
   };
   for (const GridIndex& index : blocks) insert(index);
-  if (!(map.neighbourhoodRatio() > 0.0f)) return all;
+  if (!(rules.neighbourhoodRatio() > 0.0f)) return all;
   for (const GridIndex& index : blocks) {
     // Where no voxel asks those below, nothing depends on what is below it.
-    for (int n = 0; n < (map.neighbourhoodIsBelow() ? 27 : 18); ++n) {
+    for (int n = 0; n < (rules.neighbourhoodIsBelow() ? 27 : 18); ++n) {
       const GridIndex beside{index.x + n % 3 - 1, index.y + n / 3 % 3 - 1, index.z + n / 9 - 1};
       if (known.find(beside) != kNoPosition) continue;
       const Block* const block = map.find({beside});
-      if (block && mayAskNeighbourhood(map, *block)) insert(beside);
+      if (block && mayAskNeighbourhood(rules, *block)) insert(beside);
     }
   }
   return all;

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 

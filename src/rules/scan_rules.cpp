@@ -1,9 +1,11 @@
-#include "update/update_rules.h"
+#include "rules/scan_rules.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+
+#include "rules/class_sets.h"
 
 namespace bki_mapping {
 namespace {
@@ -33,7 +35,7 @@ void limitHits(float most, BlockSums& hits) {
 }
 
 /// The voxels with sums of at least `least`, which is above 0.
-VoxelMask atLeast(float least, const BlockSums::Plane& plane, const SumKernels& kernels) {
+VoxelMask atLeast(float least, const BlockSums::Plane& plane, const LimitKernels& kernels) {
   LayerBits bits = {};
   kernels.find(plane.values, plane.layers, least, bits.data());
   return maskOf(bits);
@@ -49,7 +51,7 @@ void clear(std::uint64_t voxels, float* values) {
 }
 
 /// Notes what the threshold takes from the bottom layer of a block, unless the voxels below are crossed.
-void holdBack(const UpdateRules& rules, const SumKernels& kernels, const float* sums, BlockSeam& seam) {
+void holdBack(const ScanRules& rules, const LimitKernels& kernels, const float* sums, BlockSeam& seam) {
   std::uint64_t some = 0, all = 0;
   kernels.find(sums, {0, 1}, std::numeric_limits<float>::min(), &some);
   // The next float, in case that the sum was rounded down: then nothing is missing from what is in `all`.
@@ -61,7 +63,17 @@ void holdBack(const UpdateRules& rules, const SumKernels& kernels, const float* 
 
 }  // namespace
 
-void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums& hits,
+ScanRules::ScanRules(const ScanLimitConfig& config, const ClassTable& classes)
+    : hits_before_misses(config.hits_before_misses),
+      evidence_before_misses(config.evidence_before_misses),
+      free_threshold(static_cast<float>(config.free_threshold)),
+      void_evidence(static_cast<float>(config.void_space)),
+      fixed(fixedClasses(classes)) {
+  if (config.hits > 0.0) most_hits = static_cast<float>(config.hits);
+  if (config.free > 0.0) most_free = static_cast<float>(config.free);
+}
+
+void applyToHits(const ScanRules& rules, const LimitKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected) {
   if (rules.hits_before_misses) is_protected |= hits.occupied;
   if (rules.evidence_before_misses) {
@@ -72,7 +84,7 @@ void applyToHits(const UpdateRules& rules, const SumKernels& kernels, BlockSums&
   if (std::isfinite(rules.most_hits)) limitHits(rules.most_hits, hits);
 }
 
-VoxelMask applyToFree(const UpdateRules& rules, const SumKernels& kernels, const VoxelMask& is_protected,
+VoxelMask applyToFree(const ScanRules& rules, const LimitKernels& kernels, const VoxelMask& is_protected,
                       std::uint64_t below, BlockSums& free, BlockSeam* seam) {
   constexpr int kLayer = kBlockEdge * kBlockEdge;
   const bool limits = rules.free_threshold > 0.0f || std::isfinite(rules.most_free) || rules.seeksVoids();
@@ -94,12 +106,12 @@ EvidenceUnits roundedUnits(float sum) {
   return static_cast<EvidenceUnits>(static_cast<double>(std::min(sum, kMostSum) / kEvidenceUnit) + 0.5);
 }
 
-EvidenceUnits heldBack(const UpdateRules& rules, float sum) {
+EvidenceUnits heldBack(const ScanRules& rules, float sum) {
   const float kept = std::min(std::max(sum - rules.free_threshold, 0.0f), rules.most_free);
   return roundedUnits(std::min(sum, rules.most_free)) - roundedUnits(kept);
 }
 
-void noteHits(const UpdateRules& rules, const SumKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
+void noteHits(const ScanRules& rules, const LimitKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
               VoxelMask& hit) {
   VoxelMask may_move;
   for (const BlockSums::Plane& plane : hits) {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -25,7 +25,8 @@ struct BlockPlanes {
   };
 
   const SemanticMap* map;
-  EvidenceUnits most_vote;                ///< SemanticMap::mostVote
+  const StateRules* rules;
+  EvidenceUnits most_vote;                ///< StateRules::mostVote
   std::array<Plane, kMaxClasses> planes;  ///< of classes, by rising id; the first `count`
   std::size_t count = 0;
   const EvidenceUnits* free = nullptr;  ///< zeros if the block has no plane for `free`
@@ -33,7 +34,7 @@ struct BlockPlanes {
   const Overruled* overruled = nullptr;  ///< by the voxels around; nullptr: none is
 };
 
-/// What the voxels of a block say to those around that ask (12b) [units, at most SemanticMap::mostVote]: the
+/// What the voxels of a block say to those around that ask (12b) [units, at most StateRules::mostVote]: the
 /// evidence for the likeliest class where that asks its neighbourhood, too, and the voxel's own evidence
 /// keeps or clears it.
 struct BlockVotes {
@@ -62,12 +63,12 @@ struct ViewKernels {
 /// @throws std::invalid_argument for any other.
 const ViewKernels& viewKernelsFor(const std::string& instruction_set);
 
-/// The planes of a block. @param map that decides; it need not have the block.
-BlockPlanes planesOf(const SemanticMap& map, const Block& block);
+/// The planes of a block, which the map need not have.
+BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Block& block);
 
 /// readBlock with the given loops.
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIndex& index,
-               const Block& block, BlockFields fields, BlockView& view);
+void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+               const BlockIndex& index, const Block& block, BlockFields fields, BlockView& view);
 
 // Scalar parts, which all instruction sets share, so that they decide alike:
 
@@ -75,7 +76,7 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const BlockIn
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free);
 /// log2 of the share that (12a) asks of what remains: a quarter of the evidence of what has left.
 constexpr int kRemainingShift = 2;
-/// SemanticMap::freeGain, compiled for any processor.
-float decayedGain(const SemanticMap& map, ClassId id, float hits);
+/// StateRules::freeGain, compiled for any processor.
+float decayedGain(const StateRules& rules, ClassId id, float hits);
 
 }  // namespace bki_mapping

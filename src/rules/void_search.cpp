@@ -1,4 +1,4 @@
-#include "update/void_search.h"
+#include "rules/void_search.h"
 
 #include <cstdint>
 

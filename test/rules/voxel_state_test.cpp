@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 namespace {
@@ -28,8 +28,8 @@ SemanticMap mapWith(const std::vector<std::pair<int, float>>& evidence, int offs
 
 VoxelView viewOf(const std::vector<std::pair<int, float>>& evidence) {
   const SemanticMap map = mapWith(evidence, 77);
-  const VoxelView view = viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
-  const VoxelView judged = viewWithoutEntropy(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
+  const VoxelView view = viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
+  const VoxelView judged = viewWithoutEntropy(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   EXPECT_EQ(judged.state, view.state);
   EXPECT_EQ(judged.label, view.label);
   EXPECT_EQ(judged.probability, view.probability);
@@ -91,7 +91,7 @@ struct RandomVoxel {
   std::array<double, 3> gains;
   double persistence;
   double remaining = 0.0;  ///< gain of what remains
-  SemanticMap::Classes fixed;
+  ClassSet fixed;
 
   explicit RandomVoxel(std::mt19937& random) {
     std::uniform_real_distribution<float> exponent(-6.0f, 6.0f);
@@ -102,11 +102,12 @@ struct RandomVoxel {
     persistence = random() % 2 == 0 ? 0.0 : 2.0;
   }
   VoxelView view() const {
-    SemanticMap map = mapWith(evidence, 77);
-    for (std::size_t id = 0; id < gains.size(); ++id) map.setFreeGain(static_cast<ClassId>(id), gains[id]);
-    map.setGainPersistence(persistence);
-    map.setRemainingGain(remaining, fixed);
-    return viewPoint(map, map.geometry().voxelCentre(GridGeometry::voxelOf({{0, 0, 0}}, 77)));
+    const SemanticMap map = mapWith(evidence, 77);
+    StateRules rules = StateRules().withPersistence(persistence).withRemaining(remaining, fixed);
+    for (std::size_t id = 0; id < gains.size(); ++id) {
+      rules = rules.withFreeGain(static_cast<ClassId>(id), gains[id]);
+    }
+    return viewPoint(map, rules, map.geometry().voxelCentre(GridGeometry::voxelOf({{0, 0, 0}}, 77)));
   }
   /// The same with evidence added. @param id of a class, or kFreeClass.
   RandomVoxel with(int id, float more) const {
@@ -120,11 +121,9 @@ struct RandomVoxel {
     for (const auto& each : evidence)
       best = each.first != kFreeClass && each.second > best.second ? each : best;
     if (best.first == kFreeClass) return 1.0;
-    SemanticMap map(GridGeometry(1.0), kPrior, 3);
     const auto id = static_cast<ClassId>(best.first);
-    map.setFreeGain(id, gains[id]);
-    map.setGainPersistence(persistence);
-    return static_cast<double>(map.freeGain(id, best.second));
+    const StateRules rules = StateRules().withFreeGain(id, gains[id]).withPersistence(persistence);
+    return static_cast<double>(rules.freeGain(id, best.second));
   }
 };
 
@@ -220,9 +219,8 @@ TEST(VoxelState, WhatRemainsIsAtLeastAQuarter) {
       plane[77] = units;
       map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(id), plane);
     }
-    map.setFreeGain(1, 1e12);
-    map.setRemainingGain(1e-6, SemanticMap::Classes(0b100));
-    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
+    const StateRules rules = StateRules().withFreeGain(1, 1e12).withRemaining(1e-6, ClassSet(0b100));
+    return viewVoxel(map, rules, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
   };
   for (const EvidenceUnits quarter : {1, 2, 1000, 1 << 28}) {
     EXPECT_EQ(state(4 * (quarter - 1) + 3, quarter), VoxelState::kOccupied) << quarter;
@@ -265,7 +263,7 @@ TEST(VoxelState, ProbabilitiesDoNotDependOnTheUnitOfEvidence) {
       plane[77] = unitsOf(static_cast<double>(unit * value));
       map.getOrAllocate({{0, 0, 0}}).add(static_cast<ClassId>(id), plane);
     }
-    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
+    return viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   };
   EXPECT_FLOAT_EQ(view(64.0f).occupancy, view(1.0f).occupancy);
   EXPECT_FLOAT_EQ(view(64.0f).class_probability, view(1.0f).class_probability);
@@ -281,7 +279,7 @@ TEST(VoxelState, TheLastUnitDecides) {
       plane[77] = units;
       map.getOrAllocate({{0, 0, 0}}).add(id, plane);
     }
-    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
+    return viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77);
   };
   constexpr EvidenceUnits kMany = 1 << 30;
   EXPECT_EQ(viewOfUnits(kMany, kMany + 1, 0).label, 2);
@@ -300,30 +298,30 @@ TEST(VoxelState, FreeVoxelAndTies) {
 }
 
 TEST(VoxelState, GainsDecideTheStateAndLeaveThePosterior) {
-  SemanticMap map = mapWith({{1, 0.375f}, {2, 0.25f}, {kFreeClass, 0.5f}}, 77);
-  const auto view = [&map] { return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77); };
+  const SemanticMap map = mapWith({{1, 0.375f}, {2, 0.25f}, {kFreeClass, 0.5f}}, 77);
+  StateRules rules;
+  const auto view = [&] { return viewVoxel(map, rules, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77); };
   const double sum = 1.125 + 4 * kPrior;
   EXPECT_EQ(view().state, VoxelState::kFree);
   EXPECT_NEAR(view().probability, (0.5 + kPrior) / sum, 1e-6);
-  map.setFreeGain(1, 0.1);
+  rules = rules.withFreeGain(1, 0.1);
   EXPECT_EQ(view().state, VoxelState::kOccupied);
   EXPECT_EQ(view().label, 1);
   EXPECT_NEAR(view().probability, (0.375 + kPrior) / sum, 1e-6);
   EXPECT_NEAR(view().occupancy, occupancyOf(0.375, 0.5), 1e-6) << "a gain below 1 is a choice, not a fact";
-  map.setFreeGain(1, 4.0);
+  rules = rules.withFreeGain(1, 4.0);
   EXPECT_NEAR(view().occupancy, occupancyOf(0.375, 4.0 * 0.5), 1e-6) << "one above 1 says that things move";
-  map.setFreeGain(1, 1.0);
-  map.setFreeGain(2, 0.1);  // not the class with the most evidence
+  rules = rules.withFreeGain(1, 1.0);
+  rules = rules.withFreeGain(2, 0.1);  // not the class with the most evidence
   EXPECT_EQ(view().state, VoxelState::kFree);
 }
 
 TEST(VoxelState, RepeatedHitsOutweighTheGain) {
   // With a gain of 4, free wins with over a quarter of the hits' evidence; persistence lowers the gain.
   const auto state = [](float hits, float free, double persistence) {
-    SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
-    map.setFreeGain(1, 4.0);
-    map.setGainPersistence(persistence);
-    return viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
+    const SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
+    const StateRules rules = StateRules().withFreeGain(1, 4.0).withPersistence(persistence);
+    return viewVoxel(map, rules, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
   };
   EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
   EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have been passing";  // gain 3.5
@@ -333,15 +331,15 @@ TEST(VoxelState, RepeatedHitsOutweighTheGain) {
 }
 
 TEST(VoxelState, GainsWithoutEvidenceForFreeMakeNothingFree) {
-  SemanticMap map = mapWith({{1, 0.4f}}, 77);
-  map.setFreeGain(1, 1000.0);
-  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
+  const SemanticMap map = mapWith({{1, 0.4f}}, 77);
+  const StateRules rules = StateRules().withFreeGain(1, 1000.0);
+  EXPECT_EQ(viewVoxel(map, rules, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state, VoxelState::kOccupied);
 }
 
 TEST(VoxelState, UnknownVoxelHasThePrior) {
   const SemanticMap map = mapWith({{1, 1.0f}}, 0);
-  for (const VoxelView& view :
-       {viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 5), viewPoint(map, {100.0, 0.0, 0.0})}) {
+  for (const VoxelView& view : {viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 5),
+                                viewPoint(map, StateRules(), {100.0, 0.0, 0.0})}) {
     EXPECT_EQ(view.state, VoxelState::kUnknown);
     EXPECT_NEAR(view.probability, 0.25, 1e-6);
     EXPECT_NEAR(view.occupancy, occupancyOf(0.0, 0.0), 1e-6);
@@ -356,9 +354,11 @@ TEST(VoxelState, OccludedOnlyWithoutEvidence) {
   Block::Occlusion marks;
   marks.set(0).set(1);
   map.getOrAllocate({{0, 0, 0}}).setOcclusion(marks);
-  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 0).state, VoxelState::kOccupied);
-  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 1).state, VoxelState::kOccluded);
-  EXPECT_EQ(viewVoxel(map, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
+  EXPECT_EQ(viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 0).state,
+            VoxelState::kOccupied);
+  EXPECT_EQ(viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 1).state,
+            VoxelState::kOccluded);
+  EXPECT_EQ(viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
 }
 
 TEST(VoxelState, VisitsKnownVoxelsInSortedOrder) {
@@ -367,7 +367,7 @@ TEST(VoxelState, VisitsKnownVoxelsInSortedOrder) {
   plane[3] = unitsOf(1.0);
   for (const int x : {4, -2, 0}) map.getOrAllocate({{x, 0, 0}}).add(0, plane);
   std::vector<int> seen;
-  forEachKnownVoxel(map, [&](const VoxelIndex& v, const VoxelView&) { seen.push_back(v.x); });
+  forEachKnownVoxel(map, StateRules(), [&](const VoxelIndex& v, const VoxelView&) { seen.push_back(v.x); });
   EXPECT_EQ(seen, (std::vector<int>{-13, 3, 35}));
 }
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/map/voxel_state.h"
+#include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {
 
@@ -69,11 +69,11 @@ class ColumnMap {
   /// Recomputes the stacks that contain the given blocks, or others whose states depend on their evidence.
   /// @param changed blocks that have changed, or were created or erased. @return those stacks; stacks without
   /// blocks are no longer in columns().
-  std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes,
+  std::set<StackIndex> update(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
                               const std::vector<GridIndex>& changed);
 
   /// Recomputes all stacks of a map. @return them.
-  std::set<StackIndex> update(const SemanticMap& map, const ClassTable& classes);
+  std::set<StackIndex> update(const SemanticMap& map, const StateRules& rules, const ClassTable& classes);
 
   const std::map<StackIndex, Columns>& columns() const { return columns_; }
   /// The column that contains a voxel; nullptr if no block is above or below it, or it.

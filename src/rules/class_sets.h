@@ -1,0 +1,15 @@
+/// @file The sets of classes for which rules differ. The paper treats all classes alike.
+#pragma once
+
+#include "bki_mapping/core/class_table.h"
+
+namespace bki_mapping {
+
+/// The classes that cannot move: those without the flag dynamic, except the unlabelled one.
+ClassSet fixedClasses(const ClassTable& classes);
+
+/// The classes that ask their neighbourhood (12b): what can be parked; or all but the unlabelled one, if the
+/// table does not say what can move.
+ClassSet askingClasses(const ClassTable& classes);
+
+}  // namespace bki_mapping
