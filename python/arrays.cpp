@@ -107,6 +107,10 @@ void flatten(const py::dict& settings, const std::string& group, std::map<std::s
 
 }  // namespace
 
+void warn(const std::string& sentence) {
+  if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 std::string typeName(py::handle object) {
   return py::str(py::handle(reinterpret_cast<PyObject*>(Py_TYPE(object.ptr()))).attr("__name__"));
 }

@@ -22,6 +22,9 @@ namespace py = pybind11;
 /// The name of an object's type, for messages.
 std::string typeName(py::handle object);
 
+/// Issues a UserWarning. @throws pybind11::error_already_set if warnings are errors.
+void warn(const std::string& sentence);
+
 /// An object as an array. @param wanted what it must be, for messages. @throws std::invalid_argument also if
 /// it is a masked array of NumPy with masked values: as an array it would show what lies below the mask.
 py::array arrayOf(py::handle object, const std::string& name, const std::string& wanted);

@@ -54,10 +54,6 @@ MapperConfig configOf(py::handle config, py::handle resolution, py::dict paramet
   return result;
 }
 
-void warn(const std::string& sentence) {
-  if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) throw py::error_already_set();
-}
-
 void warnOf(const MapperConfig& config, const ClassTable& classes) {
   for (const std::string& warning : settingWarnings(config, classes)) warn(warning);
 }

@@ -13,6 +13,7 @@
 #include "bki_mapping/store/map_merge.h"
 #include "city_bindings.h"
 #include "class_bindings.h"
+#include "io/pose_agreement.h"
 #include "map_bindings.h"
 #include "mapper_bindings.h"
 
@@ -79,6 +80,29 @@ std::optional<PosesIn> sensorOf(const std::optional<std::string>& name) {
   throw std::invalid_argument("poses_in is '" + *name + "', but must be 'camera' or 'lidar'");
 }
 
+/// The number of scans before the first one without a pose.
+std::size_t posedScans(const Sequence& sequence) {
+  std::size_t i = 0;
+  try {
+    for (; i < sequence.size(); ++i) sequence.pose(i);
+  } catch (const std::runtime_error&) {  // reported when the scan is read
+  }
+  return i;
+}
+
+/// Opens a folder, and warns of poses that seem to be those of the other sensor.
+std::unique_ptr<Sequence> openSequence(const std::string& path, const SequenceOptions& options) {
+  std::unique_ptr<Sequence> sequence;
+  std::string warning;
+  {
+    const py::gil_scoped_release release;
+    sequence = std::make_unique<Sequence>(path, options);
+    warning = poseWarning(path, options, 0, posedScans(*sequence));
+  }
+  if (!warning.empty()) warn(warning);
+  return sequence;
+}
+
 void addSequence(py::module& m) {
   using Frame = SequenceFrame;
   py::class_<Frame, std::shared_ptr<Frame>>(m, "Frame", "One scan of a sequence, in the sensor's frame.")
@@ -118,8 +142,7 @@ void addSequence(py::module& m) {
              options.labels = labels.value_or("");
              if (!poses.is_none()) options.map_poses = pathOf(poses, "poses");
              options.poses_in = sensorOf(poses_in);
-             const py::gil_scoped_release release;
-             return std::make_unique<Sequence>(path, options);
+             return openSequence(path, options);
            }),
            py::arg("folder"), py::arg("labels") = "labels", py::arg("poses") = py::none(),
            py::arg("poses_in") = py::none(),
@@ -129,6 +152,7 @@ void addSequence(py::module& m) {
            "poses: a file of poses in the map frame, instead of poses.txt, relative to its first pose.\n"
            "poses_in: which sensor the poses are of, 'camera' or 'lidar'; by default the camera, as in "
            "KITTI, and the lidar if poses have stamps.\n\n"
+           "Without poses_in, warns if the scans agree much better with poses of the other sensor.\n"
            "Raises RuntimeError if a file is missing or wrong. A pose or time that is missing or wrong is "
            "reported when its scan is read.")
       .def("__len__", &Sequence::size)

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/core/grid_table.h"
+#include "bki_mapping/core/named_parameter.h"
 
 namespace bki_mapping {
 namespace {
@@ -114,6 +117,10 @@ double distanceTo(const Cells& earlier, const std::vector<Eigen::Vector3f>& poin
   return sum / static_cast<double>(points.size());
 }
 
+const char* nameOf(PosesIn sensor) {
+  return sensor == PosesIn::kCamera ? "camera" : "lidar";
+}
+
 std::vector<Eigen::Vector3f> someOf(const std::vector<Eigen::Vector3f>& points) {
   std::vector<Eigen::Vector3f> some;
   const std::size_t step = points.size() / kPoints + 1;
@@ -141,6 +148,31 @@ std::optional<PoseAgreement> comparePoses(const Sequence& given, const Sequence&
   agreement.as_given /= static_cast<double>(compared);
   agreement.otherwise /= static_cast<double>(compared);
   return agreement;
+}
+
+std::string poseWarning(const std::string& folder, SequenceOptions options, std::size_t first,
+                        std::size_t last) {
+  if (options.poses_in) return "";
+  options.labels.clear();
+  const Sequence as_given(folder, options);
+  if (as_given.layout() != SequenceLayout::kSemanticKitti) return "";
+  const bool of_camera = as_given.posesIn() == PosesIn::kCamera;
+  if (!of_camera && !std::filesystem::exists(std::filesystem::path(folder) / "calib.txt")) return "";
+  options.poses_in = of_camera ? PosesIn::kLidar : PosesIn::kCamera;
+  std::optional<PoseAgreement> agreement;
+  try {
+    agreement = comparePoses(as_given, Sequence(folder, options), first, last);
+  } catch (const std::runtime_error&) {  // the other reading is impossible, or a scan has a fault
+    return "";
+  }
+  if (!agreement || !agreement->otherIsBetter()) return "";
+  const auto centimetres = [](double metres) { return numberText(std::round(100.0 * metres)) + " cm"; };
+  return std::string("the poses seem to be those of the ") + nameOf(*options.poses_in) +
+         ": points of following scans are " + centimetres(agreement->as_given) + " apart as poses of the " +
+         nameOf(as_given.posesIn()) + ", but " + centimetres(agreement->otherwise) + " as poses of the " +
+         nameOf(*options.poses_in) +
+         "; say which they are of with --poses-in camera or --poses-in lidar (poses_in in Python and "
+         "city.yaml)";
 }
 
 }  // namespace bki_mapping

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 
 #include "bki_mapping/io/sequence.h"
 
@@ -22,5 +23,12 @@ struct PoseAgreement {
 /// as where the sensor rests. @throws std::runtime_error as Sequence::read.
 std::optional<PoseAgreement> comparePoses(const Sequence& given, const Sequence& other, std::size_t first,
                                           std::size_t last);
+
+/// What to say of a range of scans that agree much better when their poses are read as those of the other
+/// sensor, with the remedy; "" if they do not, if the options say which sensor the poses are of, or if a scan
+/// cannot be read, which is said when it is mapped.
+/// @param first, last half-open range of the scans. @throws std::runtime_error as Sequence.
+std::string poseWarning(const std::string& folder, SequenceOptions options, std::size_t first,
+                        std::size_t last);
 
 }  // namespace bki_mapping

@@ -1,13 +1,11 @@
 #include "tools/sequence_options.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
 
-#include "bki_mapping/core/named_parameter.h"
 #include "io/pose_agreement.h"
 
 namespace bki_mapping::tools {
@@ -24,10 +22,6 @@ std::optional<PosesIn> posesIn(const po::variables_map& given) {
   if (sensor == "camera") return PosesIn::kCamera;
   if (sensor == "lidar") return PosesIn::kLidar;
   throw std::invalid_argument("--poses-in '" + sensor + "' is unknown; known sensors: camera, lidar");
-}
-
-const char* nameOf(PosesIn sensor) {
-  return sensor == PosesIn::kCamera ? "camera" : "lidar";
 }
 
 }  // namespace
@@ -83,29 +77,7 @@ std::pair<std::size_t, std::size_t> frameRange(const po::variables_map& given, c
 }
 
 void warnOfPoses(const po::variables_map& given, std::size_t first, std::size_t last) {
-  if (given.count("poses-in")) return;
-  const std::string folder = given["sequence"].as<std::string>();
-  SequenceOptions options = sequenceOptionsOf(given);
-  options.labels.clear();
-  const Sequence as_given(folder, options);
-  if (as_given.layout() != SequenceLayout::kSemanticKitti) return;
-  const bool of_camera = as_given.posesIn() == PosesIn::kCamera;
-  if (!of_camera && !std::filesystem::exists(std::filesystem::path(folder) / "calib.txt")) return;
-  options.poses_in = of_camera ? PosesIn::kLidar : PosesIn::kCamera;
-  std::optional<PoseAgreement> agreement;
-  try {
-    agreement = comparePoses(as_given, Sequence(folder, options), first, last);
-  } catch (const std::runtime_error&) {  // the other reading is impossible; a scan's fault is said when it is
-                                         // mapped
-    return;
-  }
-  if (!agreement || !agreement->otherIsBetter()) return;
-  const auto centimetres = [](double metres) { return numberText(std::round(100.0 * metres)) + " cm"; };
-  std::cerr << "warning: the poses seem to be those of the " << nameOf(*options.poses_in)
-            << ": points of following scans are " << centimetres(agreement->as_given)
-            << " apart as poses of the " << nameOf(as_given.posesIn()) << ", but "
-            << centimetres(agreement->otherwise) << " as poses of the " << nameOf(*options.poses_in)
-            << "; say which they are of with --poses-in camera or --poses-in lidar\n";
+  warn(poseWarning(given["sequence"].as<std::string>(), sequenceOptionsOf(given), first, last));
 }
 
 }  // namespace bki_mapping::tools

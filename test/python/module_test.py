@@ -349,6 +349,25 @@ class Files(WithFolder):
         with self.assertRaisesRegex(ValueError, "poses_in is 'radar', but must be 'camera' or 'lidar'"):
             bki.Sequence(self.path('drive'), None, poses_in='radar')
 
+    def test_poses_of_the_other_sensor_are_noticed(self):
+        drive = self.path('drive')
+        subprocess.run([os.path.join(BIN, 'simulate_drive'), '--scans', '4', '--beams', '32', '--columns', '400', '--output', drive],
+                       check=True, capture_output=True, timeout=60)
+        with open(os.path.join(drive, 'calib.txt'), 'w') as file:
+            file.write('Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n')
+        with self.assertWarnsRegex(UserWarning, '^the poses seem to be those of the lidar: .*poses_in in Python'):
+            bki.Sequence(drive)
+        with open(os.path.join(drive, 'poses.txt')) as file:
+            poses = file.read()
+        with open(os.path.join(drive, 'poses.txt'), 'w') as file:
+            file.write(''.join(poses.splitlines(True)[:3]))  # the last scan has no pose
+        with self.assertWarnsRegex(UserWarning, 'seem to be those of the lidar'):
+            bki.Sequence(drive)
+        with warnings.catch_warnings():
+            warnings.simplefilter('error')
+            for sensor in ('lidar', 'camera'):
+                bki.Sequence(drive, poses_in=sensor)
+
     def test_save_load_add_and_merge(self):
         a, b = bki.SemanticMapper(drive='a'), bki.SemanticMapper(drive='b')
         a.integrate((0, 0, 1), *wall())

@@ -139,7 +139,7 @@ class Sequences(unittest.TestCase):
                 continue
             self.assertNotEqual(default, whole)
             self.assertRegex(said, r'^warning: the poses seem to be those of the lidar: .* \d+ cm apart as poses of the camera, but '
-                                   r'\d+ cm as poses of the lidar; say .* --poses-in lidar\n$')
+                                   r'\d+ cm as poses of the lidar; say .* --poses-in lidar \(poses_in in Python and city.yaml\)\n$')
             self.assertIn('poses seem to be those of the lidar', call('evaluate_map', '--sequence', self.drive).stderr)
         stamps = self.write('stamped.txt', *(f'{0.1 * n} {" ".join(repr(row[3]) for row in product(product(TR, pose), inverse(TR)))} 0 0 0 1'
                                              for n, pose in enumerate(self.poses)))
