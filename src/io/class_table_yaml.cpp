@@ -123,8 +123,12 @@ std::vector<std::string> classTableNames() {
   return namedFiles(kClassFolder);
 }
 
+std::string classTableFile(const std::string& name_or_file) {
+  return findNamedFile("class table", kClassFolder, name_or_file);
+}
+
 ClassTable loadClassTable(const std::string& name_or_file) {
-  const std::string file = findNamedFile("class table", kClassFolder, name_or_file);
+  const std::string file = classTableFile(name_or_file);
   try {
     const YAML::Node root = loadYamlFile(file);
     if (!root.IsMap()) fail(file, "it must be a map with a list 'classes'");

@@ -1,6 +1,7 @@
 // Maps a sequence in SemanticKITTI's layout without ROS, and writes a map file and a report.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
@@ -45,7 +46,8 @@ po::options_description options() {
       "points", text("FILE.pcd"),
       "file for the points of the scans that lie in occupied voxels of the final map")(
       "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
-                                                        "print the effective parameters as YAML, and exit");
+                                                        "print the effective parameters as YAML, and exit")(
+      "print-classes", po::bool_switch(), "print the file of the class table, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -120,6 +122,10 @@ std::string stoppedText(const po::variables_map& given, const Sequence& sequence
 int mapSequence(const po::variables_map& given) {
   if (given["print-config"].as<bool>()) {
     std::cout << parameterYaml(tools::mapperConfig(given));
+    return 0;
+  }
+  if (given["print-classes"].as<bool>()) {
+    std::cout << std::ifstream(classTableFile(given["classes"].as<std::string>())).rdbuf();
     return 0;
   }
   const auto states = parseStates(given["include"].as<std::string>());

@@ -4,16 +4,19 @@ import contextlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import unittest
 
-from harness import BIN, DRIVES, SOURCE, MadeCity, tiles_of
+from harness import BIN, DRIVES, SOURCE, MadeCity, program, tiles_of
 
+import numpy as np
 import psutil
 from bki_mapping.city import report, work
 from bki_mapping.city.description import Bag, CityError, Drive, read_city
@@ -105,7 +108,7 @@ class Made(MadeCity):
             (programs / name).write_text('#!/bin/sh\n' + script)
             (programs / name).chmod(0o755)
 
-        at_start = f'case "$1" in --version|--print-config) exec {BIN}/map_sequence "$@";; esac\n'
+        at_start = f'case "$1" in --version|--print-*) exec {BIN}/map_sequence "$@";; esac\n'
         replace('map_sequence', at_start + 'echo "$0: error while loading shared libraries: libyaml-cpp.so" >&2; exit 127\n')
         fails(rf'map_sequence cannot be started on {host} .*libyaml-cpp.*; install the same version of bki_mapping there')
         replace('map_sequence', at_start + 'kill -9 $$\n')
@@ -119,6 +122,107 @@ class Made(MadeCity):
         (programs / 'merge_maps').symlink_to(BIN / 'merge_maps')
         self.finish(self.start(city, '--workers', '2', '--resume', programs=programs))
         self.expect_equal(['d1', 'd2'])
+
+    def test_warnings_are_said_once_each(self):
+        """What programs warn of in each piece reaches the user, whatever its figures."""
+        drive = self.folder / 'camera'
+        shutil.copytree(self.folder / 'd1', drive)
+        (drive / 'calib.txt').write_text('Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n')  # poses.txt stays that of the lidar
+        for path in drive.glob('labels/*'):
+            path.write_bytes(np.full(path.stat().st_size // 4, 7, '<u4').tobytes())
+        text = self.finish(self.start(self.describe(['camera', 'd2']), '--workers', '2', '--no-picture'))
+        label = r"warning: drive 'camera' from scan \d: 100 ?% of the points .* class table 'semantic_kitti' does not list.*: 7 \("
+        self.assertEqual(len(re.findall(label, text)), 1, text)
+        self.assertEqual(text.count('the poses seem to be those of the lidar'), 1, text)
+        self.assertEqual(text.count('warning: '), 2, text)
+        found = (self.output / 'report.md').read_text()
+        self.assertRegex(found, r"\| drive 'camera' from scan \d \| 3 \| 100 ?% of the points")
+        self.assertNotIn('warnings', (self.output / 'index.json').read_text())
+
+    def test_settings_of_drives_reach_the_programs(self):
+        """poses_in and labels: none make the maps that map_sequence makes with the same options."""
+        drive = self.folder / 'lidar'
+        shutil.copytree(self.folder / 'd1', drive)
+        (drive / 'calib.txt').write_text('Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n')
+        shutil.rmtree(drive / 'labels')
+        city = self.describe([], classes='occupancy', drives=[{'sequence': 'lidar', 'poses_in': 'lidar', 'labels': 'none'}])
+        text = self.finish(self.start(city, '--workers', '2', '--no-picture'))
+        self.assertNotIn('warning', text)
+        index = json.loads((self.output / 'index.json').read_text())
+        self.assertEqual(index['drives'][0]['poses_in'], 'lidar')
+        program('map_sequence', '--sequence', drive, '--poses', drive / 'poses.txt', '--poses-in', 'lidar', '--labels', 'none',
+                '--classes', 'occupancy', '--output', self.folder / 'whole-lidar.bkm')
+        self.expect_equal(['lidar'])
+        for key, value, sentence in (('poses_in', 'radar', 'poses_in in .* is \'radar\'; give camera or lidar'),
+                                     ('labels', 3, 'labels in .* is 3; give a text')):
+            city.write_text(json.dumps({'drives': [{'sequence': 'lidar', key: value}]}))
+            with self.assertRaisesRegex(CityError, sentence):
+                read_city(city)
+
+    def test_a_program_that_is_interrupted_is_asked_again_and_then_of_the_worker(self):
+        """Status 130 says that a signal has ended a program early: the drive is not broken, and its part is not used."""
+        programs = self.folder / 'interrupted'
+        programs.mkdir()
+        for name in ('merge_maps', 'inspect_map'):
+            (programs / name).symlink_to(BIN / name)
+        script = programs / 'map_sequence'
+        at_start = f'#!/bin/sh\ncase "$1" in --version|--print-*) exec {BIN}/map_sequence "$@";; esac\n'
+        script.write_text(at_start + f'[ -e "$0.once" ] || {{ : >"$0.once"; {BIN}/map_sequence "$@" & sleep 0.1; '
+                          f'kill -INT $!; wait $!; exit 130; }}\nexec {BIN}/map_sequence "$@"\n')
+        script.chmod(0o755)
+        city = self.describe(['d1', 'd2'])
+        self.finish(self.start(city, '--workers', '1', '--no-picture', programs=programs))
+        self.expect_equal(['d1', 'd2'])
+        script.write_text(at_start + 'exit 130\n')
+        shutil.rmtree(self.output / 'pieces/d2')
+        text = self.finish(self.start(city, '--workers', '1', '--no-picture', '--resume', programs=programs), 1)
+        self.assertRegex(text, 'map_city: map_sequence was ended 3 times by signal 15 on ')
+        self.assertNotIn('is left out', text)
+
+    def interrupted(self, process):
+        """Waits until a program maps, and interrupts map_city as a terminal does: all of its processes. Returns them."""
+        children, end = [], time.monotonic() + 60
+        while not any(child.name() == 'map_sequence' for child in children):
+            self.assertLess(time.monotonic(), end)
+            with contextlib.suppress(psutil.Error):
+                children = psutil.Process(process.pid).children(recursive=True)
+                children = [child for child in children if child.name()]
+        os.killpg(process.pid, signal.SIGINT)
+        return children
+
+    def test_nothing_is_written_after_an_interruption(self):
+        programs = self.folder / 'slow'
+        programs.mkdir()
+        script = programs / 'map_sequence'
+        script.write_text(f'#!/bin/bash\ncase "$1" in --version|--print-*) exec {BIN}/map_sequence "$@";; esac\n'
+                          f'trap "" INT\nsleep 3\ntouch "$0.late"\n')  # deaf, and so alive when its worker ends
+        script.chmod(0o755)
+        process = self.start(self.describe(['d1', 'd2']), '--workers', '2', '--no-picture', programs=programs,
+                             start_new_session=True)
+        children = self.interrupted(process)
+        self.assertIn('map_city: stopped; continue with --resume', self.finish(process, 130))
+        gone, alive = psutil.wait_procs(children, timeout=2)
+        self.assertEqual(alive, [])
+        self.assertFalse(script.with_name('map_sequence.late').exists())
+        self.finish(self.start(self.describe(['d1', 'd2']), '--workers', '2', '--no-picture', '--resume'))
+        self.expect_equal(['d1', 'd2'])
+
+    def test_a_worker_of_an_ended_run_kills_its_program(self):
+        """As where map_city is interrupted, and its workers are those of a cluster, which goes on."""
+        token = self.folder / 'ended'
+        token.write_text('')
+        programs = self.folder / 'endless'
+        programs.mkdir()
+        (programs / 'map_sequence').write_text('#!/bin/sh\nexec sleep 60\n')
+        (programs / 'map_sequence').chmod(0o755)
+        setup = work.Setup(str(self.folder), str(programs), str(token), (), '')
+        timer = threading.Timer(0.5, token.unlink)
+        timer.start()
+        begin = time.monotonic()
+        with self.assertRaisesRegex(work.Fault, 'map_city has ended'):
+            work.run(setup, 'map_sequence', [], 'ended.log')
+        self.assertLess(time.monotonic() - begin, 20)
+        timer.join()
 
     def test_other_programs_and_unseen_folders_are_of_the_worker(self):
         token = self.folder / 'token'
@@ -346,6 +450,32 @@ class Made(MadeCity):
         self.assertFalse(set(files()) & set(before))
         before, identity = files(), 'bki_mapping 2'
         self.assertFalse(set(files()) & set(before))
+
+    def test_presets_and_tables_that_are_named_count_with_what_is_in_them(self):
+        """Where the package is installed, its programs read those beside them: a change there makes other pieces."""
+        prefix = self.folder / 'prefix'
+        shutil.copytree(SOURCE / 'config', prefix / 'share/bki_mapping/config')
+        (prefix / 'bin').mkdir()
+        (prefix / 'lib').mkdir()
+        shutil.copy(BIN / 'map_sequence', prefix / 'bin')
+        for line in subprocess.run(['ldd', str(BIN / 'map_sequence')], check=True, stdout=subprocess.PIPE,
+                                   universal_newlines=True).stdout.splitlines():
+            if 'libbki_mapping_' in line:
+                shutil.copy(line.split('=>')[1].split('(')[0].strip(), prefix / 'lib')
+        (prefix / 'bin/map_sequence').rename(prefix / 'bin/program')
+        (prefix / 'bin/map_sequence').write_text(f'#!/bin/sh\nLD_LIBRARY_PATH={prefix}/lib exec {prefix}/bin/program "$@"\n')
+        (prefix / 'bin/map_sequence').chmod(0o755)
+        settings = ('--classes', 'semantic_kitti', '--config', 'robot')
+        before = work.identity_of(prefix / 'bin', settings)
+        self.assertEqual(work.identity_of(prefix / 'bin', settings), before)
+        seen = {before}
+        for name, old, new in (('presets/robot.yaml', 'prior: ', '# prior: '),
+                               ('classes/semantic_kitti.yaml', 'car', 'vehicle')):
+            path = prefix / 'share/bki_mapping/config' / name
+            self.assertIn(old, path.read_text())
+            path.write_text(path.read_text().replace(old, new, 1))
+            seen.add(work.identity_of(prefix / 'bin', settings))
+        self.assertEqual(len(seen), 3)
 
     def test_sums_are_trees(self):
         files = [f'piece {n}' for n in range(300)]

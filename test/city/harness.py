@@ -68,11 +68,11 @@ class MadeCity(unittest.TestCase):
         path.write_text(json.dumps(text))  # JSON is YAML
         return path
 
-    def start(self, city, *arguments, programs=BIN):
+    def start(self, city, *arguments, programs=BIN, **more):
         self.output = self.folder / self.id().split('.')[-1]
         return subprocess.Popen([sys.executable, str(SOURCE / 'scripts/map_city'), str(city), '--output', str(self.output),
                                  '--programs', str(programs), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                universal_newlines=True, env={**os.environ, 'PYTHONPATH': str(SOURCE / 'python')})
+                                universal_newlines=True, env={**os.environ, 'PYTHONPATH': str(SOURCE / 'python')}, **more)
 
     def finish(self, process, status=0):
         text = process.communicate(timeout=240)[0]

@@ -13,6 +13,9 @@ namespace bki_mapping {
 /// The names of the tables of config/classes, sorted.
 std::vector<std::string> classTableNames();
 
+/// The path of the file that loadClassTable() reads. @throws std::invalid_argument if there is none.
+std::string classTableFile(const std::string& name_or_file);
+
 /// Reads a class table; docs/classes.md describes the format.
 /// @param name_or_file a table of config/classes (its name without .yaml), or the path of a file.
 /// @throws std::invalid_argument in one sentence: unknown name or file, invalid YAML, unknown key or bad

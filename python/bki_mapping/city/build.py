@@ -84,6 +84,7 @@ class Builder:
         self.draw = draw
         self.costs: Dict[str, report.Cost] = {}
         self.broken: Dict[str, str] = {}
+        self.warnings = report.Warnings(say)
         self.setup = None
 
     def build(self):
@@ -103,7 +104,7 @@ class Builder:
         finally:
             token.unlink()
         picture = report.draw(self.folder, index) if self.draw else None
-        report.write(self.folder, index, self.costs, time.time() - begin, picture)
+        report.write(self.folder, index, self.costs, time.time() - begin, picture, self.warnings)
         return index
 
     def check_programs(self, token):
@@ -145,7 +146,7 @@ class Builder:
                         for each, found in sorted(checked, key=lambda pair: pair[0].region)],
         }
         for region in index['regions']:
-            for name in ('seconds', 'core_seconds', 'made', 'resolution'):
+            for name in ('seconds', 'core_seconds', 'made', 'resolution', 'warnings'):
                 region.pop(name)
         report.write_whole(self.folder / 'index.json', json.dumps(index, indent=1) + '\n')
         return index
@@ -226,6 +227,8 @@ class Builder:
                 self.leave_out(drive_of(each), found['fault'])
             else:
                 cost.add(found)
+                for sentence in found.get('warnings', ()):
+                    self.warnings.add(sentence, each)
             progress.step(failed='fault' in found, drive=drive_of(each).name if drive_of else None,
                           more=count_of(found) if count_of else None)
         return done

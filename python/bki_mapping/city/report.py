@@ -2,6 +2,7 @@
 import collections
 import os
 import pathlib
+import re
 import time
 
 from bki_mapping.city import plan
@@ -48,6 +49,33 @@ class Progress:
         self.say(', '.join(parts))
 
 
+class Warnings:
+    """What programs have warned of: says each kind of sentence once, and counts it."""
+    FIGURES = re.compile(r'[\d.]+ ?%|[\d.]+ cm|\([\d,]+ points?\)')  # of one piece; other ones make no other warning
+
+    def __init__(self, say, most=20):
+        """most: how many are said; the others are only in the report."""
+        self.say, self.most = say, most
+        self.seen = {}  # by the sentence without figures: the first sentence, its origin, and the number of tasks
+
+    def add(self, sentence, task):
+        """task: a piece or a sum."""
+        first = self.seen.setdefault(self.FIGURES.sub('', sentence), [sentence, origin_of(task), 0])
+        first[2] += 1
+        if first[2] > 1:
+            return
+        if len(self.seen) <= self.most:
+            self.say(f'warning: {first[1]}: {sentence}')
+        elif len(self.seen) == self.most + 1:
+            self.say('warning: there are further ones; report.md has them all')
+
+
+def origin_of(task):
+    if isinstance(task, plan.Piece):
+        return f"drive '{task.drive.name}' from scan {task.first}"
+    return 'region {}_{}'.format(*task.region)
+
+
 def duration(seconds):
     if seconds < 120:
         return f'{seconds:.0f} s'
@@ -72,7 +100,7 @@ class Cost:
 STAGES = {'bag': 'write bags as sequences', 'map': 'map pieces', 'sum': 'sum regions', 'check': 'check and draw regions'}
 
 
-def write(folder, index, costs, elapsed, picture):
+def write(folder, index, costs, elapsed, picture, warnings):
     """Writes report.md. picture: the sentence of draw."""
     regions = index['regions']
     total = {name: sum(region['voxels'].get(name, 0) for region in regions) for name in ('occupied', 'free')}
@@ -83,6 +111,9 @@ def write(folder, index, costs, elapsed, picture):
     if index['left_out']:
         lines += ['## Drives left out', '', '| drive | reason |', '|---|---|']
         lines += [f'| {cell(name)} | {cell(why)} |' for name, why in index['left_out'].items()] + ['']
+    if warnings.seen:
+        lines += ['## Warnings of this run', '', '| first where | pieces or regions | warning |', '|---|---|---|']
+        lines += [f'| {cell(where)} | {count} | {cell(sentence)} |' for sentence, where, count in warnings.seen.values()] + ['']
     lines += ['## Drives', '', '| drive | pieces | scans |', '|---|---|---|']
     lines += [f"| {cell(drive['name'])} | {len(drive['pieces'])} | {sum(piece['scans'] for piece in drive['pieces'])} |"
               for drive in index['drives']]

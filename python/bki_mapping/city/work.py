@@ -2,7 +2,9 @@
 or be killed. Each returns a dictionary: `file` and what is known of it, or `fault`, a sentence, and with `of_worker` whether
 the worker is to blame, and not what it worked on."""
 import contextlib
+import ctypes
 import functools
+import hashlib
 import json
 import os
 import pathlib
@@ -19,10 +21,14 @@ from typing import NamedTuple
 from bki_mapping.city import bags, plan
 from bki_mapping.city.description import CityError
 
-VERSION = 3  # of the tasks: a worker whose modules have another cannot do them
+VERSION = 4  # of the tasks: a worker whose modules have another cannot do them
 STOPPED = 130  # status of programs that SIGTERM or SIGINT has ended early
 TRIES = 3  # of a program that a signal ends, as when memory is short
 SIGHT = 10.0  # how long a worker may take to see what another machine has written [s]
+LIBC, PR_SET_PDEATHSIG = ctypes.CDLL(None), 1
+OVER = 'map_city has ended'
+WARNING = 'warning: '  # how programs begin the lines of their warnings
+MOST_WARNINGS = 10  # that a task returns
 # Signals that come from outside of a program, or from a processor that it was not built for.
 OF_WORKER = {signal.SIGKILL, signal.SIGTERM, signal.SIGILL, signal.SIGXCPU}
 
@@ -36,6 +42,12 @@ class Setup(NamedTuple):
     identity: str  # what the programs say of themselves and of the settings
 
 
+class Ran(NamedTuple):
+    """What is known of a program that has done its work."""
+    core_seconds: float
+    warnings: tuple  # what it has warned of, without a repetition
+
+
 class Fault(Exception):
     def __init__(self, text, of_worker=False):
         super().__init__(text)
@@ -43,9 +55,9 @@ class Fault(Exception):
 
 
 def identity_of(programs, settings):
-    """The version of the programs and the parameters that they would use. Raises Fault."""
+    """The version of the programs, and the parameters and the class table that they would use. Raises Fault."""
     text = ''
-    for arguments in (['--version'], ['--print-config', *settings]):
+    for arguments in (['--version'], ['--print-config', *settings], ['--print-classes', *settings]):
         command = [str(pathlib.Path(programs) / 'map_sequence'), *arguments]
         for _ in range(TRIES):
             try:
@@ -61,7 +73,9 @@ def identity_of(programs, settings):
             if arguments[0] == '--version' or result.returncode in (126, 127):
                 raise not_started(command[0], lines[-1] if lines else f'status {result.returncode}')
             raise Fault(lines[-1] if lines else f'{command[0]} ended with status {result.returncode}')
-        text += result.stdout
+        # Of the table a digest, because the text goes with every task.
+        text += (result.stdout if arguments[0] != '--print-classes' else
+                 f'class table with digest {hashlib.sha256(result.stdout.encode()).hexdigest()[:16]}\n')
     return text
 
 
@@ -118,34 +132,72 @@ def task(do):
     return done
 
 
+def dies_with(parent):
+    """What a child does first, so that it does not outlive its parent, a process with this number."""
+    def prepare_child():
+        LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return prepare_child
+
+
+def wait_for(process, setup):
+    """Waits for a program, and kills it once the run of map_city is over. Returns its status, of signals negative, and its
+    processor time [s]."""
+    pause = 0.001
+    while True:
+        number, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if number:
+            process.returncode = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
+            return process.returncode, usage.ru_utime + usage.ru_stime
+        if is_over(setup):
+            os.kill(process.pid, signal.SIGKILL)
+        time.sleep(pause)
+        pause = min(1.2 * pause, 0.2)
+
+
+def is_over(setup):
+    """Whether map_city has ended, or was told to: then nothing may be written any more."""
+    try:
+        os.stat(setup.token)
+    except FileNotFoundError:
+        return True
+    except OSError:  # the disk of another machine does not answer for a moment
+        pass
+    return False
+
+
 def run(setup, name, arguments, log):
-    """Runs a program of this package. Returns its processor time [s]. Its output is added to a log of its own. Raises Fault."""
+    """Runs a program of this package. Its output is added to a log of its own. Returns Ran. Raises Fault."""
     path = pathlib.Path(setup.folder) / 'log' / log
     path.parent.mkdir(parents=True, exist_ok=True)
     command = [str(pathlib.Path(setup.programs) / name), *map(str, arguments)]
     spent = 0.0
     for _ in range(TRIES):
+        if is_over(setup):
+            raise Fault(OVER, of_worker=True)
         begin = time.time()
         with open(path, 'a') as file, tempfile.TemporaryFile() as errors:
             file.write(f'$ {" ".join(command)}\n')
             file.flush()
             try:
-                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors)
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors,
+                                           preexec_fn=dies_with(os.getpid()))
             except OSError as error:
                 raise not_started(command[0], error.strerror) from None
-            _, status, usage = os.wait4(process.pid, 0)
-            status = process.returncode = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
+            status, seconds = wait_for(process, setup)
             if status == STOPPED:
                 status = -signal.SIGTERM
             errors.seek(0)
             text = errors.read().decode(errors='replace')
-            spent += usage.ru_utime + usage.ru_stime
+            spent += seconds
             file.seek(0, os.SEEK_END)
             file.write(f'{text}status {status}, {time.time() - begin:.1f} s\n')
         if status >= 0:
             break
     if status == 0:
-        return spent
+        warnings = dict.fromkeys(line[len(WARNING):] for line in text.splitlines() if line.startswith(WARNING))
+        return Ran(spent, tuple(warnings)[:MOST_WARNINGS])
     lines = [line for line in text.strip().splitlines() if line]
     if status in (126, 127):
         raise not_started(command[0], lines[-1] if lines else f'status {status}')
@@ -163,6 +215,8 @@ def produce(setup, file, make):
     own = target.with_name(f'.{target.stem}.{uuid.uuid4().hex}{target.suffix}')
     try:
         made = make(own)
+        if is_over(setup):
+            raise Fault(OVER, of_worker=True)
         try:
             os.replace(own, target)
         except OSError:  # a folder: another worker has written it meanwhile
@@ -176,10 +230,10 @@ def produce(setup, file, make):
             own.unlink()
 
 
-def result_of(setup, file, spent, **more):
-    """spent: processor time of a program [s]; None if the file was there."""
-    return {'file': file, 'bytes': (pathlib.Path(setup.folder) / file).stat().st_size, 'made': spent is not None,
-            'core_seconds': spent or 0.0, **more}
+def result_of(setup, file, ran, **more):
+    """ran: what is known of the program; None if the file was there."""
+    return {'file': file, 'bytes': (pathlib.Path(setup.folder) / file).stat().st_size, 'made': ran is not None,
+            'core_seconds': ran.core_seconds if ran else 0.0, 'warnings': ran.warnings if ran else (), **more}
 
 
 @task
@@ -214,16 +268,16 @@ def map_piece(setup, piece):
     path = pathlib.Path(setup.folder) / piece.file
     while True:
         try:
-            spent = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
-                                                               f'{drive.name}-{piece.first:06d}.log'))
+            ran = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
+                                                             f'{drive.name}-{piece.first:06d}.log'))
         except Fault as fault:
             if not drive.folder.is_dir():
                 raise unseen(drive.folder) from None
             raise fault
         try:
-            return result_of(setup, piece.file, spent, columns=plan.columns_of(path))
+            return result_of(setup, piece.file, ran, columns=plan.columns_of(path))
         except sqlite3.DatabaseError as error:
-            if spent is not None:  # it is new, so the disk is to blame
+            if ran is not None:  # it is new, so the disk is to blame
                 raise Fault(f'{path} is damaged on {socket.gethostname()} ({error}); remove it', of_worker=True) from None
             with contextlib.suppress(FileNotFoundError):  # another worker may have removed it
                 path.unlink()
@@ -234,9 +288,9 @@ def sum_region(setup, region_tiles, each):
     x, y = (region_tiles * index for index in each.region)
     columns = f'{x},{y},{x + region_tiles - 1},{y + region_tiles - 1}'
     inputs = [pathlib.Path(setup.folder) / file for file in each.inputs]
-    spent = produce(setup, each.file, lambda own: run(setup, 'merge_maps', [*inputs, '--tiles', columns, '--output', own],
-                                                      log_of(each)))
-    return result_of(setup, each.file, spent)
+    ran = produce(setup, each.file, lambda own: run(setup, 'merge_maps', [*inputs, '--tiles', columns, '--output', own],
+                                                    log_of(each)))
+    return result_of(setup, each.file, ran)
 
 
 @task
@@ -249,13 +303,13 @@ def check_region(setup, picture, each):
         drawn.parent.mkdir(exist_ok=True)
         arguments += ['--top', drawn]
     try:
-        spent = run(setup, 'inspect_map', arguments, log_of(each))
+        ran = run(setup, 'inspect_map', arguments, log_of(each))
         found = json.loads(own.read_text())
     finally:
         if own.exists():
             own.unlink()
     figures = {name: found[name] for name in ('bounds', 'voxels', 'voxels_by_class', 'blocks', 'tiles', 'resolution')}
-    return result_of(setup, each.file, spent, **figures)
+    return result_of(setup, each.file, ran, **figures)
 
 
 def log_of(each):
