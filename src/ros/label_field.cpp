@@ -7,13 +7,13 @@ LabelField::Label LabelField::read(const std::uint8_t* point, UnlistedLabels& un
   if (!any_read_ || number != number_) {
     any_read_ = true;
     number_ = number;
-    label_.label = number && !rounds(*number) ? labelOf(*number) : kNoLabel;
+    label_.label = number && field_.exact(*number) ? labelOf(*number) : kNoLabel;
     label_.id = classes_.classOf(label_.label, values_);
   }
   if (label_.id) return label_;
   if (number) {
     unknown.add(*number);
-    if (rounds(*number)) unknown.noteRounding();
+    if (!field_.exact(*number)) unknown.noteRounding();
   } else {
     unknown.addMissing();
   }

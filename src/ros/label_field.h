@@ -10,7 +10,8 @@
 
 namespace bki_mapping::ros_interface {
 
-/// Reads the labels of a field of any datatype, and their classes.
+/// Reads the labels of a field of any datatype, and their classes. A number that the datatype may have
+/// rounded is no label: it may be that of another class.
 class LabelField {
  public:
   /// @param classes must outlive the object.
@@ -25,11 +26,6 @@ class LabelField {
   Label read(const std::uint8_t* point, UnlistedLabels& unknown);
 
  private:
-  /// Whether the field may have lost bits of a number that the class is in.
-  bool rounds(std::int64_t number) const {
-    return classes_.labelMask() != ClassTable::kAllBits && !field_.exact(number);
-  }
-
   FieldReader field_;
   const ClassTable& classes_;
   LabelValues values_;

@@ -92,7 +92,11 @@ class Bags(MadeCity):
         none = 2**32 - 1
         for dtype, values, expected in (
                 ('<u4', [10, 10 | 300 << 16, none], [10, 10 | 300 << 16, none]), ('>i4', [10, -1, -2**31 | 10], [10, none, 2**31 | 10]),
-                ('i1', [-1, 40], [none, 40]), ('<f4', [39.9, 40.5, -1, 2.0**24, 2.0**24 + 2, math.nan, math.inf], [40, 41, none, 2**24, none, none, none]),
+                ('i1', [-1, 40], [none, 40]),
+                ('<f4', [39.9, 40.5, -0.4, -0.5, -1, math.nan, math.inf], [40, 41, 0, none, none, none, none]),
+                # As in Labels.OfSinglePrecisionAreUnknownWhereThatSkipsNumbers.
+                ('<f4', [2.0**24, 2.0**24 + 4, 3.0 * 2**30, -2.0**24, -2.0**24 - 4], [2**24, none, none, 0xff000000, none]),
+                ('<f8', [0.49999999999999994, 2.0**24 + 4, -2.0**24 - 4], [0, 2**24 + 4, 0xfefffffc]),
                 ('<f8', [10 + 300 * 65536.0, 2.0**32, -2.0**31 - 1, math.nan], [10 | 300 << 16, none, none, none])):
             self.assertEqual(bags.labels_of(numpy.array(values, dtype)).tolist(), expected, dtype)
 

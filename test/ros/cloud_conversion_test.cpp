@@ -207,6 +207,25 @@ TEST(Labels, OfSinglePrecisionMayHaveLostTheirClass) {
   EXPECT_TRUE(unlisted.rounded());
 }
 
+// Nor is a class of its own to be trusted there: 16777217 would be 16777216, and 16777219 would be 16777220.
+TEST(Labels, OfSinglePrecisionAreUnknownWhereThatSkipsNumbers) {
+  SemanticClass small, great, negative;
+  small.name = "small";
+  small.raw = {16777216};
+  great.name = "great";
+  great.id = 1;
+  great.raw = {16777220, 3221225472};
+  negative.name = "negative";
+  negative.id = 2;
+  negative.raw = {0xff000000u};  // -2^24
+  const ClassTable table("t", {small, great, negative});
+  const std::vector<double> values = {16777216.0, 16777220.0, 3221225472.0, -16777216.0, -16777220.0};
+  const auto [found, unlisted] = classesOf(PointField::FLOAT32, values, table);
+  EXPECT_EQ(found, (std::vector<int>{0, -1, -1, 2, -1}));
+  EXPECT_TRUE(unlisted.rounded());
+  EXPECT_EQ(classesOf(PointField::FLOAT64, values, table).first, (std::vector<int>{0, 1, 1, 2, -1}));
+}
+
 TEST(Labels, MinusOneAndNoNumberAreTwoThings) {
   for (const auto datatype : {PointField::INT8, PointField::INT16, PointField::INT32, PointField::FLOAT32}) {
     const auto [found, unlisted] = classesOf(datatype, {40.0, -1.0, -1.0}, classes());

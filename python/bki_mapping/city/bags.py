@@ -112,9 +112,13 @@ def read_cloud(cloud, bag: Bag):
 
 
 def labels_of(values):
-    """Labels as the node reads them: all 32 bits, of negative numbers in two's complement; -1 for what is no label."""
-    numbers = numpy.floor(values.astype(float) + 0.5)
-    is_single = values.dtype.kind == 'f' and values.dtype.itemsize == 4  # which rounds greater numbers
+    """Labels as the node reads them: all 32 bits, of negative numbers in two's complement; -1 for what is no label, and for what
+    single precision may have rounded to the label of another class."""
+    values_read = values.astype(float)
+    numbers = numpy.trunc(values_read)
+    with numpy.errstate(invalid='ignore'):
+        numbers += numpy.copysign(numpy.abs(values_read - numbers) >= 0.5, values_read)  # halves away from zero
+    is_single = values.dtype.kind == 'f' and values.dtype.itemsize == 4
     least, greatest = (-2.0**24, 2.0**24) if is_single else (-2.0**31, 2.0**32 - 1)
     return numpy.where((numbers >= least) & (numbers <= greatest), numbers, -1).astype(numpy.int64).astype('<u4')
 
