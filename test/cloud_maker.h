@@ -30,6 +30,17 @@ class CloudMaker {
     }
   }
 
+  /// With coordinates in double precision.
+  static CloudMaker inDoubles(const std::vector<Eigen::Vector3d>& points) {
+    CloudMaker maker(points.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<double> values;
+      for (const auto& point : points) values.push_back(point[axis]);
+      maker.add(std::string(1, static_cast<char>('x' + axis)), sensor_msgs::PointField::FLOAT64, values);
+    }
+    return maker;
+  }
+
   CloudMaker& add(const std::string& name, std::uint8_t datatype, const std::vector<double>& values) {
     fields_.push_back({name, datatype, values});
     return *this;
@@ -60,6 +71,8 @@ class CloudMaker {
   }
 
  private:
+  explicit CloudMaker(std::size_t count) : count_(count) {}
+
   struct Field {
     std::string name;
     std::uint8_t datatype;

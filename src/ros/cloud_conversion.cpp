@@ -7,28 +7,37 @@
 namespace bki_mapping::ros_interface {
 
 CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
-                       const ClassTable& classes, LabelValues label_values, const Eigen::Vector3f& sensor) {
+                       const ClassTable& classes, LabelValues label_values, const Eigen::Vector3d& sensor) {
   checkSizes(cloud);
   const FieldReader x(cloud, "x"), y(cloud, "y"), z(cloud, "z");
   const std::unique_ptr<LabelReader> labels = makeLabelReader(cloud, input, classes, label_values);
   std::optional<FieldReader> time;
   if (!input.time_field.empty()) time.emplace(cloud, input.time_field);
   CloudContent content;
+  if (!(x.single() && y.single() && z.single())) content.origin = sensor;
   const std::size_t count = std::size_t{cloud.width} * cloud.height;
   const bool organised = input.clear_no_returns && cloud.height > 1 && cloud.width > 1;
   std::vector<Eigen::Vector3f> grid;
+  std::vector<Answer> answers;  // of the grid
   std::vector<double> grid_times;
   content.points.reserve(count);
   content.labels.labels.reserve(count);
-  if (organised) grid.reserve(count);
+  if (organised) {
+    grid.reserve(count);
+    answers.reserve(count);
+    if (time) grid_times.reserve(count);
+  }
   for (std::size_t row = 0; row < cloud.height; ++row) {
     for (std::size_t column = 0; column < cloud.width; ++column) {
       const std::uint8_t* bytes = cloud.data.data() + row * cloud.row_step + column * cloud.point_step;
-      const Eigen::Vector3f point(static_cast<float>(x(bytes)), static_cast<float>(y(bytes)),
-                                  static_cast<float>(z(bytes)));
-      if (organised) grid.push_back(point);
-      if (organised && time) grid_times.push_back((*time)(bytes));
-      const Answer answer = input.clear_no_returns ? answerOf(point, sensor) : Answer::kReturn;
+      const Eigen::Vector3d place(x(bytes), y(bytes), z(bytes));
+      const Eigen::Vector3f point = (place - content.origin).cast<float>();
+      const Answer answer = input.clear_no_returns ? answerOf(place, sensor) : Answer::kReturn;
+      if (organised) {
+        grid.push_back(point);
+        answers.push_back(answer);
+        if (time) grid_times.push_back((*time)(bytes));
+      }
       if (answer == Answer::kReturn) {
         content.points.push_back(point);
         labels->append(bytes, content.labels);
@@ -44,7 +53,8 @@ CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig&
     }
   }
   if (organised) {
-    const Holes holes = directionsOfHoles(grid, cloud.width, sensor);
+    const Holes holes =
+        directionsOfHoles(grid, answers, cloud.width, (sensor - content.origin).cast<float>());
     content.no_direction = holes.unknown;
     content.no_returns.insert(content.no_returns.end(), holes.directions.begin(), holes.directions.end());
     for (const std::size_t place : holes.same_firing) {

@@ -14,9 +14,13 @@
 namespace bki_mapping::ros_interface {
 
 struct CloudContent {
-  std::vector<Eigen::Vector3f> points;  ///< in the cloud's frame [m]; unfiltered
-  CloudLabels labels;                   ///< one per point
-  std::vector<double> times;            ///< raw, one per point; empty without time_field
+  /// Where the points are relative to, in the cloud's frame [m]: the sensor, if the cloud has coordinates in
+  /// double precision, which would be rounded far from the frame's origin; otherwise that origin.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3f>
+      points;                 ///< relative to `origin`, in the axes of the cloud's frame [m]; unfiltered
+  CloudLabels labels;         ///< one per point
+  std::vector<double> times;  ///< raw, one per point; empty without time_field
   /// Directions of the beams without a return, in the cloud's frame; 0 if not known. `points` does not
   /// contain them. Empty without clear_no_returns.
   std::vector<Eigen::Vector3f> no_returns;
@@ -30,7 +34,7 @@ struct CloudContent {
 /// data.
 CloudContent readCloud(const sensor_msgs::PointCloud2& cloud, const InputConfig& input,
                        const ClassTable& classes, LabelValues label_values,
-                       const Eigen::Vector3f& sensor = Eigen::Vector3f::Zero());
+                       const Eigen::Vector3d& sensor = Eigen::Vector3d::Zero());
 
 /// A cloud with fields x, y, z, intensity (float32) and label (uint32).
 sensor_msgs::PointCloud2 makeCloud(const std::vector<Eigen::Vector3f>& points,

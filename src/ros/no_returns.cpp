@@ -26,15 +26,15 @@ struct Grid {
   bool rings_are_rows = true;
 };
 
-Grid sort(const std::vector<Eigen::Vector3f>& points, std::size_t width, const Eigen::Vector3f& sensor) {
+Grid sort(const std::vector<Eigen::Vector3f>& points, const std::vector<Answer>& answers, std::size_t width,
+          const Eigen::Vector3f& sensor) {
   Grid grid;
   grid.rings = points.size() / width;
   grid.firings = width;
   grid.returns.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Answer answer = answerOf(points[i], sensor);
-    if (answer == Answer::kNothing) grid.holes.push_back(i);
-    if (answer != Answer::kReturn) continue;
+    if (answers[i] == Answer::kNothing) grid.holes.push_back(i);
+    if (answers[i] != Answer::kReturn) continue;
     const Eigen::Vector3f point = points[i] - sensor;
     const float square = point.squaredNorm();
     if (!(square >= kNearest * kNearest) || !std::isfinite(square)) continue;
@@ -95,10 +95,11 @@ const char* explain(NoDirection reason) {
          "see only sky";
 }
 
-Answer answerOf(const Eigen::Vector3f& point, const Eigen::Vector3f& sensor) {
-  const float nearest2 = std::min(point.squaredNorm(), (point - sensor).squaredNorm());
+Answer answerOf(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor) {
+  constexpr double kRadius = static_cast<double>(kSensorRadius);
+  const double nearest2 = std::min(point.squaredNorm(), (point - sensor).squaredNorm());
   if (std::isfinite(nearest2) || point.allFinite()) {
-    return nearest2 < kSensorRadius * kSensorRadius ? Answer::kNothing : Answer::kReturn;
+    return nearest2 < kRadius * kRadius ? Answer::kNothing : Answer::kReturn;
   }
   return !point.hasNaN() && point.array().isInf().count() == 1 ? Answer::kDirection : Answer::kNothing;
 }
@@ -111,11 +112,11 @@ Eigen::Vector3f directionOf(const Eigen::Vector3f& point) {
   return direction;
 }
 
-Holes directionsOfHoles(const std::vector<Eigen::Vector3f>& points, std::size_t width,
-                        const Eigen::Vector3f& sensor) {
+Holes directionsOfHoles(const std::vector<Eigen::Vector3f>& points, const std::vector<Answer>& answers,
+                        std::size_t width, const Eigen::Vector3f& sensor) {
   Holes found;
   if (width == 0) return found;
-  Grid grid = sort(points, width, sensor);
+  Grid grid = sort(points, answers, width, sensor);
   if (grid.holes.empty()) return found;
   found.directions.assign(grid.holes.size(), Eigen::Vector3f::Zero());
   found.same_firing = grid.holes;

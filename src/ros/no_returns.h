@@ -25,7 +25,7 @@ enum class Answer { kReturn, kDirection, kNothing };
 /// exactly one infinite coordinate, the others finite, is a direction. Others say nothing: signs of several
 /// infinite coordinates are those of an octant, and drivers write NaN and zeros for beams without a return.
 /// @param sensor where the beams start.
-Answer answerOf(const Eigen::Vector3f& point, const Eigen::Vector3f& sensor);
+Answer answerOf(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor);
 
 /// The direction that a point with one infinite coordinate gives.
 Eigen::Vector3f directionOf(const Eigen::Vector3f& point);
@@ -41,9 +41,9 @@ struct Holes {
 
 /// Estimates the directions of beams without a return from the returns around them. Whether rows or columns
 /// are rings, the axis of the lidar, and the offsets of its lasers are found from the returns.
-/// @param points in the cloud's frame, row by row. @param width points per row. @param sensor where the beams
-/// start.
-Holes directionsOfHoles(const std::vector<Eigen::Vector3f>& points, std::size_t width,
-                        const Eigen::Vector3f& sensor);
+/// @param points in the axes of the cloud's frame, row by row. @param answers what each of them says.
+/// @param width points per row. @param sensor where the beams start.
+Holes directionsOfHoles(const std::vector<Eigen::Vector3f>& points, const std::vector<Answer>& answers,
+                        std::size_t width, const Eigen::Vector3f& sensor);
 
 }  // namespace bki_mapping::ros_interface

@@ -15,8 +15,9 @@ constexpr double kLongestScan = 10.0;
 
 /// Whether a point's time matters: drivers also write points at the sensor, or NaN, where a beam had no
 /// return, with any time.
-inline bool needsTime(const Eigen::Vector3f& point) {
-  return point.allFinite() && !point.isZero(0.0f);
+/// @param zero where the origin of the cloud's frame is.
+inline bool needsTime(const Eigen::Vector3f& point, const Eigen::Vector3f& zero = Eigen::Vector3f::Zero()) {
+  return point.allFinite() && point != zero;
 }
 
 /// What the raw times of a cloud tell about their unit. Only points that need a finite time count.

@@ -24,8 +24,10 @@ ros::Time later(const ros::Time& stamp, double seconds) {
 }
 
 /// Transforms a point of the cloud to the scan: relative to its origin, in the axes of the map frame.
-void moveToScan(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
-  point = (T_map_cloud * point.cast<double>() - origin).cast<float>();
+/// @param point relative to `cloud_origin`, in the axes of the cloud's frame.
+void moveToScan(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& cloud_origin,
+                const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
+  point = (T_map_cloud * (point.cast<double>() + cloud_origin) - origin).cast<float>();
 }
 
 /// The time at which the pose of a slice is looked up: its middle.
@@ -84,14 +86,15 @@ class PosesOfScan {
 /// any time where nothing came back. @return the missing pose of a point, if there is one.
 std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& poses, Scan& scan) {
   scan.points = content.points;
+  const Eigen::Vector3f zero = (-content.origin).cast<float>();
   for (std::size_t i = 0; i < content.times.size(); ++i) {
     Eigen::Vector3f& point = scan.points[i];
-    if (!needsTime(point)) {
-      moveToScan(poses.ofCloud(), scan.origin, point);
+    if (!needsTime(point, zero)) {
+      moveToScan(poses.ofCloud(), content.origin, scan.origin, point);
     } else if (!std::isfinite(content.times[i])) {
       point.setConstant(std::numeric_limits<float>::quiet_NaN());
     } else if (const Eigen::Isometry3d* const pose = poses.at(content.times[i])) {
-      moveToScan(*pose, scan.origin, point);
+      moveToScan(*pose, content.origin, scan.origin, point);
     } else {
       return poses.missing;
     }
@@ -171,7 +174,7 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   const Eigen::Vector3d beams_start =
       one_frame ? Eigen::Vector3d::Zero()
                 : Eigen::Vector3d(frame->T_target_source.inverse() * sensor->T_target_source.translation());
-  CloudContent content = readCloud(cloud, input_, classes_, label_values_, beams_start.cast<float>());
+  CloudContent content = readCloud(cloud, input_, classes_, label_values_, beams_start);
   PlacedScan placed;
   Scan& scan = placed.scan;
   if (!input_.time_field.empty()) {
@@ -190,7 +193,9 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
     } else {
       scan.origin = sensor->T_target_source.translation();
       scan.points = content.points;
-      for (Eigen::Vector3f& point : scan.points) moveToScan(frame->T_target_source, scan.origin, point);
+      for (Eigen::Vector3f& point : scan.points) {
+        moveToScan(frame->T_target_source, content.origin, scan.origin, point);
+      }
     }
     const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
     for (const Eigen::Vector3f& way : content.no_returns) scan.no_returns.push_back(rotation * way);

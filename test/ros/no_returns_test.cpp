@@ -122,7 +122,11 @@ struct Answers {
 /// Compares the directions of holes with the truth.
 Answers answers(const OrganisedCloud& cloud, const Eigen::Vector3f& sensor = Eigen::Vector3f::Zero()) {
   const std::vector<std::size_t> holes = cloud.holes();
-  const Holes found = directionsOfHoles(cloud.points, cloud.width, sensor);
+  std::vector<Answer> said;
+  for (const Eigen::Vector3f& point : cloud.points) {
+    said.push_back(answerOf(point.cast<double>(), sensor.cast<double>()));
+  }
+  const Holes found = directionsOfHoles(cloud.points, said, cloud.width, sensor);
   EXPECT_EQ(found.directions.size(), holes.size());
   EXPECT_EQ(found.same_firing.size(), holes.size());
   Answers result;
@@ -234,7 +238,7 @@ TEST(Directions, AreNotUsedWhereTheReturnsDoNotTell) {
     EXPECT_EQ(found.used, 0u);
     EXPECT_EQ(found.unknown, cloud.second);
   }
-  EXPECT_TRUE(directionsOfHoles({}, 0, {0, 0, 0}).directions.empty());
+  EXPECT_TRUE(directionsOfHoles({}, {}, 0, {0, 0, 0}).directions.empty());
 }
 
 const ClassTable& table() {
@@ -296,7 +300,7 @@ TEST(NoReturns, OneInfiniteCoordinateIsADirection) {
   EXPECT_EQ(answerOf({2, 3, -INFINITY}, {0, 0, 0}), Answer::kDirection);
   EXPECT_EQ(directionOf({2, 3, -INFINITY}), Eigen::Vector3f(0, 0, -1));
   EXPECT_EQ(answerOf({1, 2, 3}, {0, 0, 0}), Answer::kReturn);
-  EXPECT_EQ(answerOf({1, 2, 3}, {1, 2, 3.0005f}), Answer::kNothing);  // zeros, moved to another frame
+  EXPECT_EQ(answerOf({1, 2, 3}, {1, 2, 3.0005}), Answer::kNothing);  // zeros, moved to another frame
   EXPECT_EQ(answerOf({0, 0, 0}, {1, 2, 3}), Answer::kNothing);
   const CloudContent content = contentOf(
       {2, {{1, 2, 3}, {NAN, 0, 0}}, {{1, 0, 0}, {1, 0, 0}}},

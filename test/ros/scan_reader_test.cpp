@@ -230,6 +230,51 @@ TEST_F(Reader, BeamsStartWhereTheSensorIs) {
       ScanReader(InputConfig(), "map", *classes(), LabelValues::kRaw).originDoubtful(maker.message()));
 }
 
+TEST_F(Reader, DoublesOfAFarFrameAreAsExactAsNearIt) {
+  Eigen::Isometry3d T_map_utm(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()));
+  T_map_utm.translation() = Eigen::Vector3d(3, -2, 1) - T_map_utm * Eigen::Vector3d(4e5, 5e6, 100);
+  for (const double t : {99.0, 101.0}) {
+    pose("sensor", t, {5.0 * (t - 100.0), 1, 2}, 0.1 * (t - 100.0));
+    pose("utm", t, T_map_utm.translation(), 0.7);
+    pose("near", t, {0, 0, 0});
+  }
+  std::vector<Eigen::Vector3d> near, far;
+  std::vector<double> times;
+  for (int n = 0; n < 200; ++n) {
+    near.emplace_back(0.37 * n - 40.0, std::sin(n) * 60.0, 0.01 * n);
+    far.push_back(T_map_utm.inverse() * near.back());
+    times.push_back(0.0005 * n);
+  }
+  input_.sensor_frame_id = "sensor";
+  const auto scanOf = [&](const std::vector<Eigen::Vector3d>& points, const std::string& frame) {
+    CloudMaker maker = CloudMaker::inDoubles(points);
+    maker.add("label", PointField::UINT32, std::vector<double>(points.size(), 10.0));
+    maker.add("t", PointField::FLOAT64, times);
+    maker.frame = frame;
+    return placed(maker.message()).scan;
+  };
+  for (const char* time_field : {"", "t"}) {
+    input_.time_field = time_field;
+    const Scan a = scanOf(near, "near"), b = scanOf(far, "utm");
+    EXPECT_TRUE(a.origin.isApprox(b.origin, 1e-9));
+    ASSERT_EQ(b.points.size(), near.size());
+    for (std::size_t n = 0; n < near.size(); ++n) {
+      ASSERT_LT((a.points[n] - b.points[n]).norm(), 1e-4f) << n;
+      ASSERT_LT((b.origin + b.points[n].cast<double>() - near[n]).norm(), 1e-4) << n;
+    }
+  }
+  // Zeros, which drivers write where nothing came back, need no time there either, and are no returns.
+  far[7].setZero();
+  far[8] = T_map_utm.inverse() * Eigen::Vector3d(0, 1, 2);  // the sensor
+  times[7] = times[8] = NAN;
+  EXPECT_TRUE(scanOf(far, "utm").points[7].allFinite());
+  input_.time_field = "";
+  input_.clear_no_returns = true;
+  const Scan scan = scanOf(far, "utm");
+  EXPECT_EQ(scan.points.size(), far.size() - 2);
+  EXPECT_EQ(scan.no_returns.size(), 2u);
+}
+
 TEST_F(Reader, PointsArePutWhereTheSensorWasAtTheirTime) {
   // Moving forwards at 10 m/s: after 0.1 s, a wall at x = 20 is 1 m nearer.
   pose("sensor", 99.0, {-10, 0, 0});
