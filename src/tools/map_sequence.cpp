@@ -99,11 +99,18 @@ std::vector<DriveRecord> resume(SemanticMapper& mapper, const std::string& path,
   return stored.drives;
 }
 
+/// The id of a half-open range of the scans of a drive. @param whole the id of all of it.
+std::string idOfScans(const std::string& whole, const Sequence& sequence, std::size_t first,
+                      std::size_t last) {
+  const auto scans = scansOf(whole);
+  return (scans ? scans->sequence : whole) + "/" + sequence.name(first) + "-" + sequence.name(last - 1);
+}
+
 /// The id of a drive of which only a part has been mapped. @param whole the id of all of it, which stays if
 /// the map holds another drive with the id of the part.
-std::string idOfPart(const po::variables_map& given, const Sequence& sequence, std::size_t first,
-                     std::size_t end, const std::vector<DriveRecord>& drives, const std::string& whole) {
-  const std::string id = driveId(given, sequence, first, end);
+std::string idOfPart(const Sequence& sequence, std::size_t first, std::size_t end,
+                     const std::vector<DriveRecord>& drives, const std::string& whole) {
+  const std::string id = idOfScans(whole, sequence, first, end);
   const auto has_id = [&](const DriveRecord& drive) { return drive.id == id; };
   return std::any_of(drives.begin(), drives.end(), has_id) ? whole : id;
 }
@@ -116,7 +123,10 @@ std::string stoppedText(const po::variables_map& given, const Sequence& sequence
   if (!given.count("output") || !isMapFileName(given["output"].as<std::string>())) return text;
   return text + "; to map the rest, say --first " + std::to_string(sequence.number(end)) +
          (given.count("scans") ? " --scans " + std::to_string(last - end) : "") + " --resume " +
-         given["output"].as<std::string>() + (given.count("drive") ? " and another --drive" : "");
+         given["output"].as<std::string>() +
+         (given.count("drive")
+              ? " --drive " + idOfScans(given["drive"].as<std::string>(), sequence, end, last)
+              : "");
 }
 
 int mapSequence(const po::variables_map& given) {
@@ -176,7 +186,7 @@ int mapSequence(const po::variables_map& given) {
   if (stopped && end == first) {
     throw tools::Stopped("stopped before the first scan; nothing was written");
   }
-  if (stopped) drive.id = idOfPart(given, sequence, first, end, drives, drive.id);
+  if (stopped) drive.id = idOfPart(sequence, first, end, drives, drive.id);
   if (given.count("output")) {
     const std::string output = given["output"].as<std::string>();
     if (isMapFileName(output)) {

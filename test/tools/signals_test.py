@@ -120,6 +120,19 @@ class Signals(unittest.TestCase):
         self.call('map_sequence', '--sequence', self.long, '--first', str(following), '--scans', '2', '--resume', out, '--output', out)
         self.assertEqual(sum(scans for _, scans in self.rows(out, 'SELECT id, scans FROM drive')), count + 2)
 
+    def test_a_part_of_a_named_drive_has_its_own_name(self):
+        out = self.path('named.bkm')
+        for drive in ('monday', f'monday/000000-{SCANS - 1:06d}'):
+            program = Program('map_sequence', '--sequence', self.long, '--output', out, '--drive', drive)
+            program.wait_for(f'2/{SCANS} ')
+            program.process.send_signal(signal.SIGINT)
+            status, last = program.end()
+            self.assertEqual(status, 130)
+            said = re.search(r'stopped after scan (\d+), .* say --first (\d+) --resume \S+ --drive (\S+)$', last)
+            self.assertTrue(said, last)
+            self.assertEqual(said.group(3), f'monday/{int(said.group(2)):06d}-{SCANS - 1:06d}')
+            self.assertEqual(self.rows(out, 'SELECT id FROM drive'), [(f'monday/000000-{said.group(1)}',)])
+
     def test_evaluation_ends_after_the_scan_at_hand(self):
         figures, whole = self.path('figures.json'), self.path('whole.json')
         program = Program('evaluate_map', '--sequence', self.long, '--json', figures)
