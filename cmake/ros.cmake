@@ -8,6 +8,7 @@ bki_mapping_room(ros SOURCES
     color_reader.cpp
     distance_section_config.cpp
     input_config.cpp
+    input_notes.cpp
     kept_map.cpp
     label_field.cpp label_reader.cpp
     live_settings.cpp

@@ -334,7 +334,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/costmap/semantic_layer.test)
   bki_mapping_unit_tests(ros clock_offset cloud_conversion driver_layouts kept_city query_services recent_map)
   bki_mapping_unit_tests(ros point_times)
-  bki_mapping_unit_tests(ros no_returns scan_account scan_reader sensor_trajectory server_config tf_jumps)
+  bki_mapping_unit_tests(ros input_notes no_returns scan_account scan_reader sensor_trajectory server_config tf_jumps)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
   foreach(name body_box filters)

@@ -16,6 +16,14 @@ namespace {
 /// How long the thread waits for a callback [s]: with an empty queue, and while clouds wait for transforms.
 constexpr double kScanWait = 0.1, kTransformWait = 0.005;
 
+void warn(const std::string& sentence) {
+  if (!sentence.empty()) ROS_WARN("%s", sentence.c_str());
+}
+
+void inform(const std::string& sentence) {
+  if (!sentence.empty()) ROS_INFO("%s", sentence.c_str());
+}
+
 }  // namespace
 
 MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
@@ -104,11 +112,8 @@ void MappingServer::subscribe() {
           cloud_subscribers_.back().getTopic().c_str(), mapper_->classes().name().c_str());
     }
   }
-  said_of_times_.resize(readers_.size());
-  warned_of_origin_.assign(readers_.size(), false);
-  warned_of_far_points_.assign(readers_.size(), false);
+  for (const ros::Subscriber& subscriber : cloud_subscribers_) notes_.emplace_back(subscriber.getTopic());
   points_.resize(readers_.size());
-  label_watches_.resize(readers_.size());
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
@@ -120,7 +125,7 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
   for (const InputConfig& input : inputs) {
     readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
   }
-  said_of_times_.assign(readers_.size(), {});
+  for (InputNotes& notes : notes_) notes.restart();
   wholeMapChanged();
 }
 
@@ -214,21 +219,9 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
   ledger_.unlistedLabels(placed.unlisted_labels);
   points_[waiting.input].add(stats.counts, placed.unlisted_labels);
-  warnOfLabels(waiting.input, placed, stats.counts);
-  if (readers_[waiting.input].originDoubtful(*waiting.cloud) && !warned_of_origin_[waiting.input]) {
-    warned_of_origin_[waiting.input] = true;
-    ROS_WARN(
-        "Clouds of %s are in the map frame '%s', so beams start at its origin; set sensor_frame_id to "
-        "the sensor's frame",
-        cloud_subscribers_[waiting.input].getTopic().c_str(), config_.frame_id.c_str());
-  }
-  warnOfFarPoints(waiting.input, stats.counts.beyond_max);
-  if (!placed.times.empty()) reportTimes(waiting.input, placed.times);
+  sayOfInput(waiting, placed, stats.counts);
   poses_->watchJumps(config_.frame_id, readers_[waiting.input].sensorFrame(*waiting.cloud),
                      ros::Time().fromNSec(placed.scan.stamp));
-  if (placed.no_direction) {
-    explainNoDirection(waiting.input, *placed.no_direction, stats.counts.no_direction);
-  }
   map_stamp_ = header.stamp;
   sensor_ = placed.scan.origin;
   warnOfFarPlace();
@@ -241,13 +234,18 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
   status_publisher_.publish(status());
 }
 
-void MappingServer::warnOfFarPoints(std::size_t input, std::size_t count) {
-  if (count == 0 || readers_[input].input().sensor_model.knowsRange() || warned_of_far_points_[input]) return;
-  warned_of_far_points_[input] = true;
-  ROS_WARN(
-      "%lu points of a cloud of %s are farther than %g m and left out as faults of the driver; set "
-      "sensor_model/max_range to what the sensor sees",
-      count, cloud_subscribers_[input].getTopic().c_str(), SensorModelConfig::kFarthest);
+void MappingServer::sayOfInput(const WaitingCloud& waiting, const PlacedScan& placed,
+                               const PointCounts& counts) {
+  const ScanReader& reader = readers_[waiting.input];
+  InputNotes& notes = notes_[waiting.input];
+  warn(notes.ofLabels(placed, counts, reader.input(), mapper_->classes(), mapper_->config()));
+  points_[waiting.input].label_remedy = notes.labelRemedy();
+  warn(notes.ofOrigin(reader.originDoubtful(*waiting.cloud), config_.frame_id));
+  warn(notes.ofFarPoints(counts.beyond_max, reader.input()));
+  inform(notes.ofTimes(placed.times));
+  if (!placed.no_direction) return;
+  const std::string sentence = notes.ofNoDirection(*placed.no_direction, counts.no_direction);
+  *placed.no_direction == NoDirection::kFewReturns ? inform(sentence) : warn(sentence);
 }
 
 void MappingServer::warnOfFarPlace() {
@@ -256,28 +254,6 @@ void MappingServer::warnOfFarPlace() {
   if (warning.empty()) return;
   warned_of_far_place_ = true;
   ROS_WARN("%s", warning.c_str());
-}
-
-void MappingServer::warnOfLabels(std::size_t input, const PlacedScan& placed, const PointCounts& counts) {
-  const LabelEncoding encoding = readers_[input].input().label_encoding;
-  const auto watched = encoding == LabelEncoding::kRgb   ? LabelWatch::Encoding::kRgb
-                       : encoding == LabelEncoding::kBgr ? LabelWatch::Encoding::kBgr
-                                                         : LabelWatch::Encoding::kNumber;
-  const MapperConfig& config = mapper_->config();
-  LabelWatch& watch = label_watches_[input];
-  Span<const std::uint32_t> labels = placed.scan.labels;
-  if (placed.scan.labels_are_ids) labels = {};  // the reader's, not the cloud's
-  const std::string said = watch.report(mapper_->classes(), config.unknown_labels, counts, labels,
-                                        placed.unlisted_labels, config.label_values, watched);
-  points_[input].label_remedy = watch.remedy();
-  if (said.empty()) return;
-  ROS_WARN("Clouds of %s: %s", cloud_subscribers_[input].getTopic().c_str(), said.c_str());
-}
-
-void MappingServer::reportTimes(std::size_t input, const std::string& reading) {
-  if (!said_of_times_[input].insert(reading).second) return;
-  ROS_INFO("Times of points of %s are read %s; set time_unit and time_reference if they are not",
-           cloud_subscribers_[input].getTopic().c_str(), reading.c_str());
 }
 
 void MappingServer::reportTfJumps() {
@@ -292,17 +268,6 @@ void MappingServer::reportTfJumps() {
         "~reset, or "
         "map a recording with the corrected poses",
         frames.c_str(), jump.distance, jump.angle, jump.stamp.toSec());
-  }
-}
-
-void MappingServer::explainNoDirection(std::size_t input, NoDirection reason, std::size_t count) {
-  if (count == 0 || !explained_.emplace(input, reason).second) return;
-  const std::string sentence = std::to_string(count) + " beams without a return in a cloud of " +
-                               cloud_subscribers_[input].getTopic() + " clear nothing: " + explain(reason);
-  if (reason == NoDirection::kFewReturns) {
-    ROS_INFO("%s", sentence.c_str());
-  } else {
-    ROS_WARN("%s", sentence.c_str());
   }
 }
 

@@ -12,13 +12,12 @@
 
 #include <atomic>
 #include <memory>
-#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "io/label_watch.h"
+#include "ros/input_notes.h"
 #include "ros/kept_map.h"
 #include "ros/live_settings.h"
 #include "ros/mapping_diagnostics.h"
@@ -74,17 +73,11 @@ class MappingServer {
   void checkClock();
   /// Counts the jumps of tf, and says how large they are.
   void reportTfJumps();
-  /// Says once, while the settings stay, how the times of an input's points are read.
-  void reportTimes(std::size_t input, const std::string& reading);
   void onTimeJump(const ros::Time& new_time, const std::string& what);
-  /// Warns once per input of points left out because the maximum range of its sensor is unknown.
-  void warnOfFarPoints(std::size_t input, std::size_t count);
+  /// Logs what is worth saying of an input after one of its clouds.
+  void sayOfInput(const WaitingCloud& waiting, const PlacedScan& placed, const PointCounts& counts);
   /// Warns once that the sensor is too far from the origin for programs that calculate in float32.
   void warnOfFarPlace();
-  /// Warns of labels that the class table does not list, of each once.
-  void warnOfLabels(std::size_t input, const PlacedScan& placed, const PointCounts& counts);
-  /// Says once per input and reason why beams without a return are not used.
-  void explainNoDirection(std::size_t input, NoDirection reason, std::size_t count);
   /// Logs what is wrong with the map file, when that changes.
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
@@ -123,11 +116,8 @@ class MappingServer {
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
   SensorTrajectory trajectory_;
   SentenceThrottle throttle_;
-  std::vector<LabelWatch> label_watches_;                      ///< of each input
-  std::vector<std::set<std::string>> said_of_times_;           ///< of each input
-  std::vector<bool> warned_of_origin_, warned_of_far_points_;  ///< of each input
+  std::vector<InputNotes> notes_;  ///< of each input
   bool warned_of_far_place_ = false;
-  std::set<std::pair<std::size_t, NoDirection>> explained_;  ///< inputs and reasons
 
   std::unique_ptr<PoseSource> poses_;
   std::vector<ros::Subscriber> cloud_subscribers_;
