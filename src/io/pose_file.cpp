@@ -17,6 +17,9 @@ constexpr std::size_t kRows3 = 12, kRows4 = 16, kStamped = 8, kStampedPosition =
 /// Tolerance of determinants and of lengths of quaternions, for poses that were written with few digits.
 constexpr double kRotationTolerance = 0.1;
 
+/// A file may have this many blank lines in a row before a pose: each takes memory as a pose does.
+constexpr std::size_t kMostBlank = 100000;
+
 bool isFormat(std::size_t numbers) {
   return numbers == kRows3 || numbers == kRows4 || numbers == kStamped || numbers == kStampedPosition;
 }
@@ -70,6 +73,28 @@ void checkCount(std::size_t numbers, std::size_t columns) {
   throw std::runtime_error(has + std::to_string(columns) + ", as the lines before it");
 }
 
+/// @param[in,out] columns of the file's format; 0: not known yet.
+PoseLine readLine(const std::string& text, const std::string& path, std::size_t number,
+                  std::size_t& columns) {
+  PoseLine line;
+  line.number = number;
+  line.blank = text.empty();
+  const std::string where = path + " line " + std::to_string(number);
+  try {
+    const std::vector<double> numbers = numbersOf(text);
+    if (columns == 0 && isFormat(numbers.size())) columns = numbers.size();
+    checkCount(numbers.size(), columns);
+    if (isStamped(columns)) {
+      readStamped(numbers, where, line);
+    } else {
+      line.pose = rigidTransform(numbers, "");
+    }
+  } catch (const std::runtime_error& fault) {
+    line.fault = where + fault.what();
+  }
+  return line;
+}
+
 }  // namespace
 
 Eigen::Isometry3d rigidTransform(const std::vector<double>& numbers, const std::string& what) {
@@ -98,30 +123,25 @@ PoseFile readPoseFile(const std::string& path, const std::string& remedy) {
     throw std::runtime_error(path + " cannot be read; " + remedy);
   }
   PoseFile poses;
-  std::size_t number = 0, columns = 0, filled = 0;
+  std::size_t number = 0, columns = 0;
+  std::vector<std::size_t> blanks;  // numbers of lines, which count only if a pose follows
   for (std::string text; std::getline(file, text);) {
     ++number;
     const std::size_t begin = text.find_first_not_of(" \t\r");
-    if (begin != std::string::npos && text[begin] == '#') continue;
-    PoseLine& line = poses.lines.emplace_back();
-    line.number = number;
-    line.blank = begin == std::string::npos;
-    if (!line.blank) filled = poses.lines.size();
-    const std::string where = path + " line " + std::to_string(number);
-    try {
-      const std::vector<double> numbers = numbersOf(text);
-      if (columns == 0 && isFormat(numbers.size())) columns = numbers.size();
-      checkCount(numbers.size(), columns);
-      if (isStamped(columns)) {
-        readStamped(numbers, where, line);
-      } else {
-        line.pose = rigidTransform(numbers, "");
-      }
-    } catch (const std::runtime_error& fault) {
-      line.fault = where + fault.what();
+    if (begin == std::string::npos) {
+      if (blanks.size() <= kMostBlank) blanks.push_back(number);
+      continue;
     }
+    if (text[begin] == '#') continue;
+    if (blanks.size() > kMostBlank) {
+      throw std::runtime_error(path + " line " + std::to_string(number) + " follows more than " +
+                               std::to_string(kMostBlank) +
+                               " blank lines, each of which stands for a scan; remove those");
+    }
+    for (const std::size_t blank : blanks) poses.lines.push_back(readLine("", path, blank, columns));
+    blanks.clear();
+    poses.lines.push_back(readLine(text, path, number, columns));
   }
-  poses.lines.resize(filled);
   poses.has_stamps = isStamped(columns);
   return poses;
 }

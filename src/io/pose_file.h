@@ -33,7 +33,8 @@ Eigen::Isometry3d rigidTransform(const std::vector<double>& numbers, const std::
 /// these formats the file has:
 /// - 12 numbers: a 3x4 matrix, row by row (KITTI); 16 numbers: a 4x4 matrix, whose last row is 0 0 0 1;
 /// - 8 numbers: `seconds x y z qx qy qz qw` (TUM RGB-D benchmark); lines may lack the rotation.
-/// @param remedy ends the sentence if the file cannot be opened. @throws std::runtime_error then.
+/// @param remedy ends the sentence if the file cannot be opened. @throws std::runtime_error then, and if more
+/// than 100,000 blank lines in a row are before a pose.
 PoseFile readPoseFile(const std::string& path, const std::string& remedy);
 
 }  // namespace bki_mapping

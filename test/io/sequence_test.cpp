@@ -296,6 +296,26 @@ TEST_F(LongerSequence, AnEmptyLineIsALineToo) {
   expectPairedByNumber({0, 2, 3, 4});
 }
 
+/// The most memory that this process has had so far [MB].
+double peakMegabytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmHWM:", 0) == 0) return std::stod(line.substr(6)) / 1000.0;
+  }
+  return 0.0;
+}
+
+TEST_F(SequenceFolder, BlankLinesTakeNoMemory) {
+  const std::string poses = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 4 0 1 0 0 0 0 1 0\n";
+  const double before = peakMegabytes();
+  replace("poses.txt", poses + std::string(1000000, '\n'));
+  EXPECT_EQ(Sequence(folder_ / "drive").pose(1).translation().x(), 4.0);
+  EXPECT_LT(peakMegabytes() - before, 50.0);
+  replace("poses.txt", std::string(1000000, '\n') + poses);
+  expectFault("poses.txt line 1000001 follows more than 100000 blank lines");
+  EXPECT_LT(peakMegabytes() - before, 50.0);
+}
+
 TEST_F(LongerSequence, NumbersNeedNotBePadded) {
   rename("000003", "3");
   rename("000004", "0000000004");
