@@ -190,14 +190,14 @@ SharedMap snapshot(Mapper& self) {
 }
 
 /// Adds a map, unless its scans are there already.
-void addStored(Mapper& self, const StoredMap& added) {
-  checkNotAdded("the map", self.drives, added.drives);
-  if (self.drive.scans > 0) checkNotAdded("the map", {self.drive}, added.drives);
+void addStored(Mapper& self, const StoredMap& added, bool allow_overlap) {
+  checkNotAdded("the map", self.drives, added.drives, allow_overlap);
+  if (self.drive.scans > 0) checkNotAdded("the map", {self.drive}, added.drives, allow_overlap);
   self.mapper.addMap(added.map);
   self.drives.insert(self.drives.end(), added.drives.begin(), added.drives.end());
 }
 
-void add(Mapper& self, const FixedMap& added) {
+void add(Mapper& self, const FixedMap& added, bool allow_overlap) {
   const StoredMap& map = added.stored;
   alone(self, [&] {
     checkSameGrid("the mapper", mapInfoOf(self.mapper, self.frame), "the added map", map.info);
@@ -206,13 +206,13 @@ void add(Mapper& self, const FixedMap& added) {
                                   "', and the mapper's in '" + self.frame +
                                   "'; move it there with bki_mapping.merge");
     }
-    addStored(self, map);
+    addStored(self, map, allow_overlap);
   });
 }
 
-void addFile(Mapper& self, py::handle path) {
+void addFile(Mapper& self, py::handle path, bool allow_overlap) {
   const std::string file = pathOf(path, "path");
-  alone(self, [&] { addStored(self, loadMapFor(self.mapper, file, self.frame)); });
+  alone(self, [&] { addStored(self, loadMapFor(self.mapper, file, self.frame), allow_overlap); });
 }
 
 void reset(Mapper& self) {
@@ -337,11 +337,14 @@ void addMapper(py::module& m) {
       .def("snapshot", &snapshot,
            "The map as it is, to be read while mapping goes on. Takes far less than a scan.")
       .def_property_readonly("map", &snapshot, "The same as snapshot().")
-      .def("add", &add, py::arg("map"),
+      .def("add", &add, py::arg("map"), py::arg("allow_overlap") = false,
            "Add another map: the map is then the same to the bit as if the scans of both had been integrated "
-           "here.\n\nRaises ValueError if grids, classes or frames differ, or a drive is in both.")
-      .def("load", &addFile, py::arg("path"),
-           "Add the map of a map file (.bkm), to go on with it.\n\nRaises MapFileError if the file cannot be "
+           "here.\n\n"
+           "allow_overlap: add drives that share scans with the map's according to their ids, too.\n\n"
+           "Raises ValueError if grids, classes or frames differ, or a drive is in both.")
+      .def("load", &addFile, py::arg("path"), py::arg("allow_overlap") = false,
+           "Add the map of a map file (.bkm), to go on with it.\n\n"
+           "allow_overlap: as for add.\n\nRaises MapFileError if the file cannot be "
            "read, or has another grid, class table or frame; ValueError if a drive is in both.")
       .def(
           "save", [](Mapper& self, const py::object& path) { py::cast(snapshot(self)).attr("save")(path); },

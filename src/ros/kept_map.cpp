@@ -256,7 +256,7 @@ void KeptMap::reset() {
   }
 }
 
-void KeptMap::addMap(StoredMap map, bool replace) {
+void KeptMap::addMap(StoredMap map, bool replace, bool allow_overlap) {
   requireWritable();
   if (replace) {
     reset();
@@ -269,8 +269,8 @@ void KeptMap::addMap(StoredMap map, bool replace) {
     }
   }
   unsaved_ = true;
-  if (keeper_) return keeper_->addMap(std::move(map.map), map.drives);
-  checkNotAdded("the map", drives_, map.drives);
+  if (keeper_) return keeper_->addMap(std::move(map.map), map.drives, allow_overlap);
+  checkNotAdded("the map", drives_, map.drives, allow_overlap);
   mapper_.addMap(std::move(map.map));
   drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
 }

@@ -46,9 +46,9 @@ class KeptMap {
   bool makeRoom() { return keeper_ && keeper_->makeRoom(); }
   /// Clears the map, also in the file, and begins a drive. @throws std::invalid_argument if it is read only.
   void reset();
-  /// Adds a map. @param replace what was there before. @throws as MapKeeper::addMap; std::invalid_argument if
-  /// the map is read only.
-  void addMap(StoredMap map, bool replace);
+  /// Adds a map. @param replace what was there before. @param allow_overlap as MapKeeper::addMap. @throws as
+  /// MapKeeper::addMap; std::invalid_argument if the map is read only.
+  void addMap(StoredMap map, bool replace, bool allow_overlap = false);
 
   /// Clears a box. @param box map frame [m]. @return the blocks that changed. @throws std::invalid_argument
   /// if the map is read only.

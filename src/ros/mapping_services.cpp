@@ -157,7 +157,7 @@ bool MappingServer::onLoadMap(LoadMap::Request& request, LoadMap::Response& resp
     const std::string what = counted(stored->map.size(), "block") + " of " +
                              counted(stored->drives.size(), "drive") + " from " + request.path;
     QueuedCall<bool>::ask(queue_, [&] {
-      kept_->addMap(std::move(*stored), !request.add);
+      kept_->addMap(std::move(*stored), !request.add, request.allow_overlap);
       if (!request.add) trajectory_.clear();
       wholeMapChanged();
       return true;

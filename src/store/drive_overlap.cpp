@@ -64,10 +64,11 @@ void checkNotAdded(const std::string& where, const std::vector<DriveRecord>& the
       }
       const auto shared = allow_overlap ? std::nullopt : sharedScans(known, drive);
       if (!shared) continue;
-      throw std::invalid_argument("by their ids, drive '" + known.id + "' in " + where + " and drive '" +
-                                  drive.id + "' share " + textOf(*shared) +
-                                  ", which would count twice; add a map without them, or, if they are "
-                                  "different scans, merge the files with --allow-overlap");
+      throw std::invalid_argument(
+          "by their ids, drive '" + known.id + "' in " + where + " and drive '" + drive.id + "' share " +
+          textOf(*shared) +
+          ", which would count twice; add a map without them, or, if they are "
+          "different scans, allow the overlap (allow_overlap; --allow-overlap of merge_maps)");
     }
   }
 }

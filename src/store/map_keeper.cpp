@@ -329,11 +329,11 @@ void MapKeeper::reset(const DriveRecord& drive) {
   s.reach = kEverything;
 }
 
-void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives) {
+void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives, bool allow_overlap) {
   State& s = *state_;
   s.mapper.map().checkAddable(other);
-  checkNotAdded("the map in " + s.path, s.drives, drives);
-  checkNotAdded("the map in " + s.path, {s.drive}, drives);
+  checkNotAdded("the map in " + s.path, s.drives, drives, allow_overlap);
+  checkNotAdded("the map in " + s.path, {s.drive}, drives, allow_overlap);
   for (const GridIndex& tile : other.regions()) {
     SemanticMap part = other.takeRegion(tile);
     if (s.here.count(tile) > 0) {

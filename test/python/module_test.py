@@ -330,6 +330,15 @@ class Files(WithFolder):
         for add in (lambda: whole.load(files[1]), lambda: whole.add(part.map)):
             with self.assertRaisesRegex(ValueError, 'share scans 000000 to 000004 of 04'):
                 add()
+        blocks = len(whole.map.blocks)
+        whole.load(files[1], allow_overlap=True)
+        self.assertGreaterEqual(len(whole.map.blocks), blocks)
+        with self.assertRaisesRegex(ValueError, 'already holds drive'):
+            whole.load(files[1], allow_overlap=True)
+        other = bki.SemanticMapper()
+        other.load(files[0])
+        other.add(bki.load(files[1]), allow_overlap=True)
+        self.assertEqual(len(other.map.drives), 2)
         self.assertEqual(len(bki.merge(files, both, allow_overlap=True)['drives']), 2)
 
     def test_sequences_without_labels_and_with_poses_of_the_lidar(self):

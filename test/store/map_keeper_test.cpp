@@ -171,6 +171,24 @@ TEST(MapKeeper, KeepsWithinMemory) {
   EXPECT_TRUE(same(contentIn(folder / "limited.bkm"), contentOfAll(scans)));
 }
 
+TEST(MapKeeper, AddsDrivesThatShareScansOnlyIfToldTo) {
+  const TemporaryFolder folder;
+  Kept kept(folder / "map.bkm", "04/000000-000009");
+  const Scan scan = drive().front();
+  kept.integrate(scan);
+  SemanticMapper other(configOf(), reference::smallTable());
+  other.integrate(scan);
+  DriveRecord part = driveOf("04/000000-000004");
+  part.scans = 1;
+  part.first_stamp = part.last_stamp = scan.stamp;
+  EXPECT_THROW(kept.keeper.addMap(other.snapshot(), {part}), std::invalid_argument);
+  kept.keeper.addMap(other.snapshot(), {part}, true);
+  EXPECT_THROW(kept.keeper.addMap(other.snapshot(), {part}, true), std::invalid_argument)
+      << "the same drive is no overlap";
+  EXPECT_EQ(kept.keeper.close(), "");
+  EXPECT_EQ(loadMap(folder / "map.bkm").drives.size(), 2u);
+}
+
 TEST(MapKeeper, AddsMapsAndForgetsThem) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";

@@ -66,7 +66,8 @@ class MapKeeper {
   void reset(const DriveRecord& drive);
   /// Adds another map, in memory or in the file. @throws std::invalid_argument if this map already contains
   /// one of the drives, or as SemanticMap::add; nothing is then added. @throws std::bad_alloc.
-  void addMap(SemanticMap other, const std::vector<DriveRecord>& drives);
+  /// @param allow_overlap adds drives that share scans with those of this map according to their ids, too.
+  void addMap(SemanticMap other, const std::vector<DriveRecord>& drives, bool allow_overlap = false);
 
   /// Clears a box, in memory and in the file. @param box map frame [m]; may be infinite.
   /// @return the blocks in memory that changed.
