@@ -61,13 +61,14 @@ struct Scene {
 
 /// What moves in a street.
 enum class SceneKind {
-  kStreet,   ///< cars that pass or are parked, and a few pedestrians
-  kTraffic,  ///< stop-and-go traffic in both directions, and parked cars of which some drive off
-  kCrowd,    ///< many pedestrians, who walk and stand, and cyclists
+  kStreet,    ///< cars that pass or are parked, and a few pedestrians
+  kTraffic,   ///< stop-and-go traffic in both directions, and parked cars of which some drive off
+  kCrowd,     ///< many pedestrians, who walk and stand, and cyclists
+  kArrivals,  ///< cars that come, park and leave, people who stop and walk on, trolleys that are left
 };
 /// @throws std::invalid_argument if there is no kind of this name.
 SceneKind sceneKindNamed(const std::string& name);
-/// "street", "traffic" or "crowd".
+/// "street", "traffic", "crowd" or "arrivals".
 std::string nameOf(SceneKind kind);
 
 /// A street along x with buildings, fences, trees, poles, signs, and the road users of its kind.

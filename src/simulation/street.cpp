@@ -66,15 +66,38 @@ void addCrowd(double length, double duration, Dice& dice, std::vector<Shape>& sh
     addBicycle(x, 8.3, Motion(), shapes);
 }
 
-constexpr const char* kNames[] = {"street", "traffic", "crowd"};
+/// What comes, stands for a while, and goes or stays: cars beside the road, people and trolleys on the
+/// pavement.
+void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>& shapes) {
+  using Add = void (*)(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
+  const auto add = [&](Add visitor, double x, double y, double speed, double aside, double longest) {
+    const double arrival = dice.between(0.1, 0.6) * duration, stand = dice.between(3.0, longest);
+    const bool stays = dice.between(0.0, 1.0) < 0.4;
+    const Motion motion = Motion::visiting(arrival, arrival + (stays ? 2.0 * duration : stand), speed, aside);
+    const Eigen::Vector3d way = motion.wayUntil(arrival);
+    visitor(x - way.x(), y - way.y(), motion, shapes);
+  };
+  for (double x = kStart; x < kStart + length; x += dice.between(7.0, 11.0))
+    add(addCar, x, 4.0, 6.0, 2.5, 0.5 * duration);
+  for (double x = kStart; x < kStart + length; x += dice.between(4.0, 8.0)) {
+    const double side = dice.between(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+    add(addPedestrian, x, side * dice.between(6.0, 7.8), side * dice.between(0.8, 1.6), 0.0, 10.0);
+  }
+  for (double x = kStart + 3.0; x < kStart + length; x += dice.between(10.0, 16.0))
+    add(addTrolley, x, -dice.between(5.7, 7.0), 1.0, 0.0, 0.5 * duration);
+}
+
+constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals"};
 
 }  // namespace
 
 SceneKind sceneKindNamed(const std::string& name) {
-  for (const SceneKind kind : {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd}) {
+  for (const SceneKind kind :
+       {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd, SceneKind::kArrivals}) {
     if (nameOf(kind) == name) return kind;
   }
-  throw std::invalid_argument("there is no scene " + name + "; known scenes: street, traffic, crowd");
+  throw std::invalid_argument("there is no scene " + name +
+                              "; known scenes: street, traffic, crowd, arrivals");
 }
 
 std::string nameOf(SceneKind kind) {
@@ -93,6 +116,10 @@ Scene makeScene(SceneKind kind, double length, double duration, double speed, st
     for (double x = kStart + 9.0; x < kStart + length; x += 25.0) addLampPost(x, side, shapes);
     for (double x = kStart + 20.0; x < kStart + length; x += 40.0) addSign(x, side, shapes);
     if (kind == SceneKind::kCrowd) continue;
+    if (kind == SceneKind::kArrivals) {
+      if (side < 0.0) addParkedCars(length, side, 0.0, duration, dice, shapes);
+      continue;
+    }
     addParkedCars(length, side, kind == SceneKind::kTraffic ? 0.25 : 0.0, duration, dice, shapes);
     addFewPedestrians(length, side, dice, shapes);
   }
@@ -105,6 +132,9 @@ Scene makeScene(SceneKind kind, double length, double duration, double speed, st
       break;
     case SceneKind::kCrowd:
       addCrowd(length, duration, dice, shapes);
+      break;
+    case SceneKind::kArrivals:
+      addVisitors(length, duration, dice, shapes);
       break;
   }
   return scene;

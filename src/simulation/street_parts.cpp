@@ -28,6 +28,28 @@ Motion Motion::drivingOff(double start, double speed, double to) {
   return motion;
 }
 
+Motion Motion::visiting(double arrival, double departure, double speed, double aside) {
+  const double turn = aside == 0.0 ? 0.0 : 2.5;  // [s]
+  const Eigen::Vector3d along(speed, 0.0, 0.0), into(0.5 * speed, turn == 0.0 ? 0.0 : aside / turn, 0.0);
+  Motion motion = constant(speed);
+  motion.legs = {{arrival - turn, along},
+                 {arrival, into},
+                 {departure, Eigen::Vector3d::Zero()},
+                 {departure + turn, {into.x(), -into.y(), 0.0}}};
+  return motion;
+}
+
+Eigen::Vector3d Motion::wayUntil(double time) const {
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  double begin = 0.0;
+  for (const Leg& leg : legs) {
+    if (leg.until > time) break;
+    way += (leg.until - begin) * leg.velocity;
+    begin = leg.until;
+  }
+  return way;
+}
+
 Shape box(double x, double y, double z, double length, double width, double height, std::uint32_t label) {
   Shape shape{ShapeType::kBox, {x, y, z}, {length / 2, width / 2, height / 2}};
   shape.label = label;
@@ -47,6 +69,10 @@ void addCar(double x, double y, const Motion& motion, std::vector<Shape>& shapes
 
 void addPedestrian(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {
   addMoving(pillar(x, y, 0.28, 1.75, kPerson), motion, kMovingPerson, shapes);
+}
+
+void addTrolley(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {
+  addMoving(box(x, y, 0.55, 0.8, 0.6, 1.1, kMovingVehicle), motion, kMovingVehicle, shapes);
 }
 
 void addBicycle(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {

@@ -12,7 +12,7 @@ namespace bki_mapping::simulation {
 // Raw SemanticKITTI labels.
 constexpr std::uint32_t kCar = 10, kBicycle = 11, kPerson = 30, kBuilding = 50, kFence = 51, kVegetation = 70,
                         kTrunk = 71, kPole = 80, kSign = 81, kMovingCar = 252, kMovingBicyclist = 253,
-                        kMovingPerson = 254;
+                        kMovingPerson = 254, kMovingVehicle = 259;
 
 /// A sequence of random numbers. Different streams of a seed are independent.
 class Dice {
@@ -41,6 +41,13 @@ struct Motion {
   /// Stands, pulls out towards the middle of the street, and drives away along it.
   /// @param to lateral distance of the lane [m].
   static Motion drivingOff(double start, double speed, double to);
+  /// Comes along x, moves aside to its place, stands there, and goes as it came. Where it is at time 0
+  /// follows.
+  /// @param arrival, departure when it comes to a stand, and when it moves again [s]. @param aside from its
+  /// way to its place [m].
+  static Motion visiting(double arrival, double departure, double speed, double aside);
+  /// How far it goes in the legs that end by a time.
+  Eigen::Vector3d wayUntil(double time) const;
   bool moves() const { return !velocity.isZero() || !legs.empty(); }
 };
 
@@ -50,6 +57,8 @@ Shape pillar(double x, double y, double radius, double height, std::uint32_t lab
 /// Body and cabin of a car along x.
 void addCar(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 void addPedestrian(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
+/// A trolley, as large as a cupboard.
+void addTrolley(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 /// A bicycle, alone or with its rider.
 void addBicycle(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 void addTree(double x, double y, Dice& dice, std::vector<Shape>& shapes);

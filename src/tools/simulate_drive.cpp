@@ -24,8 +24,9 @@ po::options_description options() {
   options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
       "scene", value<std::string>("KIND", "street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
-      "many "
-      "pedestrians and cyclists")("scans", value<int>("N", 100), "number of scans")(
+      "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop, trolleys "
+      "that "
+      "are left")("scans", value<int>("N", 100), "number of scans")(
       "lidar", value<std::string>("NAME", "hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
       "columns", value("N", lidar.columns), "azimuth steps per revolution")(
@@ -34,7 +35,7 @@ po::options_description options() {
       "range-noise", value("M", lidar.range_noise), "standard deviation of the ranges [m]")(
       "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
       "speed", po::value<double>()->value_name("M/S"),
-      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2")(
+      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1")(
       "height", value("M", simulation::DriveConfig().height), "height of the sensor above the ground [m]")(
       "layout", value<std::string>("NAME", "semantic_kitti"),
       "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
@@ -50,6 +51,8 @@ double usualSpeed(simulation::SceneKind scene) {
       return 3.0;
     case simulation::SceneKind::kCrowd:
       return 2.0;
+    case simulation::SceneKind::kArrivals:
+      return 1.0;
     default:
       return 8.0;
   }

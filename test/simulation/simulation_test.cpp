@@ -83,6 +83,33 @@ TEST(Scene, ACrowdStandsAndWalks) {
   for (const auto& way : waysOf(scene, 254, {30.0})) EXPECT_GT(way[0], 0.0);
 }
 
+TEST(Scene, VisitorsArriveAndStayAndLeave) {
+  constexpr double kDuration = 60.0;
+  const Scene scene = makeScene(SceneKind::kArrivals, 100.0, kDuration, 0.0, 1);
+  for (const std::uint32_t label : {252u, 254u, 259u}) {
+    std::size_t come = 0, stay = 0, leave = 0;
+    for (const Shape& shape : scene.shapes) {
+      if (shape.label != label) continue;
+      const auto moves = [&](double time) {
+        return !shape.centreAt(time).isApprox(shape.centreAt(time + 0.1), 1e-6);
+      };
+      EXPECT_TRUE(moves(0.0));
+      bool stood = false, left = false;
+      for (double time = 0.0; time < kDuration; time += 0.5) {
+        stood |= !moves(time);
+        left |= stood && moves(time);
+      }
+      come += stood;
+      stay += stood && !left;
+      leave += left;
+    }
+    EXPECT_GT(come, 3u) << label;
+    EXPECT_GT(stay, 0u) << label;
+    EXPECT_GT(leave, 0u) << label;
+  }
+  EXPECT_GT(waysOf(scene, 10, {1.0}).size(), 5u) << "cars that stand all the time";
+}
+
 TEST(Lidar, IsKnownByName) {
   EXPECT_EQ(lidarNamed("hdl64").beams, 64);
   EXPECT_EQ(lidarNamed("hdl32").beams, 32);
