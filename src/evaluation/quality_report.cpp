@@ -92,6 +92,30 @@ Json dynamicsJson(const DynamicsQuality& d) {
           {"ha", d.harmonicAccuracy()}};
 }
 
+/// Null of nothing; a text for never.
+Json delayJson(double seconds) {
+  if (std::isinf(seconds)) return "never";
+  return seconds;
+}
+
+Json presenceJson(const PresenceQuality& p) {
+  Json json;
+  for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
+    json["by_distance"].push_back({{"up_to", PresenceQuality::kDistances[bin]},
+                                   {"moving_points", p.moving[bin].points},
+                                   {"pa_moving", p.moving[bin].accuracy()},
+                                   {"standing_points", p.standing[bin].points},
+                                   {"pa_standing", p.standing[bin].accuracy()}});
+  }
+  for (const auto& [name, delays] : {std::pair("appear", &p.appear), std::pair("clear", &p.clear)}) {
+    json[name] = {{"voxels", delays->count()},
+                  {"never", delays->never},
+                  {"median", delayJson(delays->quantile(0.5))},
+                  {"p95", delayJson(delays->quantile(0.95))}};
+  }
+  return json;
+}
+
 /// One decimal; "-" for a fraction of nothing.
 std::string figureText(double figure) {
   if (!std::isfinite(figure)) return "-";
@@ -125,6 +149,26 @@ class Table {
  private:
   std::ostringstream out_;
 };
+
+void addPresence(const PresenceQuality& presence, Table& table) {
+  for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
+    const std::string within = " within " + numberText(PresenceQuality::kDistances[bin]) + " m";
+    table.percent(
+        "PA moving", presence.moving[bin].accuracy(),
+        "of each scan's points of moving objects" + within + " are in occupied voxels right after it");
+    table.percent("   standing", presence.standing[bin].accuracy(),
+                  "of those of objects that could move, but stand still");
+  }
+  const auto delays = [&](const Delays& d, const std::string& what) {
+    const auto text = [](double seconds) {
+      return std::isinf(seconds) ? "never" : figureText(seconds) + " s";
+    };
+    table.text(what + ": median " + text(d.quantile(0.5)) + ", 95 % within " + text(d.quantile(0.95)) + "; " +
+               std::to_string(d.never) + " of " + std::to_string(d.count()) + " voxels never");
+  };
+  delays(presence.appear, "to appear");
+  delays(presence.clear, "to clear, once beams come near again");
+}
 
 void addCloud(const CloudQuality& cloud, Table& table) {
   const std::string distance = numberText(cloud.distance) + " m";
@@ -194,6 +238,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
                 "of those in voxels that share no static point and that beams came near again");
   table.percent("AA", d.accuracy(), "sqrt(SA DA)");
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
+  addPresence(quality.presence, table);
   table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");
   table.percent("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
   table.percent("  present: map", s.map_of_present.meanIou(), "without the points of what has moved away");
@@ -261,6 +306,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                                   {"iou_map", s.map.iou(c.id)},
                                   {"iou_input", s.input.iou(c.id)}});
   }
+  figures["presence"] = presenceJson(quality.presence);
   figures["probability_reliability"] = reliabilityJson(s.probability);
   figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
   figures["occupancy_reliability"] = reliabilityJson(quality.occupancy);

@@ -8,6 +8,7 @@
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/dynamics_evaluation.h"
 #include "evaluation/occupancy_evaluation.h"
+#include "evaluation/presence_evaluation.h"
 #include "evaluation/semantic_evaluation.h"
 #include "evaluation/truth_evaluation.h"
 
@@ -22,6 +23,7 @@ struct JudgedMap {
 struct MapQuality {
   DynamicsQuality dynamics;
   std::vector<JudgedMap> judged;
+  PresenceQuality presence;
   SemanticQuality semantics;
   Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
   std::optional<CloudQuality> cloud;               ///< compared with a ground-truth cloud

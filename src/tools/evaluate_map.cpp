@@ -14,6 +14,7 @@
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/label_noise.h"
 #include "evaluation/pose_noise.h"
+#include "evaluation/presence_evaluation.h"
 #include "evaluation/quality_report.h"
 #include "io/label_watch.h"
 #include "io/truth_cloud.h"
@@ -71,6 +72,7 @@ po::options_description options() {
 /// The measures of one run.
 struct Evaluation {
   DynamicsEvaluation dynamics;
+  PresenceEvaluation presence;
   SemanticEvaluation semantics;
   OccupancyEvaluation occupancy;
   std::optional<simulation::TruthEvaluation> truth;
@@ -116,6 +118,7 @@ struct Evaluation {
     const StateRules& rules = mapper.rules();
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map, rules, taken());
+    quality.presence = presence.quality();
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
     quality.semantics = semantics.compare(map, rules, still_there);
@@ -260,8 +263,11 @@ int evaluate(const po::variables_map& given) {
   const GridGeometry& geometry = mapper.map().geometry();
   const auto moving = KittiLabels::moving();
   Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
-                        SemanticEvaluation(geometry, moving), OccupancyEvaluation(geometry, moving),
-                        std::nullopt, cloudEvaluation(given, sequence, mapper.config())};
+                        PresenceEvaluation(geometry, moving),
+                        SemanticEvaluation(geometry, moving),
+                        OccupancyEvaluation(geometry, moving),
+                        std::nullopt,
+                        cloudEvaluation(given, sequence, mapper.config())};
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   // A map that drifts is in no frame of the true scene.
@@ -288,6 +294,7 @@ int evaluate(const po::variables_map& given) {
     tools::warn(watch.report(mapper, input, stats.counts));
     if (sequence.labelled()) {
       evaluation.add(scan, input.labels, mapper.classes());
+      evaluation.presence.add(scan, mapper.classes(), mapper.map(), mapper.rules());
     } else {
       evaluation.addUnlabelled(scan, mapper.classes());
     }

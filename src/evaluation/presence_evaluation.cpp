@@ -1,0 +1,137 @@
+#include "evaluation/presence_evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bki_mapping {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+double Delays::quantile(double share) const {
+  if (count() == 0) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> sorted = seconds;
+  std::sort(sorted.begin(), sorted.end());
+  const auto n = static_cast<std::size_t>(std::ceil(share * static_cast<double>(count())));
+  return n <= sorted.size() ? sorted[std::max<std::size_t>(n, 1) - 1] : kNever;
+}
+
+std::uint32_t PresenceEvaluation::voxelAt(const VoxelIndex& index) {
+  const auto fresh = static_cast<std::uint32_t>(voxels_.size());
+  const std::uint32_t n = index_of_.insert(index, fresh);
+  if (n == fresh) {
+    voxels_.push_back({index});
+    voxels_.back().last_hit = -kNever;
+  }
+  return n;
+}
+
+bool PresenceEvaluation::isOccupied(const VoxelIndex& voxel, const SemanticMap& map,
+                                    const StateRules& rules) {
+  const BlockIndex index = GridGeometry::blockOf(voxel);
+  const Block* const block = map.find(index);
+  if (!block) return false;
+  const auto fresh = static_cast<std::uint32_t>(views_.size());
+  const std::uint32_t n = view_of_.insert(index, fresh);
+  if (n == fresh) {
+    views_.emplace_back();
+    readBlock(map, rules, index, *block, BlockFields::kStates, views_.back());
+  }
+  return views_[n].state[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] ==
+         VoxelState::kOccupied;
+}
+
+void PresenceEvaluation::start(std::uint32_t n, Wait wait, double time) {
+  Voxel& voxel = voxels_[n];
+  voxel.wait = wait;
+  voxel.since = time;
+  if (!voxel.waits) waiting_.push_back(n);
+  voxel.waits = true;
+}
+
+void PresenceEvaluation::follow(const Scan& scan, double time, const SemanticMap& map,
+                                const StateRules& rules) {
+  beams_.build(scan);
+  const auto isDone = [&](std::uint32_t n) {
+    Voxel& voxel = voxels_[n];
+    const bool is_hit = voxel.last_hit == time;
+    if (voxel.wait == Wait::kToAppear) {
+      if (isOccupied(voxel.index, map, rules)) {
+        delays_.push_back({n, true, time - voxel.since});
+        voxel.wait = Wait::kToBeSeen;
+      } else if (time - voxel.last_hit > kAnew) {
+        delays_.push_back({n, true, kNever});
+        voxel.wait = Wait::kNone;
+      }
+    } else if (is_hit) {
+      voxel.wait = Wait::kToBeSeen;
+    }
+    if (voxel.wait == Wait::kToBeSeen && !is_hit &&
+        beams_.anyPasses(geometry_.voxelCentre(voxel.index), geometry_.resolution())) {
+      start(n, Wait::kToClear, time);
+    }
+    if (voxel.wait == Wait::kToClear && !isOccupied(voxel.index, map, rules)) {
+      delays_.push_back({n, false, time - voxel.since});
+      voxel.wait = Wait::kNone;
+    }
+    voxel.waits = voxel.wait != Wait::kNone;
+    return !voxel.waits;
+  };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), isDone), waiting_.end());
+}
+
+void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, const SemanticMap& map,
+                             const StateRules& rules) {
+  const double time = 1e-9 * static_cast<double>(scan.stamp);
+  view_of_ = GridTable();
+  views_.clear();
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
+    const auto id = classes.classOf(scan.labels[i], labelValues(scan));
+    if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
+    const bool moves = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
+    const std::uint32_t n = voxelAt(geometry_.voxelAt(point));
+    Voxel& voxel = voxels_[n];
+    const double before = voxel.last_hit;
+    voxel.last_hit = time;
+    voxel.is_shared |= !moves;
+    if (scans_ < kFirstScans) continue;
+    if (moves && before != time && time - before > kAnew) start(n, Wait::kToAppear, time);
+    if (!moves && !classes.find(*id)->dynamic) continue;
+    const bool occupied = isOccupied(voxel.index, map, rules);
+    for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
+      if (static_cast<double>(scan.points[i].norm()) > PresenceQuality::kDistances[bin]) continue;
+      PresentPoints& points = (moves ? quality_.moving : quality_.standing)[bin];
+      ++points.points;
+      points.present += occupied;
+    }
+  }
+  follow(scan, time, map, rules);
+  last_time_ = time;
+  ++scans_;
+}
+
+PresenceQuality PresenceEvaluation::quality() const {
+  PresenceQuality quality = quality_;
+  for (const Delay& delay : delays_) {
+    if (voxels_[delay.voxel].is_shared) continue;
+    Delays& all = delay.appears ? quality.appear : quality.clear;
+    if (delay.seconds < kNever) {
+      all.seconds.push_back(delay.seconds);
+    } else {
+      ++all.never;
+    }
+  }
+  // What is not cleared by the end, although beams have been near for as long as clearing may take.
+  for (const std::uint32_t n : waiting_) {
+    const Voxel& voxel = voxels_[n];
+    if (voxel.wait == Wait::kToClear && !voxel.is_shared && last_time_ - voxel.since > kAnew)
+      ++quality.clear.never;
+  }
+  return quality;
+}
+
+}  // namespace bki_mapping
