@@ -48,8 +48,8 @@ struct DynamicsQuality : Accuracies {
               other_kept = 0;
   std::size_t floor_voxels = 0;  ///< voxels with static points of ground
   std::size_t floor_holes = 0;   ///< of these, those that are not occupied
-  /// Moving points that no map can tell to be gone: those in voxels that static points are in, too, and of
-  /// the others those that no beam has come near after the last moving point in their voxel.
+  /// Moving points that no map can tell to be gone: those in voxels shared with static points, and those in
+  /// other voxels that no beam came near after the last moving point.
   std::size_t moving_shared = 0, moving_unseen = 0;
   std::size_t decidable_points = 0;   ///< the other moving points
   std::size_t decidable_removed = 0;  ///< of these, those that the map does not keep

@@ -12,8 +12,7 @@ namespace bki_mapping {
 /// The beams of one scan, by direction. Keeps its memory from scan to scan.
 class PassingBeams {
  public:
-  /// Replaces the beams by those of a scan, of whose points those that are not finite or at the sensor are
-  /// skipped.
+  /// Replaces the beams by those of a scan. Skips points that are not finite, or at the sensor.
   void build(const Scan& scan) {
     origin_ = scan.origin;
     ends_.clear();

@@ -16,7 +16,7 @@ namespace bki_mapping {
 /// as small ones.
 ///
 /// Axes along which the ray descends are mirrored, so that it ascends along all: voxel i becomes -1 - i,
-/// which is ~i. A ray that starts on a face thus starts in the voxel that it goes on to.
+/// which is ~i. A ray that starts on a face thus starts in the voxel ahead.
 class RayWalk {
  public:
   /// @param origin in units of voxels, within the grid. @param direction which is the unit of lengths along

@@ -57,7 +57,7 @@ class Examples(unittest.TestCase):
         return f'{free.sum()} free, {far.sum()} of them more than 1 m'
 
     def test_blocks_of_the_documents(self):
-        """What README.md and docs/python.md show runs as it stands, block after block."""
+        """What docs/start.md and docs/python.md show runs as it stands, block after block."""
         rng = np.random.default_rng(1)
         given = {'origin': (0.0, 0.0, 1.7), 'points': rng.uniform([4, -3, -1], [4.1, 3, 1], (500, 3)).astype(np.float32),
                  'labels': np.full(500, 50, np.uint32), 'stamp': 0, 'pose': np.eye(4)}
@@ -71,7 +71,7 @@ class Examples(unittest.TestCase):
             small_city.write_city(BIN, ['drive.bkm'], 'city', 2)
             for name in ('a', 'b', 'yesterday'):
                 bki_mapping.SemanticMapper(config='robot').save(f'{name}.bkm')
-            for document in ('README.md', 'docs/python.md'):
+            for document in ('docs/start.md', 'docs/python.md'):
                 with open(os.path.join(os.path.dirname(EXAMPLES), document)) as file:
                     blocks = re.findall(r'^```python\n(.*?)^```$', file.read(), re.MULTILINE | re.DOTALL)
                 self.assertGreater(len(blocks), 0, document)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Every command of README.md and docs, word for word, in a copy of the source tree, on stand-in data.
 
-README.md's are for the build of scripts/demo, so they are typed where nothing else is built; those of docs are for all targets.
+Those of the first pages (README.md, docs/install.md, docs/start.md) are for the build of scripts/demo, so they are typed where
+nothing else is built; those of other pages are for all targets.
 A block of commands is what a user types: what does not end by itself (roslaunch, rviz) goes on in a terminal of its own
 until the block's last command has ended. Launch files must map what is played to them.
 """
@@ -30,7 +31,9 @@ MADE_BY = {
     f'{PACKAGE}/_core': 'bki_mapping_python',
     'lib/libbki_mapping_nodelets': 'bki_mapping_nodelets',
 }
-DOCUMENTS = ['README.md', *(f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md'))]
+FIRST_PAGES = ['README.md', 'docs/install.md', 'docs/start.md']  # for the build of scripts/demo
+PAGES = [f'docs/{name}' for name in sorted(os.listdir(f'{SOURCE}/docs')) if name.endswith('.md')]
+DOCUMENTS = [*FIRST_PAGES, *(page for page in PAGES if page not in FIRST_PAGES)]
 OF_DASK = {'docs/city.md'}  # Debian 11's python3-distributed lacks tornado
 TIMEOUT = 60.0  # maximum duration of a command, and of waiting for an event [s]
 SCANS = 6
@@ -274,7 +277,7 @@ class Commands(unittest.TestCase):
         cls.display = cls.start_display()
         shell = Shell(cls.folder, cls.display)
         cls.copy_source(shell.clone)
-        cls.use_build_of('docs')
+        cls.use_build_of(None)
         os.makedirs(os.path.join(shell.home, 'kitti/sequences'))
         shell.run(f'{DEVEL}/lib/bki_mapping/simulate_drive --output ~/kitti/sequences/04 --scans {SCANS} --beams 16 '
                   '--columns 400')
@@ -310,11 +313,11 @@ class Commands(unittest.TestCase):
 
     @classmethod
     def use_build_of(cls, document):
-        """Puts the build that a document speaks of into the clone."""
+        """Puts the build that a document speaks of into the clone; without a document, that of all targets."""
         link = os.path.join(cls.folder, 'bki_mapping/build/devel')
         if os.path.lexists(link):
             os.unlink(link)
-        os.symlink(cls.demo_build if document == 'README.md' else DEVEL, link)
+        os.symlink(cls.demo_build if document in FIRST_PAGES else DEVEL, link)
 
     def start_mapper(self, shell):
         """Starts the mapper of README.md if a command needs one in another terminal."""
@@ -397,22 +400,24 @@ class Commands(unittest.TestCase):
         self.assertGreaterEqual(count, 6)
         self.assertLessEqual(set(LEFT_OUT), seen, 'commands left out that no text has')
 
-    def test_the_readme_names_only_programs_that_the_demo_builds(self):
+    def test_the_first_pages_name_only_programs_that_the_demo_builds(self):
         programs = {name for name in os.listdir(f'{DEVEL}/{PROGRAM_FOLDER}') if target_of(f'{PROGRAM_FOLDER}/{name}')}
         self.assertLess(set(DEMO_TARGETS) & programs, programs, 'other targets are built, too')
-        self.assertLessEqual(set(re.findall(r'\w+', text_of('README.md'))) & programs, set(DEMO_TARGETS))
+        for document in FIRST_PAGES:
+            with self.subTest(document=document):
+                self.assertLessEqual(set(re.findall(r'\w+', text_of(document))) & programs, set(DEMO_TARGETS))
 
-    def test_python_of_the_readme_runs_on_the_build_of_the_demo(self):
-        self.use_build_of('README.md')
+    def test_python_of_the_first_pages_runs_on_the_build_of_the_demo(self):
+        self.use_build_of(FIRST_PAGES[0])
         given = 'import numpy\npose = numpy.eye(4)\npoints = numpy.full((9, 3), 4.0)\nlabels = numpy.full(9, 50)\n'
-        blocks = re.findall(r'^```python\n(.*?)^```$', text_of('README.md'), re.MULTILINE | re.DOTALL)
+        blocks = re.findall(r'^```python\n(.*?)^```$', ''.join(map(text_of, FIRST_PAGES)), re.MULTILINE | re.DOTALL)
         self.assertTrue(blocks)
         shell = Shell(self.folder, self.display)
-        folder = os.path.join(shell.clone, 'of_readme')
+        folder = os.path.join(shell.clone, 'of_first_pages')
         os.mkdir(folder)
         with open(os.path.join(folder, 'blocks.py'), 'w') as file:
             file.write(given + ''.join(blocks))
-        shell.run('cd of_readme && /usr/bin/python3 blocks.py')
+        shell.run('cd of_first_pages && /usr/bin/python3 blocks.py')
         self.assertIn('street.bkm', os.listdir(folder))
 
     def test_arguments_of_launch_files_are_explained_and_documented(self):

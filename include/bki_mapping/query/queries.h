@@ -68,7 +68,7 @@ struct RayHit {
 
 /// Follows a ray through all voxels of which it crosses more than a point, in order, the origin's first. A
 /// voxel contains its faces on the side of the smaller coordinates: a ray within a face belongs to the voxels
-/// above. A ray that starts on a face starts in the voxel that it goes on to, and one that passes through an
+/// above. A ray that starts on a face starts in the voxel ahead, and one that passes through an
 /// edge meets none of the voxels that it only touches there. Lengths are rounded once and do not add up, so
 /// that only voxels that the ray crosses for less than some 1e-15 of its length can be missed. Blocks in
 /// which the ray cannot stop are skipped: the time grows with the blocks along the ray where space is open,
