@@ -150,11 +150,11 @@ endfunction()
 bki_mapping_unit_tests(core atomic_file class_filter grid_geometry)
 bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
-bki_mapping_unit_tests(map semantic_map)
+bki_mapping_unit_tests(map looks semantic_map)
 bki_mapping_unit_tests(map clear_box LINK bki_mapping_store)
 bki_mapping_unit_tests(store damaged_file full_disk map_clear map_file migration
   LINK SQLite::SQLite3 ZLIB::ZLIB)
-bki_mapping_unit_tests(store map_keeper)  # scripts/test runs a part of it
+bki_mapping_unit_tests(store map_keeper LINK bki_mapping_io)  # scripts/test runs a part of it
 foreach(name hostile_file map_merge tile_codec)  # each counts what is allocated, as damaged_file and allocation do
   bki_mapping_unit_tests(store ${name} LINK SQLite::SQLite3 ZLIB::ZLIB)
 endforeach()
@@ -191,12 +191,12 @@ function(bki_mapping_fuzzer name)
     set_tests_properties(fuzz_${name} PROPERTIES TIMEOUT ${BKI_MAPPING_TEST_SECONDS})
   endif()
 endfunction()
-bki_mapping_fuzzer(map_file fuzz_map_file version_1.bkm version_2.bkm)
+bki_mapping_fuzzer(map_file fuzz_map_file version_1.bkm version_2.bkm version_3.bkm)
 bki_mapping_fuzzer(tile_codec fuzz_tile_codec)
 if(BKI_MAPPING_LIBFUZZER)
   target_sources(fuzz_map_file PRIVATE test/store/fuzz_map_file_mutator.cpp)
 endif()
-bki_mapping_unit_tests(rules limit_kernels read_block scan_rules void_search voxel_state)
+bki_mapping_unit_tests(rules latest_looks limit_kernels read_block scan_rules void_search voxel_state)
 bki_mapping_unit_tests(rules neighbours)
 bki_mapping_unit_tests(query column_map distance_field points rays shapes)
 bki_mapping_unit_tests(query state_map)  # scripts/test leaves a part of it out by GTEST_FILTER, which joined tests do not heed
@@ -217,7 +217,7 @@ bki_mapping_unit_tests(mapping brute_force scan_preprocessor snapshot)
 foreach(name allocation bounds laws)
   bki_mapping_unit_tests(mapping ${name})
 endforeach()
-bki_mapping_unit_tests(mapping parameters real_data LINK bki_mapping_io)
+bki_mapping_unit_tests(mapping latest parameters real_data LINK bki_mapping_io)
 # The laws with the loops for processors without AVX, which instruction_sets_test compares with brute force.
 foreach(name instruction_sets laws)
   add_test(NAME ${name}_generic_test COMMAND ${name}_test)
@@ -245,7 +245,7 @@ set_tests_properties(traffic_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*Traffic*
   COST 80)
 bki_mapping_long_tests(navigation_test traffic_test)
 bki_mapping_long_programs(navigation_test)
-bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy semantics truth)
+bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy presence semantics truth)
 target_include_directories(octomap_export_test SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
@@ -314,7 +314,7 @@ if(CATKIN_ENABLE_TESTING)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
     test/ros/large_coordinates_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
-    test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
+    test/ros/bumper_rostest.py test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
     test/ros/query_latency_rostest.py test/ros/rates_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
@@ -360,6 +360,7 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/map_file.test)
   add_rostest(test/ros/mapping_node.test)
   add_rostest(test/ros/mapping_nodelet.test)
+  add_rostest(test/ros/bumper.test)
   add_rostest(test/ros/navigation.test)
   add_rostest(test/ros/publishing.test)
   add_rostest(test/ros/queries.test)

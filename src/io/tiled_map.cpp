@@ -88,9 +88,7 @@ struct TiledMap::State {
     return found;
   }
 
-  void checkMemory(const std::vector<Found>& found, std::size_t limit) const {
-    std::size_t bytes = 0;
-    for (const Found& each : found) bytes += memoryOf(each.entry);
+  void checkMemory(const std::vector<Found>& found, std::size_t bytes, std::size_t limit) const {
     if (limit == 0 || bytes <= limit) return;
     throw MapFileError("the " + std::to_string(found.size()) + " tiles of " + files.path() +
                        " that are asked for take " + std::to_string(bytes / 1'000'000) +
@@ -99,13 +97,17 @@ struct TiledMap::State {
   }
   RuledMap read(const std::vector<Found>& found, std::size_t limit) {
     const MapInfo& info = files.info();
-    checkMemory(found, limit);
+    std::size_t bytes = 0;
+    for (const Found& each : found) bytes += memoryOf(each.entry);
+    checkMemory(found, bytes, limit);
     RuledMap stored{{info, {}, info.emptyMap()}, storedRules(files.infoPath(), info)};
     for (const Found& each : found) {
       if (!files.file(each.file).addTileTo(stored.map, {each.entry.index})) {
         throw damaged(files.nameOf(each.file), "a tile of its list is missing");
       }
       ++tiles_read;
+      bytes += memoryOfLooks(stored.map, each.entry.index);
+      checkMemory(found, bytes, limit);
     }
     std::set<std::size_t> numbers;
     for (const Found& each : found) numbers.insert(each.file);

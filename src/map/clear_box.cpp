@@ -55,6 +55,7 @@ void clear(Block& block, const Voxels& voxels) {
     });
   }
   block.setOcclusion(block.occlusion() & ~voxels);
+  block.looks().erase(voxels);
 }
 
 }  // namespace

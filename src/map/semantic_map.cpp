@@ -116,6 +116,7 @@ void SemanticMap::erase(const BlockIndex& index) {
   --size_;
   dropIfEmpty(index);
   if (!own || !block->empty() || spare_blocks_.size() == spare_blocks_.capacity()) return;
+  block->looks().clear();
   spare_bytes_ += block->bytes();
   spare_blocks_.push_back(std::move(block));
 }
@@ -197,6 +198,7 @@ void SemanticMap::add(const SemanticMap& other) {
     for (const Entry& entry : other.entries()) {
       Block& block = getOrAllocate(entry.index);
       block.reserve(block.newClassesOf(*entry.block));
+      block.looks().reserve(entry.block->looks().all().size());
     }
   } catch (...) {
     for (const Entry& entry : other.entries()) {
@@ -210,6 +212,7 @@ void SemanticMap::add(const SemanticMap& other) {
     const auto& classes = entry.block->classes();
     for (std::size_t i = 0; i < classes.size(); ++i) block.add(classes[i], entry.block->plane(i));
     block.setOcclusion(block.occlusion() | entry.block->occlusion());
+    block.looks().add(entry.block->looks());
     if (block.empty()) erase(entry.index);  // negative evidence may have undone all of it
   }
 }

@@ -106,6 +106,12 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
         "scan_limit/void adds nothing without scan_limit/free, which says what counts as seen empty; set "
         "scan_limit/free, such as 0.1");
   }
+  if (config.free_gain.latest && config.scan_limit.free == 0.0) {
+    warnings.push_back(
+        "free_gain/latest sees nothing leave without scan_limit/free, which says what counts as seen empty; "
+        "set "
+        "scan_limit/free, such as 0.1");
+  }
   return warnings;
 }
 

@@ -116,12 +116,14 @@ struct SemanticMapper::Pipeline {
   Pipeline(const MapperConfig& config, const GridGeometry& geometry, const ClassTable& classes)
       : rules(config.scan_limit, classes),
         preprocessor(config),
-        hits(geometry, config.kernel, config.scan_limit.hits_before_misses,
+        hits(geometry, config.kernel, config.scan_limit.hits_before_misses || config.free_gain.latest,
              config.kernel.static_spread ? ClassSet() : rules.fixed),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
-        occlusion(config.occlusion) {}
+        occlusion(config.occlusion) {
+    rules.keeps_looks = config.free_gain.latest;
+  }
 };
 
 SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
@@ -267,6 +269,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
   const FreeSpaceEvidence free = p.free_space->observe(p.beams, scan.stamp, *pool_);
   ScanEvidence evidence;
   evidence.withdraws = withdraws;
+  evidence.stamp = scan.stamp;
   evidence.hits = &p.hits;
   evidence.free = free.evidence;
   if (occludes) {

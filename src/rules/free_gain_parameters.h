@@ -47,11 +47,16 @@ inline std::vector<NamedParameter<FreeGainConfig>> freeGainParameters() {
                     Changes::kWhileMapping,
                     "Where the likeliest class has the flag dynamic and not the flag living, or no class "
                     "has the flag dynamic, the voxels up to two away decide together: a voxel is occupied "
-                    "if the evidence in those that their own evidence keeps is at least this factor times "
-                    "that in those that it clears. One that its own evidence clears also needs a quarter of "
-                    "the mean evidence of those kept, and a twentieth of its evidence for free. Set it to "
-                    "about 2 to clear remains of what has left and to keep roofs that beams graze; 0 lets "
-                    "each voxel decide by itself."),
+                    "if the ratio of kept to cleared evidence among them is at least this factor. "
+                    "Evidence is kept where a voxel by itself is occupied, and cleared elsewhere; a "
+                    "cleared voxel also needs a quarter of the mean evidence of the kept ones, and a "
+                    "twentieth of its evidence for free. Set it to about 2 to clear remains of what has "
+                    "left and to keep roofs that beams graze; 0 lets each voxel decide by itself."),
+      truthParameter("latest", &C::latest, Changes::kAtStart,
+                     "Whether the map knows time: a voxel whose latest look was a hit is occupied, one that "
+                     "has been seen void in two intervals of 0.27 s since is free, and one that was hit for "
+                     "long and is crossed since stays; elsewhere the sum decides. Needs scan_limit/free and "
+                     "stamped scans; takes about 0.7 kB of memory a block. False lets the sum decide alone."),
   };
 }
 

@@ -29,12 +29,13 @@ struct ScanRules {
   /// voxel below reaches most_free.
   float free_threshold = 0.0f;
   float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
+  bool keeps_looks = false;    ///< note when the scan looked at which voxels (Looks)
   ClassSet fixed;              ///< the classes that cannot move
 
   bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
   /// Whether the threshold depends on the voxel below.
   bool asksBelow() const { return free_threshold > 0.0f && std::isfinite(most_free); }
-  bool seeksVoids() const { return void_evidence > 0.0f; }
+  bool seeksVoids() const { return void_evidence > 0.0f || keeps_looks; }
 };
 
 /// Evidence for `free` at the top and bottom of a block, where the threshold depends on a block of another
@@ -59,6 +60,9 @@ VoxelMask applyToFree(const ScanRules& rules, const LimitKernels& kernels, const
 
 /// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
 EvidenceUnits roundedUnits(float sum);
+
+/// Whether any sum of a block, limits applied, rounds to a unit or more.
+bool addsEvidence(const LimitKernels& kernels, const BlockSums& sums);
 
 /// The units that the threshold has taken from a sum >= 0 of a voxel, but would not above a crossed one.
 EvidenceUnits heldBack(const ScanRules& rules, float sum);

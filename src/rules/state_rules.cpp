@@ -23,13 +23,13 @@ double gainOf(const SemanticClass& c, const FreeGainConfig& config) {
 }  // namespace
 
 StateRules::StateRules(const FreeGainConfig& config, const ClassTable& classes)
-    : StateRules(
-          StateRules()
-              .withPersistence(config.persistence)
-              .withRemaining(config.remaining, fixedClasses(classes))
-              // Where floors ask, too, they would keep whatever moves on them: the layers below are
-              // left out.
-              .withNeighbourhood(config.neighbourhood, askingClasses(classes), classes.saysWhatMoves())) {
+    : StateRules(StateRules()
+                     .withPersistence(config.persistence)
+                     .withRemaining(config.remaining, fixedClasses(classes))
+                     // Where floors ask, too, they would keep whatever moves on them: the layers below are
+                     // left out.
+                     .withNeighbourhood(config.neighbourhood, askingClasses(classes), classes.saysWhatMoves())
+                     .withLatest(config.latest)) {
   for (const SemanticClass& c : classes.classes()) {
     free_gains_[c.id] = finite(c.free_gain.value_or(gainOf(c, config)));
   }
@@ -63,12 +63,18 @@ StateRules StateRules::withNeighbourhood(double ratio, const ClassSet& asking, b
   return rules;
 }
 
+StateRules StateRules::withLatest(bool decides) const {
+  StateRules rules = *this;
+  rules.latest_decides_ = decides;
+  return rules;
+}
+
 bool StateRules::decidesAs(const StateRules& other) const {
   return free_gains_ == other.free_gains_ && persistence_ == other.persistence_ &&
          (neighbourhood_ratio_ == 0.0f ||
           (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_)) &&
-         neighbourhood_ratio_ == other.neighbourhood_ratio_ && remaining_gain_ == other.remaining_gain_ &&
-         (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
+         latest_decides_ == other.latest_decides_ && neighbourhood_ratio_ == other.neighbourhood_ratio_ &&
+         remaining_gain_ == other.remaining_gain_ && (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
 }
 
 }  // namespace bki_mapping

@@ -9,7 +9,8 @@
 
 namespace bki_mapping {
 
-/// The voxels of a block whose own evidence is overruled by the voxels around them (12b).
+/// The voxels of a block whose own evidence is overruled by the voxels around them (12b), or by the latest
+/// looks (12c).
 using Overruled = std::array<std::int32_t, kBlockVoxels>;
 constexpr std::int32_t kNotOverruled = 0, kKept = 1, kCleared = -1;
 
@@ -31,7 +32,7 @@ struct BlockPlanes {
   std::size_t count = 0;
   const EvidenceUnits* free = nullptr;  ///< zeros if the block has no plane for `free`
   bool has_free = false;
-  const Overruled* overruled = nullptr;  ///< by the voxels around; nullptr: none is
+  const Overruled* overruled = nullptr;  ///< nullptr: none is
 };
 
 /// What the voxels of a block say to those around that ask (12b) [units, at most StateRules::mostVote]: the

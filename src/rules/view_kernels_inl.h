@@ -205,12 +205,12 @@ struct Priors {
 };
 
 /// Equations 10 and 13 of a vector of voxels. @param found what decides the state: the likeliest class, or
-/// what remains.
+/// what remains. @param restored, cleared the voxels whose own evidence is overruled.
 template <bool kEntropy>
 [[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
                                                   const Likeliest& likeliest, const Likeliest& found,
-                                                  IntVec free, Mask is_occupied, IntVec overruling, int v,
-                                                  BlockView& view) {
+                                                  IntVec free, Mask is_occupied, Mask restored, Mask cleared,
+                                                  int v, BlockView& view) {
   ExactSum total = found.classes;
   total.add(free);
   const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
@@ -219,10 +219,10 @@ template <bool kEntropy>
   others.subtract(own);
   const FloatVec p = (prior.once + evidenceOf(own)) * inverse_sum,
                  not_p = (prior.classes + others.evidence()) * inverse_sum;
-  const Mask has_left = (overruling == kCleared) & ~is_occupied;  // otherwise a fixed class remains
+  const Mask has_left = cleared & ~is_occupied;  // otherwise a fixed class remains
   const FloatVec best = evidenceOf(found.best), alpha = prior.once + best,
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
-                 weighted_free = weight * unless(overruling == kKept, evidenceOf(free)),
+                 weighted_free = weight * unless(restored, evidenceOf(free)),
                  something = prior.something + unless(has_left, best) +
                              static_cast<float>(kInFreeSpace) * weighted_free,
                  nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something + weighted_free;
@@ -264,13 +264,16 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     const Likeliest likeliest = found;
     Mask is_occupied = found.best > 0;
     const IntVec overruling = planes.overruled ? LoadU(planes.overruled->data() + v) : IntVec{};
+    Mask restored = {}, cleared = {};
     // Elsewhere the gain makes no difference to the state.
     const Mask disputed = (is_occupied & (free > 0)) | (overruling != 0);
     if (kPosterior || AnyTrue(disputed)) {
       if constexpr (!kPosterior) findGains(planes, found);
       decay(planes, free, found);
       is_occupied &= occupied(found, free);
-      is_occupied = (is_occupied | (overruling == kKept)) & (overruling != kCleared);
+      restored = (overruling == kKept) & (found.best > 0) & ~is_occupied;
+      cleared = (overruling == kCleared) & is_occupied;
+      is_occupied = (is_occupied | restored) & ~cleared;
       is_occupied = keepRemaining(planes, free, v, is_occupied, found);
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
@@ -285,7 +288,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       continue;
     }
     if (!AnyTrue(is_known)) unknown = v;
-    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, overruling, v, view);
+    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, restored, cleared, v, view);
   }
 }
 

@@ -17,6 +17,8 @@ struct SeenVoxels {
   VoxelMask crossed;  ///< evidence for `free` reaches its limit, and no hit adds evidence
   VoxelMask fixed;    ///< hits add evidence, all of them of classes that cannot move
   VoxelMask moving;   ///< other hits add evidence
+  VoxelMask hit;      ///< contain a hit, if the evidence reports them
+  bool adds = false;  ///< the scan adds evidence to the block; noted if the rules keep looks
 };
 
 /// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
@@ -36,6 +38,8 @@ class VoidSearch {
   void find(const BlocksByGroup& blocks, ThreadPool& pool);
   /// The void voxels of a block, after find().
   const VoxelMask& voidsOf(std::size_t block) const { return voids_[block]; }
+  /// The crossed and bridged voxels of a block, after find().
+  const VoxelMask& emptyOf(std::size_t block) const { return empty_[block]; }
 
  private:
   /// Positions of the blocks across the faces of a block: before and after it along each axis.

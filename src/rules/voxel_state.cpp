@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rules/latest_looks.h"
 #include "rules/neighbourhood.h"
 #include "rules/occupancy_constants.h"
 #include "rules/view_kernels.h"
@@ -143,7 +144,12 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRu
                                                             : kernels.all;
   BlockPlanes planes = planesOf(map, rules, block);
   Overruled overruled;
-  if (findOverruled(kernels, map, rules, index, block, overruled)) planes.overruled = &overruled;
+  bool overrules = findOverruled(kernels, map, rules, index, block, overruled);
+  if (rules.latestDecides() && !block.looks().empty()) {
+    if (!overrules) overruled.fill(kNotOverruled);
+    overrules |= overruleByLooks(block, rules.mostVote(), overruled);
+  }
+  if (overrules) planes.overruled = &overruled;
   read(planes, view);
   const Block::Occlusion& marks = block.occlusion();
   if (marks.none()) return;
@@ -169,6 +175,15 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
                       : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
     restored = holds && !own.holds;
     has_left = !holds && own.holds;
+  }
+  if (rules.latestDecides() && own.best > 0) {
+    const std::int32_t verdict =
+        verdictOf(block.looks(), static_cast<std::size_t>(offset), own.best >= kStay * rules.mostVote());
+    if (verdict != kNotOverruled) {
+      holds = verdict == kKept;
+      restored = holds && !own.holds;
+      has_left = !holds && own.holds;
+    }
   }
   if (!holds && rules.remainingGain() > 0.0f && own.fixed != own.label &&
       own.fixed_best > (own.best - 1) >> kRemainingShift &&

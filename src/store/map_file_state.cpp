@@ -8,7 +8,8 @@
 
 namespace bki_mapping {
 
-void MapFile::State::readAll(std::int64_t version) {
+void MapFile::State::readAll(std::int64_t version_of_file) {
+  version = version_of_file;
   TableRow table;
   totals = readTotals(database);
   checkTotals();
@@ -42,7 +43,7 @@ void MapFile::State::checkTotals() const {
 }
 
 TileCodec& MapFile::State::tileCodec() {
-  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes);
+  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes, version >= kFirstVersionWithLooks);
   return *codec_;
 }
 

@@ -8,6 +8,7 @@
 #include "bki_mapping/store/map_file.h"
 #include "store/database.h"
 #include "store/records.h"
+#include "store/schema.h"
 #include "store/tile_codec.h"
 
 namespace bki_mapping {
@@ -29,6 +30,7 @@ struct MapFile::State {
 
   Database database;
   bool writable;
+  std::int64_t version = kFormatVersion;  ///< of the file
   MapInfo info;
   Totals totals;
 

@@ -249,6 +249,7 @@ std::uint64_t addCounting(SemanticMap& sum, const SemanticMap& other) {
       saturated += to.add(block->classes()[p], block->plane(p));
     }
     to.setOcclusion(to.occlusion() | block->occlusion());
+    to.looks().add(block->looks());
     if (to.empty()) sum.erase(index);  // negative evidence may have cancelled all of it
   }
   return saturated;
@@ -258,9 +259,14 @@ std::uint64_t addCounting(SemanticMap& sum, const SemanticMap& other) {
 SemanticMap readTile(const Group& group, const GridIndex& tile) {
   SemanticMap evidence = group.front().read(tile);
   for (std::size_t i = 1; i < group.size(); ++i) {
-    if (sameEvidence(evidence, group[i].read(tile))) continue;
-    throw notTheSame(*group.front().drives().begin(), group.front().path(), group[i].path(),
-                     "its evidence differs, as after clearing or with other settings");
+    const SemanticMap same = group[i].read(tile);
+    if (!sameEvidence(evidence, same)) {
+      throw notTheSame(*group.front().drives().begin(), group.front().path(), group[i].path(),
+                       "its evidence differs, as after clearing or with other settings");
+    }
+    for (const auto& [index, block] : same.entries()) {  // a file of an older version has none
+      if (!block->looks().empty()) evidence.getOrAllocate(index).looks().add(block->looks());
+    }
   }
   return evidence;
 }

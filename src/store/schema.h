@@ -9,7 +9,9 @@ namespace bki_mapping {
 
 /// "BKIM", the application_id in the header of the file.
 constexpr std::int64_t kApplicationId = 0x424b494d;
-constexpr std::int64_t kFormatVersion = 2;
+constexpr std::int64_t kFormatVersion = 3;
+/// Before it, tiles have no looks (bki_mapping/map/looks.h).
+constexpr std::int64_t kFirstVersionWithLooks = 3;
 
 /// Marks an empty database as a map file, and creates the tables.
 void createSchema(Database& database);

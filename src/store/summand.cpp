@@ -9,7 +9,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Subtracts the evidence and marks of a map from a sum that contains them.
+/// Subtracts the evidence, marks and looks of a map from a sum that contains them.
 /// @return false if that is impossible because the sum is saturated.
 bool subtract(SemanticMap& sum, const SemanticMap& other) {
   bool possible = true;
@@ -28,19 +28,42 @@ bool subtract(SemanticMap& sum, const SemanticMap& other) {
       });
     }
     from.setOcclusion(from.occlusion() & ~block->occlusion());
+    from.looks().subtract(block->looks());
     if (from.empty()) sum.erase(index);
   }
   return possible;
 }
 
+/// A voxel of the source. @param block nullptr if the source has none there.
+struct SourceVoxel {
+  const Block* block;
+  int offset;
+};
+using SourceVoxels = std::array<SourceVoxel, kBlockVoxels>;
+
+void gatherLooks(const SourceVoxels& voxels, Looks& looks) {
+  std::vector<const Block*> blocks;
+  for (const SourceVoxel& voxel : voxels) {
+    const bool known = std::find(blocks.begin(), blocks.end(), voxel.block) != blocks.end();
+    if (voxel.block && !known && !voxel.block->looks().empty()) blocks.push_back(voxel.block);
+  }
+  for (const Block* const block : blocks) {
+    Looks moved = block->looks();
+    moved.moveVoxels([&](Look::Voxels& mask) {
+      Look::Voxels there;
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        there[v] = voxels[v].block == block && mask[static_cast<std::size_t>(voxels[v].offset)];
+      }
+      mask = there;
+    });
+    looks.add(moved);
+  }
+}
+
 /// A block of the target, whose voxels come from several blocks of the source.
 void gatherBlock(const SemanticMap& source, const GridTransform& transform, const BlockIndex& index,
                  SemanticMap& target) {
-  struct Voxel {
-    const Block* block;
-    int offset;
-  };
-  std::array<Voxel, kBlockVoxels> voxels;
+  SourceVoxels voxels;
   std::bitset<256> classes;
   Block::Occlusion marks;
   BlockIndex last_index{};
@@ -73,6 +96,7 @@ void gatherBlock(const SemanticMap& source, const GridTransform& transform, cons
     block.add(static_cast<ClassId>(id), plane.data());
   }
   block.setOcclusion(marks);
+  gatherLooks(voxels, block.looks());
   if (block.empty()) target.erase(index);
 }
 

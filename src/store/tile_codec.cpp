@@ -14,6 +14,9 @@ constexpr std::size_t kMaskBytes = kBlockVoxels / 8;
 /// Deflate's limit: a compressed byte expands to at most this many bytes.
 constexpr std::size_t kMostInflation = 1032;
 constexpr std::size_t kLengthBytes = 4;
+constexpr std::size_t kBeginBytes = 8, kLookBytes = kBeginBytes + 2 * kMaskBytes;  // in kLooks
+// The flags of a block: the first bit says whether it has marks, the others are its number of looks.
+constexpr std::size_t kMarked = 1, kMostLooks = 127;
 
 void append32(std::string& bytes, std::uint32_t value) {
   for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xffu);
@@ -86,7 +89,8 @@ struct TileCodec::Zlib {
   z_stream packing{}, unpacking{};
 };
 
-TileCodec::TileCodec(const ClassTable& classes) : zlib_(std::make_unique<Zlib>()) {
+TileCodec::TileCodec(const ClassTable& classes, bool keeps_looks)
+    : keeps_looks_(keeps_looks), zlib_(std::make_unique<Zlib>()) {
   for (const SemanticClass& c : classes.classes()) allowed_[c.id] = true;
   allowed_[kFreeClass] = true;
 }
@@ -94,9 +98,11 @@ TileCodec::TileCodec(const ClassTable& classes) : zlib_(std::make_unique<Zlib>()
 TileCodec::~TileCodec() = default;
 
 void TileCodec::clear() {
-  for (std::string* piece : {&numbers_, &plane_counts_, &marked_, &classes_, &marks_, &evidence_masks_}) {
+  for (std::string* piece : {&numbers_, &plane_counts_, &flags_, &classes_, &levels_, &marks_,
+                             &evidence_masks_, &begins_, &look_masks_}) {
     piece->clear();
   }
+  looks_ = 0;
   values_.clear();
   packed_.clear();
   blocks_ = 0;
@@ -121,6 +127,17 @@ bool TileCodec::takePlane(const EvidenceUnits* units) {
   values_.resize(after);
   if (after == before) evidence_masks_.resize(masks_before);
   return after != before;
+}
+
+void TileCodec::takeLooks(const Looks& looks) {
+  for (const Look& look : looks.all()) {
+    levels_ += static_cast<char>(look.level());
+    for (unsigned shift = 0; shift < 8 * kBeginBytes; shift += 8) {
+      begins_ += static_cast<char>(look.begin() >> shift & 0xffu);
+    }
+    appendMask(look_masks_, look.low());
+    appendMask(look_masks_, look.high());
+  }
 }
 
 void TileCodec::splitValues() {
@@ -152,13 +169,8 @@ std::uint32_t TileCodec::checksum(const TileKey& key, const TileEntry& entry) co
   return static_cast<std::uint32_t>(sum);
 }
 
-void TileCodec::appendPacked(Section section) {
+std::size_t TileCodec::appendPacked(Section section) {
   const std::string& bytes = sections_[section];
-  const auto length = [&](std::size_t size) {
-    for (unsigned i = 0; i < kLengthBytes; ++i) {
-      packed_[section * kLengthBytes + i] = static_cast<char>(size >> 8 * i & 0xff);
-    }
-  };
   const std::size_t before = packed_.size();
   if (section != kList && !bytes.empty()) {
     z_stream& stream = zlib_->packing;
@@ -170,13 +182,12 @@ void TileCodec::appendPacked(Section section) {
     stream.avail_out = static_cast<uInt>(bytes.size() - 1);
     if (deflate(&stream, Z_FINISH) == Z_STREAM_END) {
       packed_.resize(before + stream.total_out);
-      length(stream.total_out);
-      return;
+      return stream.total_out;
     }
     packed_.resize(before);
   }
   packed_ += bytes;
-  length(bytes.size());
+  return bytes.size();
 }
 
 TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
@@ -200,55 +211,99 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
     const bool marked = block->occlusion().any();
     if (planes == 0 && !marked) continue;
     if (marked) appendMask(marks_, block->occlusion());
+    const std::size_t looks = keeps_looks_ ? block->looks().all().size() : 0;
+    if (looks > 0) takeLooks(block->looks());
     numbers_ += static_cast<char>(number & 0xff);
     numbers_ += static_cast<char>(number >> 8);
     plane_counts_ += static_cast<char>(planes);
-    marked_ += static_cast<char>(marked);
+    flags_ += static_cast<char>((marked ? kMarked : 0) | looks << 1);
     ++entry.blocks;
     entry.planes += planes;
   }
   if (entry.blocks == 0) return entry;
-  sections_[kList] = numbers_ + plane_counts_ + marked_ + classes_;
+  sections_[kList] = numbers_ + plane_counts_ + flags_ + classes_ + levels_;
   sections_[kMasks] = marks_ + evidence_masks_;
+  sections_[kLooks] = begins_ + look_masks_;
   splitValues();
   entry.checksum = checksum(key, entry);
-  packed_.assign(kSections * kLengthBytes, '\0');
-  for (std::size_t section = 0; section < kSections; ++section) appendPacked(static_cast<Section>(section));
+  packed_.assign(kLooks * kLengthBytes, '\0');
+  const auto append = [&](Section section, std::size_t length_at) {
+    const std::size_t length = appendPacked(section);
+    for (unsigned i = 0; i < kLengthBytes; ++i) {
+      packed_[length_at + i] = static_cast<char>(length >> 8 * i & 0xff);
+    }
+  };
+  for (std::size_t section = 0; section < kLooks; ++section) {
+    append(static_cast<Section>(section), section * kLengthBytes);
+  }
+  if (!sections_[kLooks].empty()) {
+    const std::size_t length_at = packed_.size();
+    packed_.append(kLengthBytes, '\0');
+    append(kLooks, length_at);
+  }
   return entry;
 }
 
-std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked) const {
+std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked, std::size_t& looks) const {
   const std::string& list = sections_[kList];
   const auto blocks = static_cast<std::size_t>(entry.blocks);
+  const std::size_t end_of_classes = 4 * blocks + static_cast<std::size_t>(entry.planes);
   std::size_t next_class = 4 * blocks;
   int last_number = -1;
-  marked = 0;
+  marked = looks = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     const int number = at(list, 2 * b) | at(list, 2 * b + 1) << 8;
     if (number <= last_number || number >= Region::kBlocks) return "its blocks are out of order";
     last_number = number;
-    const std::size_t planes = at(list, 2 * blocks + b), marks = at(list, 3 * blocks + b);
-    if (marks > 1 || planes + marks == 0) return "a block is empty";
-    marked += marks;
-    if (planes > list.size() - next_class) return "planes are missing";
+    const std::size_t planes = at(list, 2 * blocks + b), flags = at(list, 3 * blocks + b);
+    if (planes + (flags & kMarked) == 0) return "a block is empty";
+    if (flags > kMarked && !keeps_looks_) return "a flag is not known";
+    marked += flags & kMarked;
+    looks += flags >> 1;
+    if (planes > end_of_classes - next_class) return "planes are missing";
     for (std::size_t p = next_class; p < next_class + planes; ++p) {
       if (p > next_class && at(list, p) <= at(list, p - 1)) return "its planes are out of order";
       if (!allowed_[at(list, p)]) return "it has a class that is not in the class table";
     }
     next_class += planes;
   }
-  return next_class == list.size() ? "" : "planes are left over";
+  if (next_class < end_of_classes) return "planes are left over";
+  return end_of_classes + looks == list.size() ? "" : "it has another number of looks";
+}
+
+Looks TileCodec::looksAt(std::size_t& next, std::size_t count) const {
+  const std::string &list = sections_[kList], &section = sections_[kLooks];
+  const std::size_t first_level = list.size() - looks_;
+  Looks looks;
+  looks.reserve(count);
+  for (const std::size_t end = next + count; next < end; ++next) {
+    std::uint64_t begin = 0;
+    for (std::size_t i = 0; i < kBeginBytes; ++i) {
+      begin |= std::uint64_t{at(section, next * kBeginBytes + i)} << 8 * i;
+    }
+    const char* const masks = section.data() + looks_ * kBeginBytes + 2 * kMaskBytes * next;
+    looks.append(Look(begin, at(list, first_level + next), readMask(masks), readMask(masks + kMaskBytes)));
+  }
+  return looks;
+}
+
+std::string TileCodec::checkLooks(const TileEntry& entry, std::size_t looks) const {
+  const auto blocks = static_cast<std::size_t>(entry.blocks);
+  std::size_t next = 0;
+  for (std::size_t b = 0; b < blocks && next < looks; ++b) {
+    if (!looksAt(next, at(sections_[kList], 3 * blocks + b) >> 1).isCanonical()) return "its looks are wrong";
+  }
+  return "";
 }
 
 std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
                               std::size_t size) {
   clear();
-  constexpr std::size_t kHead = kSections * kLengthBytes;
+  constexpr std::size_t kHead = kLooks * kLengthBytes;
   if (size < kHead) return "it is too short";
   const unsigned char* next = bytes + kHead;
   std::size_t left = size - kHead;
-  const auto take = [&](Section section, std::size_t wanted) -> std::string {
-    const std::size_t length = read32(bytes + section * kLengthBytes);
+  const auto takeOf = [&](Section section, std::size_t length, std::size_t wanted) -> std::string {
     std::string& content = sections_[section];
     if (length > left || length > wanted || (section == kList && length != wanted)) {
       return "a length is wrong";
@@ -272,12 +327,17 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     left -= length;
     return "";
   };
+  const auto take = [&](Section section, std::size_t wanted) {
+    return takeOf(section, read32(bytes + section * kLengthBytes), wanted);
+  };
 
   if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
-  std::string fault =
-      take(kList, 4 * static_cast<std::size_t>(entry.blocks) + static_cast<std::size_t>(entry.planes));
-  std::size_t marked = 0;
-  if (fault.empty()) fault = checkList(entry, marked);
+  const std::size_t blocks = static_cast<std::size_t>(entry.blocks),
+                    least = 4 * blocks + static_cast<std::size_t>(entry.planes), listed = read32(bytes);
+  if (listed < least || listed > least + kMostLooks * blocks) return "a length is wrong";
+  std::string fault = take(kList, listed);
+  std::size_t marked = 0, looks = 0;
+  if (fault.empty()) fault = checkList(entry, marked, looks);
   if (fault.empty()) fault = take(kMasks, kMaskBytes * (marked + static_cast<std::size_t>(entry.planes)));
   if (!fault.empty()) return fault;
   std::size_t values = 0;
@@ -289,8 +349,16 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     if (bits == 0) return "a plane is empty";
     if (begin >= kMaskBytes * marked) values += bits;
   }
-  for (std::size_t section = kByte0; section < kSections && fault.empty(); ++section) {
+  for (std::size_t section = kByte0; section < kLooks && fault.empty(); ++section) {
     fault = take(static_cast<Section>(section), values);
+  }
+  sections_[kLooks].clear();
+  if (fault.empty() && looks > 0) {
+    if (left < kLengthBytes) return "it is too short";
+    const std::size_t length = read32(next);
+    next += kLengthBytes;
+    left -= kLengthBytes;
+    fault = takeOf(kLooks, length, kLookBytes * looks);
   }
   if (!fault.empty()) return fault;
   if (left > 0) return "bytes are left over";
@@ -301,20 +369,20 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     if (value == 0 || value == kLeast) return "a value is out of range";
   }
   blocks_ = entry.blocks;
-  return "";
+  looks_ = looks;
+  return checkLooks(entry, looks);
 }
 
 void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
   const Region region(key.index);
   const std::string &list = sections_[kList], &masks = sections_[kMasks];
   const auto blocks = static_cast<std::size_t>(blocks_);
-  const std::size_t marked =
-      static_cast<std::size_t>(std::count(list.begin() + static_cast<std::ptrdiff_t>(3 * blocks),
-                                          list.begin() + static_cast<std::ptrdiff_t>(4 * blocks), '\1'));
+  std::size_t marked = 0;
+  for (std::size_t b = 0; b < blocks; ++b) marked += at(list, 3 * blocks + b) & kMarked;
   const char *marks = masks.data(), *mask = marks + kMaskBytes * marked;
   const std::uint32_t* value = values_.data();
   std::array<EvidenceUnits, kBlockVoxels> plane;
-  std::size_t next_class = 4 * blocks;
+  std::size_t next_class = 4 * blocks, next_look = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     const BlockIndex index = region.blockIndex(at(list, 2 * b) | at(list, 2 * b + 1) << 8);
     const bool is_new = !map.find(index);
@@ -332,7 +400,13 @@ void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
         block.add(at(list, next_class), plane.data());
       }
     }
-    if (at(list, 3 * blocks + b) != 0) {
+    const std::size_t flags = at(list, 3 * blocks + b);
+    if (flags >> 1 > 0) {
+      const Looks looks = looksAt(next_look, flags >> 1);
+      block.looks().reserve(looks.all().size());
+      block.looks().add(looks);
+    }
+    if ((flags & kMarked) != 0) {
       block.setOcclusion(block.occlusion() | readMask(marks));
       marks += kMaskBytes;
     }

@@ -8,10 +8,8 @@
 namespace bki_mapping {
 namespace {
 
-/// @param limit for the memory of a map of these tiles [bytes]; 0: no limit.
-void checkMemory(const std::string& path, const std::vector<TileEntry>& tiles, std::size_t limit) {
-  std::size_t bytes = 0;
-  for (const TileEntry& tile : tiles) bytes += memoryOf(tile);
+/// @param bytes that the map takes. @param limit for them; 0: no limit.
+void checkMemory(const std::string& path, std::size_t bytes, std::size_t limit) {
   if (limit == 0 || bytes <= limit) return;
   throw MapFileError("the map in " + path + " takes " + std::to_string(bytes / 1'000'000) +
                      " MB of memory, and the limit is " + std::to_string(limit / 1'000'000) +
@@ -56,11 +54,15 @@ StoredMap readMap(MapFile& file, std::size_t memory_limit) {
   StoredMap stored{file.info(), file.drives(), file.info().emptyMap()};
   for (DriveRecord& drive : stored.drives) drive.part = 0;
   const std::vector<TileEntry> tiles = file.tiles();
-  checkMemory(file.path(), tiles, memory_limit);
+  std::size_t bytes = 0;
+  for (const TileEntry& tile : tiles) bytes += memoryOf(tile);
+  checkMemory(file.path(), bytes, memory_limit);
   for (const TileEntry& tile : tiles) {
     if (!file.addTileTo(stored.map, {tile.index})) {
       throw damaged(file.path(), "a tile of its list is missing");
     }
+    bytes += memoryOfLooks(stored.map, tile.index);
+    checkMemory(file.path(), bytes, memory_limit);
   }
   return stored;
 }
@@ -80,6 +82,15 @@ void checkFits(const MapFile& file, const MapInfo& own) {
 std::size_t memoryOf(const TileEntry& tile) {
   return static_cast<std::size_t>(tile.planes) * kBlockVoxels * sizeof(EvidenceUnits) +
          static_cast<std::size_t>(tile.blocks) * (sizeof(Block) + kReferenceCountBytes);
+}
+
+std::size_t memoryOfLooks(const SemanticMap& map, const GridIndex& tile) {
+  std::size_t bytes = 0;
+  const Region* const region = map.findRegion(tile);
+  for (int number = 0; region && number < Region::kBlocks; ++number) {
+    if (region->has(number)) bytes += region->find(number)->looks().bytes();
+  }
+  return bytes;
 }
 
 std::vector<GridIndex> tilesOf(const SemanticMap& map) {

@@ -96,6 +96,7 @@ std::size_t MapUpdater::reservePlanes(BlockJob& job) {
   } else {
     job.block->reserve(classes.count());
   }
+  if (keeps_looks_) job.block->looks().reserveTick(tick_);
   return count;
 }
 
@@ -211,7 +212,8 @@ void MapUpdater::mend(ThreadPool& pool) {
   const EvidenceUnits of_void = roundedUnits(rules_.void_evidence);
   pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
     if (rules_.asksBelow()) mendSeams(groups_[g], worker);
-    if (rules_.seeksVoids()) addVoids(groups_[g], of_void, worker);
+    if (of_void > 0) addVoids(groups_[g], of_void, worker);
+    if (keeps_looks_) addLooks(groups_[g], of_void > 0);
     finishGroup(groups_[g]);
   });
 }
@@ -231,6 +233,7 @@ void MapUpdater::mendSeams(const Group& group, std::size_t worker) {
     for (std::uint64_t left = voxels; left != 0; left &= left - 1) {
       const int v = __builtin_ctzll(left);
       units[v] = heldBack(rules_, seams_[job].sums[v]);
+      if (keeps_looks_ && units[v] > 0) voids_.at(job).adds = true;
     }
     jobs_[job].block->change(kFreeClass, [&](EvidenceUnits* plane) {
       return add(&voxels, 1, units, plane, workers_[worker].mended);
@@ -256,6 +259,16 @@ void MapUpdater::addVoids(const Group& group, EvidenceUnits units, std::size_t w
   }
 }
 
+void MapUpdater::addLooks(const Group& group, bool voids_add) noexcept {
+  for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
+    const SeenVoxels& seen = voids_.at(j);
+    // A block exists where scans add evidence: whether others have done so must make no difference to this
+    // one.
+    if (!seen.adds && !(voids_add && voids_.voidsOf(j).any())) continue;
+    jobs_[j].block->looks().add(Look(tick_, voids_.emptyOf(j), voids_.voidsOf(j), seen.hit));
+  }
+}
+
 void MapUpdater::finishGroup(const Group& group) {
   for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
     BlockJob& job = jobs_[j];
@@ -274,6 +287,8 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   jobs_.clear();
   rules_ = rules;
   withdraws_ = scan.withdraws;
+  keeps_looks_ = rules.keeps_looks && scan.stamp > 0 && !scan.withdraws;
+  tick_ = Look::tickOf(scan.stamp);
   const auto indexBytes = [&] { return static_cast<std::ptrdiff_t>(map.indexBytes()); };
   const std::ptrdiff_t index_before = indexBytes();
   try {

@@ -20,6 +20,7 @@ struct ScanEvidence {
   Evidence* free = nullptr;        ///< of free space
   BlockPass* occlusion = nullptr;  ///< sets its marks after the sums are added
   bool withdraws = false;          ///< subtracts the evidence instead of adding it
+  std::uint64_t stamp = 0;         ///< time of the scan [ns]; 0: not known, so that no looks are kept
 };
 
 struct MapUpdateStats {
@@ -127,6 +128,9 @@ class MapUpdater {
   void mendSeams(const Group& group, std::size_t worker);
   /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
   void addVoids(const Group& group, EvidenceUnits units, std::size_t worker);
+  /// Notes what the scan saw of the voxels of a group, in the blocks to which it adds evidence.
+  /// @param voids_add whether it does so in void voxels.
+  void addLooks(const Group& group, bool voids_add) noexcept;
 
   bool mends() const { return rules_.seeksVoids() || rules_.asksBelow(); }
   /// Counts the memory of a group, and returns that of planes that are gone.
@@ -144,6 +148,8 @@ class MapUpdater {
   // Of this scan:
   ScanRules rules_;
   bool withdraws_ = false;
+  bool keeps_looks_ = false;
+  std::uint64_t tick_ = 0;
   VoidSearch voids_;
   std::vector<BlockSeam> seams_;                                       ///< of the jobs
   std::vector<std::array<float, kBlockEdge * kBlockEdge>> seam_sums_;  ///< of those at the bottom of a group

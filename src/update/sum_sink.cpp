@@ -22,10 +22,14 @@ void SumSink::addSums(const GroupBlock& to) {
     applyToHits(work_.rules_, *work_.limits_, work_.sums_, work_.protected_[to.slot_]);
     if (work_.rules_.seeksVoids()) {
       noteHits(work_.rules_, *work_.limits_, work_.sums_, *to.seen_, work_.hit_[to.slot_]);
+      to.seen_->hit = work_.sums_.occupied;
     }
   } else {
     const VoxelMask reached = applyRulesToFree(to);
     if (work_.rules_.seeksVoids()) to.seen_->crossed = reached & ~work_.hit_[to.slot_];
+  }
+  if (work_.rules_.keeps_looks && !to.seen_->adds) {
+    to.seen_->adds = addsEvidence(*work_.limits_, work_.sums_);
   }
   const auto add = work_.withdraws_ ? work_.kernels_->withdraw : work_.kernels_->add;
   for (const BlockSums::Plane& sums : work_.sums_) {

@@ -24,6 +24,7 @@ std::vector<Scan> someScans() {
   for (const reference::Scene& scene : reference::nastyScenes(200)) {
     if (scene.name != "far from zero") scans.push_back(scene.scan);
   }
+  for (std::size_t n = 0; n < scans.size(); ++n) scans[n].stamp = 1000000000 + 400000000 * n;
   return scans;
 }
 
@@ -113,6 +114,8 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     configs.emplace_back(mode + ", with rules and limits", config);
     config.kernel.static_spread = false;
     configs.emplace_back(mode + ", with rules and hits that stay in their voxels", config);
+    config.free_gain.latest = true;
+    configs.emplace_back(mode + ", with looks", config);
   }
   return configs;
 }
@@ -157,6 +160,12 @@ void expectSame(const SemanticMap& a, const SemanticMap& b, const std::string& w
   }
 }
 
+void expectSameLooks(const SemanticMap& a, const SemanticMap& b, const std::string& what) {
+  for (const auto& [index, block] : a.entries()) {
+    ASSERT_TRUE(block->looks() == b.find(index)->looks()) << what;
+  }
+}
+
 TEST(Laws, OrderAndMergingChangeNoBit) {
   std::mt19937 random(3);
   for (const auto& [name, config] : additiveConfigs()) {
@@ -165,11 +174,14 @@ TEST(Laws, OrderAndMergingChangeNoBit) {
       const std::string what = name + (soft ? ", soft labels" : "");
       const SemanticMap forth = mapOf(scans, config);
       std::shuffle(scans.begin(), scans.end(), random);
-      expectSame(forth, mapOf(scans, config), what + ", order");
+      const SemanticMap shuffled = mapOf(scans, config);
+      expectSame(forth, shuffled, what + ", order");
+      expectSameLooks(forth, shuffled, what + ", order");
       const auto middle = scans.begin() + 3;
       SemanticMap sum = mapOf({middle, scans.end()}, config);
       sum.add(mapOf({scans.begin(), middle}, config));
       expectSame(forth, sum, what + ", sum of two maps");
+      expectSameLooks(forth, sum, what + ", sum of two maps");
     }
   }
 }

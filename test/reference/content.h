@@ -8,7 +8,7 @@
 
 namespace bki_mapping::reference {
 
-/// The classes, the planes and the occlusion marks of each block as bytes.
+/// The classes, the planes, the occlusion marks and the looks of each block as bytes.
 inline std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
   std::map<GridIndex, std::string> content;
   for (const auto& [index, block] : map.entries()) {
@@ -18,6 +18,10 @@ inline std::map<GridIndex, std::string> contentOf(const SemanticMap& map) {
       text.append(reinterpret_cast<const char*>(block->plane(c)), kBlockVoxels * sizeof(EvidenceUnits));
     }
     text += block->occlusion().to_string();
+    for (const Look& look : block->looks().all()) {
+      text += " " + std::to_string(look.begin()) + " " + std::to_string(look.level()) + " ";
+      text += look.low().to_string() + look.high().to_string();
+    }
   }
   return content;
 }

@@ -74,6 +74,17 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
     rules = rules.withNeighbourhood(std::exp2(static_cast<double>(random() % 5) - 2.0), asking,
                                     random() % 2 == 0);
   }
+  if (kind.neighbours && random() % 2 == 0) {
+    rules = rules.withLatest(true);
+    for (std::uint64_t tick = 1000; tick < 1000 + random() % 40; tick += 1 + random() % 3) {
+      Look::Voxels seen[3];
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        const std::size_t sight = random() % 5;
+        if (sight < 3) seen[sight][v] = true;
+      }
+      block.looks().add(Look(tick, seen[0], seen[1], seen[2]));
+    }
+  }
   if (kind.occlusion) {
     Block::Occlusion marks;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) marks[v] = random() % 2 == 0;

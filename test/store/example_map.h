@@ -30,8 +30,24 @@ inline MapInfo exampleInfo() {
   return info;
 }
 
+/// What the scan in a tick saw of voxel v of block (0, 0, 0), with m = tick mod 1009: s = (v (m mod 6 + 1) +
+/// m) mod 7 is 1 (crossed), 2 (void) or 3 (hit), and nothing otherwise.
+inline Look exampleLook(std::uint64_t tick) {
+  Look::Voxels of[7];
+  const std::size_t m = tick % 1009;
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) of[(v * (m % 6 + 1) + m) % 7][v] = true;
+  return {tick, of[1], of[2], of[3]};
+}
+/// The ticks before kExampleTick, or in it, in which scans of a drive looked at block (0, 0, 0).
+constexpr std::uint64_t kExampleTick = 6332993607;
+inline std::vector<std::uint64_t> exampleAges(int drive) {
+  if (drive == 1) return {3, 2000};
+  return {0, 1, 5, 6, 40, 1000, 1001, 100000};
+}
+
 /// The evidence of a drive: that of drive 0 is in the sum only, that of drive 1 also has a part of its own.
-inline SemanticMap exampleMap(int drive) {
+/// @param has_looks false for what files of versions before 3 hold.
+inline SemanticMap exampleMap(int drive, bool has_looks = true) {
   SemanticMap map = exampleInfo().emptyMap();
   std::vector<EvidenceUnits> plane(kBlockVoxels);
   const auto add = [&](const BlockIndex& block, ClassId id, auto&& units_of) {
@@ -40,6 +56,12 @@ inline SemanticMap exampleMap(int drive) {
     }
     map.getOrAllocate(block).add(id, plane.data());
   };
+  const auto addLooks = [&] {
+    if (!has_looks) return;
+    for (const std::uint64_t age : exampleAges(drive)) {
+      map.getOrAllocate({{0, 0, 0}}).looks().add(exampleLook(kExampleTick - age));
+    }
+  };
   const auto only = [](std::uint32_t voxel, EvidenceUnits units) {
     return [=](std::uint32_t v) { return v == voxel ? units : 0; };
   };
@@ -47,6 +69,7 @@ inline SemanticMap exampleMap(int drive) {
     add({{0, 0, 0}}, 40, [](std::uint32_t v) { return static_cast<EvidenceUnits>(v); });
     add({{-1, -1, -1}}, kFreeClass, only(511, -7));
     add({{-1, -1, -1}}, kFreeClass, only(0, kMostUnits));
+    addLooks();
     return map;
   }
   add({{0, 0, 0}}, 40, only(3, kMostUnits));                // stops there with the other drive's 3
@@ -64,6 +87,7 @@ inline SemanticMap exampleMap(int drive) {
   Block::Occlusion marks;
   for (std::size_t v = 0; v < marks.size(); v += 3) marks[v] = true;
   map.getOrAllocate({{8, 0, -8}}).setOcclusion(marks);
+  addLooks();
   return map;
 }
 

@@ -60,30 +60,37 @@ std::string deflated(const std::string& bytes) {
 /// be.
 std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size_t compressed) {
   const auto blocks = static_cast<std::size_t>(entry.blocks), planes = static_cast<std::size_t>(entry.planes);
-  std::array<std::string, 6> sections;
+  std::array<std::string, 7> sections;
   sections[0] = bytes.string(4 * blocks + planes);
-  const auto marked = static_cast<std::size_t>(
-      std::count(sections[0].begin() + static_cast<std::ptrdiff_t>(3 * blocks),
-                 sections[0].begin() + static_cast<std::ptrdiff_t>(4 * blocks), '\1'));
+  std::size_t marked = 0, looks = 0;
+  for (std::size_t b = 3 * blocks; b < 4 * blocks; ++b) {
+    const auto flags = static_cast<unsigned char>(sections[0][b]);
+    marked += flags & 1u;
+    looks += flags >> 1;
+  }
+  sections[0] += bytes.string(looks);
   sections[1] = bytes.string(64 * (marked + planes));
   std::size_t values = 0;
   for (std::size_t b = 64 * marked; b < sections[1].size(); ++b) {
     values += static_cast<std::size_t>(__builtin_popcount(static_cast<unsigned char>(sections[1][b])));
   }
   for (std::size_t s = 2; s < 6; ++s) sections[s] = bytes.string(values);
+  sections[6] = bytes.string(looks * (8 + 2 * 64));
   uLong checksum = 0;
   for (const int number : {key.part, key.index.x, key.index.y, key.index.z, entry.blocks, entry.planes}) {
     checksum = crc32(checksum, reinterpret_cast<const Bytef*>(&number), 4);
   }
   std::string head, body;
-  for (std::size_t s = 0; s < 6; ++s) {
+  for (std::size_t s = 0; s < sections.size(); ++s) {
     std::string& section = sections[s];
+    if (s == 6 && looks == 0) break;
     checksum = crc32_z(checksum, reinterpret_cast<const Bytef*>(section.data()), section.size());
     if (s > 0 && (compressed >> s & 1) != 0) {
       std::string packed = deflated(section);
       if (packed.size() < section.size()) section = std::move(packed);
     }
-    for (unsigned shift = 0; shift < 32; shift += 8) head += static_cast<char>(section.size() >> shift);
+    std::string& length = s < 6 ? head : body;
+    for (unsigned shift = 0; shift < 32; shift += 8) length += static_cast<char>(section.size() >> shift);
     body += section;
   }
   entry.checksum = static_cast<std::uint32_t>(checksum);

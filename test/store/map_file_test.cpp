@@ -20,7 +20,7 @@ TEST(MapFile, HoldsAWholeMap) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const SemanticMap map = randomMap(seed);
+    const SemanticMap map = withLooks(randomMap(seed), seed);
     saveMap(path, infoOf(), {driveOf("b"), driveOf("a", 3)}, map);
     const StoredMap stored = loadMap(path);
     EXPECT_EQ(contentOf(stored.map), contentOf(map));
@@ -62,9 +62,9 @@ TEST(MapFile, HoldsWhatTheMapIsAbout) {
 TEST(MapFile, AddsToAMapAsMapsAreAdded) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  const SemanticMap stored = randomMap(1);
+  const SemanticMap stored = withLooks(randomMap(1), 1);
   saveMap(path, infoOf(), {}, stored);
-  SemanticMap sum = randomMap(2), expected = randomMap(2);
+  SemanticMap sum = withLooks(randomMap(2), 2), expected = withLooks(randomMap(2), 2);
   expected.add(stored);
   MapFile file(path, MapFile::Access::kRead);
   for (const TileEntry& tile : file.tiles()) EXPECT_TRUE(file.addTileTo(sum, {tile.index}));
@@ -137,10 +137,16 @@ TEST(MapFile, IsUpdatedByOneAlone) {
 TEST(MapFile, RefusesWhatExceedsTheLimitOfMemory) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
-  const SemanticMap map = randomMap(6);
+  const SemanticMap map = withLooks(randomMap(6), 6);
   saveMap(path, infoOf(), {}, map);
   EXPECT_NO_THROW(loadMap(path, map.bytes()));
-  EXPECT_NE(sentenceOf([&] { loadMap(path, map.bytes() / 2); }).find("raise the limit"), std::string::npos);
+  const auto isRefused = [&](std::size_t limit) {
+    return sentenceOf([&] { loadMap(path, limit); }).find("raise the limit") != std::string::npos;
+  };
+  EXPECT_TRUE(isRefused(map.bytes() / 2));
+  std::size_t without_looks = 0;
+  for (const TileEntry& tile : MapFile(path, MapFile::Access::kRead).tiles()) without_looks += memoryOf(tile);
+  EXPECT_TRUE(isRefused(without_looks + 10'000));
 }
 
 TEST(MapFile, RefusesOtherFiles) {

@@ -64,6 +64,21 @@ inline SemanticMap randomMap(unsigned seed, int blocks = 60, int extent = 12) {
   return map;
 }
 
+/// Adds looks of scans at various times to half of the blocks.
+inline SemanticMap withLooks(SemanticMap map, unsigned seed) {
+  std::mt19937 random(seed);
+  for (const auto& [index, block] : sortedBlocks(map)) {
+    if (random() % 2 == 0) continue;
+    Looks& looks = map.getOrAllocate(index).looks();
+    for (std::uint64_t age = random() % 20, n = 0; n < 10; ++n, age += age / 2 + random() % 20) {
+      Look::Voxels of[4];
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) of[random() % 4][v] = true;
+      looks.add(Look(6'000'000'000 - age, of[1], of[2], of[3]));
+    }
+  }
+  return map;
+}
+
 inline DriveRecord driveOf(const std::string& id, int part = 0) {
   DriveRecord drive;
   drive.id = id;

@@ -101,7 +101,9 @@ class MapMerge : public testing::Test {
     saveMap(path, infoOf(), records, sum);
     return path;
   }
-  static SemanticMap mapOf(char drive) { return drivenMap(static_cast<unsigned>(drive)); }
+  static SemanticMap mapOf(char drive) {
+    return withLooks(drivenMap(static_cast<unsigned>(drive)), static_cast<unsigned>(drive));
+  }
   static SemanticMap sumOf(const std::string& drives) {
     SemanticMap sum = infoOf().emptyMap();
     for (const char id : drives) sum.add(mapOf(id));
@@ -194,6 +196,7 @@ TEST_F(MapMerge, SumsColumnsOfTilesApart) {
       Block& to = expected.getOrAllocate(index);
       for (std::size_t p = 0; p < block->classes().size(); ++p) to.add(block->classes()[p], block->plane(p));
       to.setOcclusion(block->occlusion());
+      to.looks().add(block->looks());
     }
     EXPECT_TRUE(same(loadMap(options.output).map, expected));
     EXPECT_EQ(report.blocks, expected.size());
@@ -336,10 +339,11 @@ TEST_F(MapMerge, TakesDrivesOut) {
   EXPECT_EQ(refusal({cd, a}, false, {"x"}), "drive 'x' is in none of the maps; they hold 'a', 'c', 'd'");
 }
 
-/// Marks that several drives share cannot be told apart in a sum.
+/// Marks and looks that several drives share cannot be told apart in a sum.
 SemanticMap withoutMarks(SemanticMap map) {
   for (const auto& [index, block] : sortedBlocks(map)) {
     map.getOrAllocate(index).setOcclusion({});
+    map.getOrAllocate(index).looks().clear();
     if (block->empty()) map.erase(index);
   }
   return map;
@@ -360,6 +364,45 @@ TEST_F(MapMerge, TakesPartsFromASumThatHoldsMore) {
   merge({kept}, folder_ / "without", true, {"a"});
   EXPECT_EQ(drivesOf(folder_ / "without"), "b1 c2 ");
   EXPECT_TRUE(same(partOf(folder_ / "without", 2), withoutMarks(mapOf('c'))));
+}
+
+TEST_F(MapMerge, TakesTheLooksOfADriveFromASumWhereItsAreStrongest) {
+  const std::string path = folder_ / "sum", result = folder_ / "result";
+  const auto viewed = [](std::uint64_t tick, std::initializer_list<std::pair<std::size_t, Sight>> sights) {
+    SemanticMap map = infoOf().emptyMap();
+    Block& block = map.getOrAllocate({{1, 2, 3}});
+    block.add(40, std::vector<EvidenceUnits>(kBlockVoxels, 5).data());
+    Look::Voxels of[4];
+    for (const auto& [voxel, sight] : sights) of[static_cast<std::size_t>(sight)][voxel] = true;
+    block.looks().add(Look(tick, of[1], of[2], of[3]));
+    return map;
+  };
+  using S = Sight;
+  const SemanticMap a = viewed(900, {{1, S::kHit}, {2, S::kCrossed}, {3, S::kVoid}, {4, S::kHit}});
+  SemanticMap sum = viewed(900, {{2, S::kHit}, {3, S::kVoid}, {4, S::kCrossed}, {5, S::kCrossed}});
+  sum.add(a);
+  {
+    NewMapFile file(path, infoOf());
+    for (const auto& [id, part] : {std::pair("a", 1), std::pair("b", 0)})
+      file.content().putDrive(driveOf(id, part));
+    file.content().writeTile(sum, {SemanticMap::regionOf({{1, 2, 3}})});
+    file.content().writeTile(a, {SemanticMap::regionOf({{1, 2, 3}}), 1});
+    file.commit();
+  }
+  merge({path}, result, false, {"a"});
+  // The other drive has seen voxels 3 and 4, too, but no less can be said of the first.
+  EXPECT_TRUE(same(loadMap(result).map, viewed(900, {{2, S::kHit}, {5, S::kCrossed}})));
+  merge({path}, result, true);
+  EXPECT_TRUE(same(loadMap(result).map.find({{1, 2, 3}})->looks().all().empty() ? a : sum, sum));
+}
+
+TEST_F(MapMerge, TakesTheLooksOfAllCopiesOfADrive) {
+  const std::string with = make("with", "a"), without = folder_ / "without";
+  saveMap(without, infoOf(), {driveOf("a")}, drivenMap('a'));  // as a file of version 2 has it
+  for (const auto& inputs : {std::vector{with, without}, std::vector{without, with}}) {
+    merge(inputs, folder_ / "c");
+    EXPECT_TRUE(bytesOf(folder_ / "c") == bytesOf(with));
+  }
 }
 
 /// A map with one evidence in one voxel.
@@ -547,6 +590,46 @@ TEST_F(MapMerge, MovesByWholeVoxelsAndQuarterTurnsThereAndBack) {
       EXPECT_TRUE(bytesOf(back) == bytesOf(a)) << turn << " " << shift.transpose();
     }
   }
+}
+
+TEST_F(MapMerge, MovesLooksWithTheirVoxels) {
+  const std::string a = folder_ / "a", there = folder_ / "there", back = folder_ / "back";
+  const SemanticMap before = withLooks(drivenMap(7, 20, 4), 7);
+  saveMap(a, infoOf(), {driveOf("a")}, before);
+  const double block = infoOf().emptyMap().geometry().blockSize();
+  for (int turn = 0; turn < 4; ++turn) {
+    move(a, {{3 * block, 0.0, -block}, 90.0 * turn}, there);
+    const double cos[] = {3.0, 0.0, -3.0, 0.0}, sin[] = {0.0, 3.0, 0.0, -3.0};
+    move(there, {{-cos[turn] * block, sin[turn] * block, block}, -90.0 * turn}, back);
+    EXPECT_TRUE(same(loadMap(back).map, before)) << turn;
+    if (turn == 0) continue;
+    EXPECT_FALSE(same(loadMap(there).map, before));
+  }
+  // Half a block: each voxel keeps what was seen of it in the latest look of its old block.
+  const MapPlacement half{{0.5 * block, 0.0, 0.0}, 0.0};
+  move(a, half, there);
+  const SemanticMap after = loadMap(there).map;
+  const GridTransform transform(half, before.geometry().resolution());
+  std::size_t seen = 0;
+  for (const auto& [index, moved] : after.entries()) {
+    EXPECT_TRUE(moved->looks().isCanonical());
+    for (int v = 0; v < kBlockVoxels; ++v) {
+      const VoxelIndex from = transform.sourceOf(GridGeometry::voxelOf(index, v));
+      const Block* const source = before.find(GridGeometry::blockOf(from));
+      if (!source || source->looks().empty()) continue;
+      const Look& latest = source->looks().all().back();
+      const Sight sight = latest.at(static_cast<std::size_t>(GridGeometry::offsetInBlock(from)));
+      const auto& looks = moved->looks().all();
+      const auto interval = std::find_if(looks.begin(), looks.end(), [&](const Look& look) {
+        return look.begin() <= latest.begin() && latest.begin() < look.begin() + look.length() &&
+               look.level() == Looks::levelAt(looks.back().begin(), latest.begin());
+      });
+      ASSERT_TRUE(interval != looks.end());
+      EXPECT_GE(interval->at(static_cast<std::size_t>(v)), sight);
+      seen += sight != Sight::kNothing;
+    }
+  }
+  EXPECT_GT(seen, 1000u);
 }
 
 TEST(GridTransform, ListsTheTilesOfEachVoxel) {

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "reference/content.h"
+#include "store/example_map.h"
 #include "store/map_maker.h"
 #include "store/schema.h"
 #include "temporary_folder.h"
@@ -14,6 +15,7 @@
 namespace bki_mapping {
 namespace {
 
+constexpr std::size_t kVersionByte = 63;  // the last one of user_version
 const std::string kVersion1 = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm";
 
 std::string bytesOf(const std::string& path) {
@@ -27,20 +29,31 @@ void change(const std::string& path, std::size_t position, char byte) {
   file.put(byte);
 }
 
-TEST(Migration, CopiesAllOfVersion1) {
+std::int64_t versionOf(const std::string& path) {
+  return static_cast<unsigned char>(bytesOf(path)[kVersionByte]);
+}
+
+class MigrationFrom : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(All, MigrationFrom, testing::Range(1, static_cast<int>(kFormatVersion) + 1));
+
+TEST_P(MigrationFrom, CopiesAll) {
   const TemporaryFolder folder;
-  const std::string before = bytesOf(kVersion1);
-  EXPECT_EQ(migrateMap(kVersion1, folder / "new.bkm"), 1);
-  EXPECT_TRUE(bytesOf(kVersion1) == before);
-  MapFile old(kVersion1, MapFile::Access::kRead), copy(folder / "new.bkm", MapFile::Access::kRead);
+  const std::string path =
+      BKI_MAPPING_SOURCE_DIR "/test/store/data/version_" + std::to_string(GetParam()) + ".bkm";
+  const std::string before = bytesOf(path);
+  ASSERT_EQ(versionOf(path), GetParam());
+  EXPECT_EQ(migrateMap(path, folder / "new.bkm"), GetParam());
+  EXPECT_TRUE(bytesOf(path) == before);
+  EXPECT_EQ(versionOf(folder / "new.bkm"), kFormatVersion);
+  MapFile old(path, MapFile::Access::kRead), copy(folder / "new.bkm", MapFile::Access::kRead);
   EXPECT_TRUE(old.drives() == copy.drives());
   EXPECT_EQ(old.info().parameters, copy.info().parameters);
   EXPECT_EQ(old.info().program, copy.info().program);
   EXPECT_EQ(old.info().frame, copy.info().frame);
   EXPECT_EQ(old.info().classes->name(), copy.info().classes->name());
-  EXPECT_EQ(copy.info().classes->labelMask(), ClassTable::kAllBits);
+  EXPECT_EQ(copy.info().classes->labelMask(), GetParam() == 1 ? ClassTable::kAllBits : kExampleMask);
   EXPECT_NO_THROW(checkSameGrid("old", old.info(), "copy", copy.info()));
-  EXPECT_NE(bytesOf(folder / "new.bkm").find("label_mask INTEGER"), std::string::npos) << "of version 2";
+  EXPECT_NE(bytesOf(folder / "new.bkm").find("label_mask INTEGER"), std::string::npos) << "since version 2";
   ASSERT_EQ(old.parts(), copy.parts());
   ASSERT_GT(old.parts().size(), 1u);
   for (const int part : old.parts()) {
@@ -53,6 +66,28 @@ TEST(Migration, CopiesAllOfVersion1) {
   EXPECT_EQ(folder.fileCount(), 1u);
 }
 
+// A file that a program has brought up to date can hold looks; the old one can not.
+TEST_P(MigrationFrom, MakesRoomForLooks) {
+  const TemporaryFolder folder;
+  const std::string old = folder / "old.bkm", copy = folder / "new.bkm";
+  std::filesystem::copy_file(
+      BKI_MAPPING_SOURCE_DIR "/test/store/data/version_" + std::to_string(GetParam()) + ".bkm", old);
+  std::filesystem::permissions(old, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  migrateMap(old, copy);
+  for (const std::string& path : {old, copy}) {
+    {
+      MapFile file(path, MapFile::Access::kUpdate);
+      MapFile::Change change = file.change();
+      change.writeTile(exampleMap(1), {{0, 0, 0}});
+      change.commit();
+    }
+    MapFile file(path, MapFile::Access::kRead);
+    SemanticMap map = file.info().emptyMap();
+    file.addTileTo(map, {{0, 0, 0}});
+    EXPECT_EQ(map.find({{0, 0, 0}})->looks().empty(), path == old && GetParam() < 3) << path;
+  }
+}
+
 TEST(Migration, RefusesWhatItCannotRead) {
   const TemporaryFolder folder;
   const std::string old = folder / "old.bkm", output = folder / "new.bkm";
@@ -60,7 +95,6 @@ TEST(Migration, RefusesWhatItCannotRead) {
   EXPECT_NE(fault().find("cannot be opened"), std::string::npos) << fault();
   std::filesystem::copy_file(kVersion1, old);
   std::filesystem::permissions(old, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  constexpr std::size_t kVersionByte = 63;  // the last one of user_version
   change(old, kVersionByte, kFormatVersion + 1);
   EXPECT_NE(fault().find(old + " was written by a newer version of bki_mapping"), std::string::npos)
       << fault();

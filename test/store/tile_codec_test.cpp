@@ -14,7 +14,8 @@
 namespace bki_mapping {
 namespace {
 
-using Sections = std::array<std::string, 6>;
+/// The last one, the looks, is left out if it is empty.
+using Sections = std::array<std::string, 7>;
 
 std::string deflated(const std::string& bytes) {
   uLongf size = compressBound(bytes.size());
@@ -25,13 +26,19 @@ std::string deflated(const std::string& bytes) {
   return packed;
 }
 
+std::string lengthOf(const std::string& section) {
+  std::string bytes;
+  for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(section.size() >> shift);
+  return bytes;
+}
+
 std::string joined(const Sections& sections) {
-  std::string content;
-  for (const std::string& section : sections) {
-    for (unsigned shift = 0; shift < 32; shift += 8) content += static_cast<char>(section.size() >> shift);
+  std::string lengths, content;
+  for (std::size_t s = 0; s < 6; ++s) {
+    lengths += lengthOf(sections[s]);
+    content += sections[s];
   }
-  for (const std::string& section : sections) content += section;
-  return content;
+  return lengths + content + (sections[6].empty() ? "" : lengthOf(sections[6]) + sections[6]);
 }
 
 /// docs/map_file.md. @param sections not compressed.
@@ -142,8 +149,8 @@ TEST_F(TileCodecTest, RefusesAnythingElse) {
     sections_ = good;
     sections_[section].pop_back();
     EXPECT_NE(fault(), "") << section;
-    sections_[section] += "xx";
-    EXPECT_EQ(fault(), "a length is wrong") << section;
+    sections_[section] = good[section] + '\0';
+    EXPECT_EQ(fault(), section == 0 ? "it has another number of looks" : "a length is wrong") << section;
   }
   sections_ = good;
   entry_.blocks = 0;
@@ -170,6 +177,217 @@ TEST_F(TileCodecTest, RefusesStreamsOfAnotherSize) {
     sections_[1] = stream;
     EXPECT_EQ(fault(joined(sections_)), "it cannot be decompressed") << stream.size();
   }
+}
+
+/// The sections with two looks at block 511, in ticks 0x0102030000 to 0x010203ffff (level 16), and
+/// 0x0102048765.
+class LooksInTile : public TileCodecTest {
+ protected:
+  LooksInTile() {
+    sections_[0] = std::string("\0\0\xff\1\0\2\1\4", 8) + "\x28\xff" + std::string("\x10\0", 2);
+    std::string& looks = sections_[6];
+    looks = std::string("\0\0\3\2\1\0\0\0", 8) + std::string("\x65\x87\4\2\1\0\0\0", 8);
+    looks.resize(kMasks + 4 * 64);
+    looks[kMasks + 1] = '\3';       // voxels 8 and 9: the low bits of the first look
+    looks[kMasks + 64 + 1] = '\6';  // voxels 9 and 10: its high bits
+    looks[kMasks + 128 + 63] = '\x80';
+  }
+  std::string faultWith(std::size_t section, std::size_t position, const std::string& bytes) {
+    const Sections good = sections_;
+    sections_[section].replace(position, bytes.size(), bytes);
+    const std::string found = fault();
+    sections_ = good;
+    return found;
+  }
+
+  static constexpr std::size_t kMasks = 2 * 8;
+};
+
+TEST_F(LooksInTile, AreReadAsSpecified) {
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  EXPECT_TRUE(map.find({{16, -8, 0}})->looks().empty());
+  EXPECT_EQ(map.find({{16, -8, 0}})->occlusion().count(), 2u);
+  const std::vector<Look>& looks = map.find({{23, -1, 7}})->looks().all();
+  ASSERT_EQ(looks.size(), 2u);
+  EXPECT_EQ(looks[0].begin(), 0x0102030000u);
+  EXPECT_EQ(looks[0].level(), 16u);
+  EXPECT_EQ(looks[1].begin(), 0x0102048765u);
+  EXPECT_EQ(looks[1].level(), 0u);
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    const Sight first = v == 8    ? Sight::kCrossed
+                        : v == 9  ? Sight::kHit
+                        : v == 10 ? Sight::kVoid
+                                  : Sight::kNothing;
+    ASSERT_EQ(looks[0].at(v), first) << v;
+    ASSERT_EQ(looks[1].at(v), v == 511 ? Sight::kCrossed : Sight::kNothing) << v;
+  }
+  codec_.addTo(map, kKey);  // the same again
+  EXPECT_EQ(map.find({{23, -1, 7}})->looks().all(), looks);
+}
+
+TEST_F(LooksInTile, AreWrittenAsSpecified) {
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  const TileEntry entry = codec_.pack(map, kKey);
+  EXPECT_EQ(entry.blocks, 2);
+  EXPECT_EQ(entry.planes, 2);
+  EXPECT_EQ(entry.checksum, checksumOf(kKey, entry, sections_));
+  const std::string packed = codec_.packed();
+  EXPECT_EQ(packed.substr(24, sections_[0].size()), sections_[0]);
+  entry_ = entry;
+  EXPECT_EQ(fault(packed), "");
+  // Where they are not kept, the tile is as if the map had none.
+  sections_[0][7] = '\0';
+  sections_[0].resize(10);
+  sections_[6].clear();
+  TileCodec without(*infoOf().classes, false);
+  EXPECT_EQ(without.pack(map, kKey).checksum, checksumOf(kKey, entry, sections_));
+  for (const auto& [index, block] : sortedBlocks(map)) map.getOrAllocate(index).looks().clear();
+  EXPECT_TRUE(codec_.pack(map, kKey) == without.pack(map, kKey));
+  EXPECT_TRUE(codec_.packed() == without.packed());
+}
+
+TEST_F(LooksInTile, AreAllKept) {
+  SemanticMap map = infoOf().emptyMap();
+  Block& block = map.getOrAllocate({{16, -8, 0}});
+  Look::Voxels some;
+  some[77] = true;
+  block.setOcclusion(some);
+  constexpr std::uint64_t kLatest = Look::tickOf(~std::uint64_t{0});
+  for (unsigned level = 0; level < 36; ++level) {  // as many as there can be
+    const std::uint64_t interval = kLatest >> level;
+    block.looks().add(Look(interval << level, some, {}, {}));
+    block.looks().add(Look((interval - 1) << level, some, some, {}));
+  }
+  EXPECT_GT(block.looks().all().size(), 36u);
+  EXPECT_LE(block.looks().all().size(), 2 * 36u);
+  entry_ = codec_.pack(map, kKey);
+  const std::string packed = codec_.packed();
+  ASSERT_EQ(fault(packed), "");
+  SemanticMap copy = infoOf().emptyMap();
+  codec_.addTo(copy, kKey);
+  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+}
+
+TEST_F(LooksInTile, StayReadableWhenABoxIsCleared) {
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  const BlockIndex index{{23, -1, 7}};
+  Look::Voxels cleared;
+  cleared[511] = true;  // all that the latest look has seen
+  map.getOrAllocate(index).looks().erase(cleared);
+  EXPECT_EQ(map.find(index)->looks().all().size(), 2u)
+      << "without the latest, the other would have a wrong level";
+  entry_ = codec_.pack(map, kKey);
+  const std::string packed = codec_.packed();
+  ASSERT_EQ(fault(packed), "");
+  SemanticMap copy = infoOf().emptyMap();
+  codec_.addTo(copy, kKey);
+  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  cleared.set();
+  map.getOrAllocate(index).looks().erase(cleared);
+  EXPECT_TRUE(map.find(index)->looks().empty());
+}
+
+TEST_F(LooksInTile, AreRefusedIfNoMapWritesThem) {
+  ASSERT_EQ(fault(), "");
+  const std::string wrong = "its looks are wrong";
+  EXPECT_EQ(faultWith(0, 10, "\x0f"), wrong) << "finer than its age demands";
+  EXPECT_EQ(faultWith(0, 10, "\x11"), wrong) << "coarser";
+  EXPECT_EQ(faultWith(0, 10, "\xff"), wrong) << "longer than time";
+  EXPECT_EQ(faultWith(0, 11, "\1"), wrong) << "the latest is longer than a tick";
+  EXPECT_EQ(faultWith(6, 0, "\1"), wrong) << "begins at no multiple of its length";
+  EXPECT_EQ(faultWith(6, 0, sections_[6].substr(8, 8)), wrong) << "twice the same time";
+  EXPECT_EQ(faultWith(6, 0, sections_[6].substr(8, 8) + sections_[6].substr(0, 8)), wrong) << "out of order";
+  EXPECT_EQ(faultWith(6, 15, "\1"), wrong) << "beyond all stamps";
+  EXPECT_EQ(faultWith(6, 8, std::string(8, '\xff')), wrong) << "likewise";
+  EXPECT_EQ(faultWith(6, 0, std::string(8, '\xff')), wrong) << "and before it";
+  EXPECT_EQ(faultWith(6, kMasks, std::string(128, '\0')), wrong) << "one that has seen nothing";
+  EXPECT_EQ(faultWith(6, kMasks + 128, std::string(128, '\0')), "")
+      << "the latest gives the others their levels";
+  EXPECT_EQ(faultWith(6, kMasks, std::string(256, '\0')), wrong);
+}
+
+TEST_F(LooksInTile, AreRefusedInOtherNumbers) {
+  const Sections good = sections_;
+  const std::string other_number = "it has another number of looks";
+  EXPECT_EQ(faultWith(0, 7, "\2"), other_number);
+  EXPECT_EQ(faultWith(0, 7, "\6"), other_number);
+  EXPECT_EQ(faultWith(0, 7, "\xfe"), other_number);
+  sections_[0].resize(10);
+  EXPECT_EQ(fault(), other_number);
+  sections_[0] = good[0] + '\0';
+  EXPECT_EQ(fault(), other_number);
+  sections_[0] = good[0] + std::string(1000, '\0');
+  EXPECT_EQ(fault(), "a length is wrong");
+  // Planes instead of looks: there is no evidence for them.
+  sections_ = good;
+  sections_[0][7] = '\0';
+  sections_[0][5] = '\3';
+  sections_[0].replace(8, 4, std::string("\0\x28\x50\xff", 4));
+  entry_.planes = 3;
+  EXPECT_EQ(fault(), other_number);
+  sections_[0][5] = '\4';
+  EXPECT_EQ(fault(), "planes are missing");
+  entry_.planes = 2;
+  EXPECT_EQ(fault(), "planes are missing");
+  // The section is cut off, or goes on.
+  sections_ = good;
+  sections_[6].pop_back();
+  EXPECT_EQ(fault(), "it cannot be decompressed");
+  sections_[6] += "xx";
+  EXPECT_EQ(fault(), "a length is wrong");
+  sections_[6].clear();
+  EXPECT_EQ(fault(), "it is too short");
+  sections_ = good;
+  EXPECT_EQ(fault(joined(sections_) + "x"), "bytes are left over");
+  EXPECT_EQ(fault(joined(sections_).substr(0, joined(sections_).size() - 1)), "a length is wrong");
+  sections_[0][7] = '\0';
+  sections_[0].resize(10);
+  EXPECT_EQ(fault(), "bytes are left over");
+  sections_ = good;
+  ASSERT_EQ(fault(), "");
+  const std::string content = joined(sections_);
+  for (const std::size_t end : {content.size() - good[6].size() - 1, content.size() - good[6].size() - 4}) {
+    EXPECT_EQ(fault(content.substr(0, end)), "it is too short") << end;
+  }
+  sections_[6][kMasks + 2] = '\1';
+  EXPECT_EQ(fault(joined(sections_)), "its checksum is wrong");
+}
+
+TEST_F(LooksInTile, AreRefusedInFilesThatKeepNone) {
+  entry_.checksum = checksumOf(kKey, entry_, sections_);
+  const std::string content = joined(sections_);
+  TileCodec codec(*infoOf().classes, false);
+  EXPECT_EQ(
+      codec.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()), content.size()),
+      "a flag is not known");
+}
+
+// Whoever claims much must send much.
+TEST_F(LooksInTile, TakeNoMemoryForClaims) {
+  std::string numbers;
+  for (int b = 0; b < 512; ++b) numbers += {static_cast<char>(b & 0xff), static_cast<char>(b >> 8)};
+  sections_[0] = numbers + std::string(512, '\0') + std::string(512, '\xff') + std::string(127 * 512, '\0');
+  sections_[1] = std::string(512 * 64, '\xff');
+  for (std::size_t section = 2; section < 6; ++section) sections_[section].clear();
+  sections_[6] = "x";
+  entry_ = {kKey.index, 512, 0, 0};
+  const std::string content = joined(sections_);
+  {
+    const PeakMemory memory;
+    EXPECT_EQ(fault(content), "a length is wrong");
+    EXPECT_LT(memory.bytes(), 300'000);
+  }
+  sections_[6] = deflated(std::string(127 * 512 * 136, '\0'));
+  const std::string zeros = joined(sections_);
+  const PeakMemory memory;
+  EXPECT_EQ(fault(zeros), "its checksum is wrong");
+  EXPECT_LT(memory.bytes(), static_cast<std::ptrdiff_t>(500'000 + TileCodec::kMemoryPerByte * zeros.size()));
 }
 
 // Whoever claims much must send much.

@@ -47,6 +47,22 @@ uLong checksumOf(const SemanticMap& map) {
   return sum;
 }
 
+/// CRC-32 over all looks of a block: begin (8 bytes), level (4 bytes) and the sight of each voxel (1 byte).
+uLong checksumOf(const Looks& looks) {
+  uLong sum = 0;
+  for (const Look& look : looks.all()) {
+    const std::uint64_t begin = look.begin();
+    const std::uint32_t level = look.level();
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(&begin), sizeof begin);
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(&level), sizeof level);
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      const auto sight = static_cast<Bytef>(look.at(v));
+      sum = crc32(sum, &sight, 1);
+    }
+  }
+  return sum;
+}
+
 EvidenceUnits unitsAt(const SemanticMap& map, const BlockIndex& block, ClassId id, std::size_t voxel) {
   return map.find(block)->evidence(id)[voxel];
 }
@@ -68,6 +84,29 @@ TEST_P(Version, HoldsItsEvidence) {
   ASSERT_NE(marked, nullptr);
   EXPECT_TRUE(marked->classes().empty());
   for (std::size_t v = 0; v < kBlockVoxels; ++v) ASSERT_EQ(marked->occlusion()[v], v % 3 == 0) << v;
+}
+
+TEST_P(Version, HoldsItsLooks) {
+  MapFile file(file_, MapFile::Access::kRead);
+  const SemanticMap map = readPart(file, 0), part = readPart(file, 1);
+  for (const SemanticMap* const each : {&map, &part}) {
+    for (const auto& [index, block] : each->entries()) {
+      const bool has_looks = GetParam() >= 3 && index == GridIndex{0, 0, 0};
+      EXPECT_EQ(block->looks().empty(), !has_looks);
+    }
+  }
+  if (GetParam() < 3) return;
+  const Looks &looks = map.find({{0, 0, 0}})->looks(), &of_part = part.find({{0, 0, 0}})->looks();
+  EXPECT_EQ(looks.all().size(), 8u);
+  EXPECT_EQ(looks.all()[0].begin(), 6332874752u);
+  EXPECT_EQ(looks.all()[0].level(), 16u);
+  EXPECT_EQ(looks.all()[0].at(0), Sight::kHit);
+  EXPECT_EQ(looks.all()[0].at(1), Sight::kNothing);
+  EXPECT_EQ(looks.all()[0].at(2), Sight::kVoid);
+  EXPECT_EQ(looks.all()[0].at(4), Sight::kCrossed);
+  EXPECT_EQ(checksumOf(looks), 0x527149d5u);
+  EXPECT_EQ(of_part.all().size(), 2u);
+  EXPECT_EQ(checksumOf(of_part), 0xb1b1e00cu);
 }
 
 TEST_P(Version, HoldsWhatTheMapIsAbout) {
@@ -117,11 +156,13 @@ TEST_P(Version, HoldsWhatTheMapIsAbout) {
 
 // What write_example_map would write today reads as what it wrote then.
 TEST_P(Version, IsWhatTheFormulasSay) {
-  SemanticMap sum = exampleMap(0);
-  sum.add(exampleMap(1));
+  const bool has_looks = GetParam() >= 3;
+  const SemanticMap part = exampleMap(1, has_looks);
+  SemanticMap sum = exampleMap(0, has_looks);
+  sum.add(part);
   MapFile file(file_, MapFile::Access::kRead);
   EXPECT_EQ(reference::contentOf(readPart(file, 0)), reference::contentOf(sum));
-  EXPECT_EQ(reference::contentOf(readPart(file, 1)), reference::contentOf(exampleMap(1)));
+  EXPECT_EQ(reference::contentOf(readPart(file, 1)), reference::contentOf(part));
   EXPECT_TRUE(file.drives() == exampleDrives());
   EXPECT_NO_THROW(checkSameGrid("file", file.info(), "formulas", exampleInfo()));
 }
@@ -143,6 +184,7 @@ TEST_P(Version, IsUpdatedByThisVersion) {
   const SemanticMap map = readPart(file, 0);
   EXPECT_EQ(map.size(), 3u);
   EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 3);
+  EXPECT_EQ(map.find({{0, 0, 0}})->looks().empty(), GetParam() < 3) << "the file keeps its version";
 }
 
 TEST(NewerVersion, IsRefused) {
@@ -150,12 +192,12 @@ TEST(NewerVersion, IsRefused) {
   const std::string path = folder / "map.bkm";
   std::filesystem::copy_file(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm", path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\3');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\4');
   for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
     EXPECT_EQ(
         sentenceOf([&] { MapFile(path, access); }),
         path +
-            " was written by a newer version of bki_mapping (format 3, this one knows formats up to 2); "
+            " was written by a newer version of bki_mapping (format 4, this one knows formats up to 3); "
             "use that version or a later one");
   }
 }

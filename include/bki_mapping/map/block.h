@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bki_mapping/core/types.h"
+#include "bki_mapping/map/looks.h"
 
 namespace bki_mapping {
 
@@ -45,7 +46,8 @@ class Block {
 
   Block() = default;
   /// A copy with memory for the planes of further classes.
-  Block(const Block& other, std::size_t further_classes) : occlusion_(other.occlusion_) {
+  Block(const Block& other, std::size_t further_classes)
+      : occlusion_(other.occlusion_), looks_(other.looks_) {
     reserve(other.classes_.size() + further_classes);
     classes_.assign(other.classes_.begin(), other.classes_.end());
     planes_.assign(other.planes_.begin(), other.planes_.end());
@@ -85,6 +87,7 @@ class Block {
   void shrink() noexcept {
     if (planes_.capacity() > planes_.size()) planes_.shrink_to_fit();
     if (classes_.capacity() > classes_.size()) classes_.shrink_to_fit();
+    looks_.shrink();
   }
 
   /// Changes the plane of a class, which is created if missing, and removed if nothing is left in it.
@@ -138,13 +141,17 @@ class Block {
   const Occlusion& occlusion() const { return occlusion_; }
   void setOcclusion(const Occlusion& occlusion) { occlusion_ = occlusion; }
 
+  /// When scans looked at the voxels. They say nothing of voxels without evidence.
+  const Looks& looks() const { return looks_; }
+  Looks& looks() { return looks_; }
+
   /// Whether the block holds no evidence and no occlusion marks.
   bool empty() const { return classes_.empty() && occlusion_.none(); }
 
   /// Memory of the block, including this object and its reference count [bytes].
   std::size_t bytes() const {
     return sizeof(*this) + kReferenceCountBytes + planes_.capacity() * sizeof(EvidenceUnits) +
-           classes_.capacity() * sizeof(ClassId);
+           classes_.capacity() * sizeof(ClassId) + looks_.bytes();
   }
 
  private:
@@ -160,6 +167,7 @@ class Block {
   std::vector<ClassId> classes_;
   std::vector<EvidenceUnits> planes_;
   Occlusion occlusion_;
+  Looks looks_;
 };
 
 }  // namespace bki_mapping

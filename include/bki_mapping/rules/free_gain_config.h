@@ -21,12 +21,16 @@ struct FreeGainConfig {
   /// evidence is at least this factor times that for free, and a quarter of that for what has left; 0: never.
   double remaining = 0.0;
 
-  /// A voxel whose likeliest class is flagged dynamic, but not living, is occupied if, up to two voxels away,
-  /// the evidence in such voxels that are occupied by themselves is at least this factor times that in those
-  /// that are not; 0: each voxel decides by itself. One that is not occupied by itself stays free if it has
-  /// less than a quarter of the mean evidence of those that are, or less than a twentieth of its evidence for
-  /// free. If no class is flagged dynamic, all but the unlabelled one count, and no voxel below.
+  /// Least ratio of kept to cleared evidence in the neighbourhood of an occupied voxel (Equation 12b), where
+  /// the likeliest class is flagged dynamic, but not living; 0: each voxel decides by itself. Of voxels up to
+  /// two away whose class is such, too, the evidence is kept where the voxel by itself is occupied, and
+  /// cleared elsewhere. A cleared voxel stays free if it has less than a quarter of the mean evidence of the
+  /// kept ones, or less than a twentieth of its evidence for free. If no class is flagged dynamic, all but
+  /// the unlabelled one count, and no voxel below.
   double neighbourhood = 0.0;
+
+  /// Whether what the latest scans saw of a voxel decides its state, where that is clear, and not the sum.
+  bool latest = false;
 };
 
 }  // namespace bki_mapping

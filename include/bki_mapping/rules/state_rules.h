@@ -11,7 +11,7 @@
 
 namespace bki_mapping {
 
-/// What a voxel is, given its evidence and that around it: Equations 11 to 12b in docs/method.md. Only (11)
+/// What a voxel is, given its evidence and that around it: Equations 11 to 12c in docs/method.md. Only (11)
 /// follows from the paper; by default no other rule applies. A value that does not change: `with...` returns
 /// another one.
 class StateRules {
@@ -32,8 +32,8 @@ class StateRules {
   /// @param persistence in units of evidence; 0: gains do not decay.
   StateRules withPersistence(double persistence) const;
 
-  /// Gain by which the likeliest of the fixed classes, those that cannot move, holds a voxel that its
-  /// likeliest class does not; 0, the default: such a voxel is free (Equation 12a).
+  /// Gain with which a fixed class, one that cannot move, keeps a voxel that its likeliest class has left; 0,
+  /// the default: such a voxel is free (Equation 12a).
   float remainingGain() const { return remaining_gain_; }
   bool isFixed(ClassId id) const { return fixed_[id]; }
   StateRules withRemaining(double gain, const ClassSet& fixed) const;
@@ -55,6 +55,11 @@ class StateRules {
   /// The same without a persistence, or with one above 16; sums over a neighbourhood then still fit 32 bits.
   static constexpr EvidenceUnits kMostVote = 1 << 23;
 
+  /// Whether what the latest scans saw of a voxel decides, where that is clear, and not the sum (Equation
+  /// 12c).
+  bool latestDecides() const { return latest_decides_; }
+  StateRules withLatest(bool decides) const;
+
   /// Whether equal blocks, with equal blocks around, have the same states and labels by both rules.
   bool decidesAs(const StateRules& other) const;
 
@@ -62,7 +67,7 @@ class StateRules {
   std::array<float, 256> free_gains_;
   float persistence_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
   ClassSet fixed_, asking_;
-  bool neighbourhood_is_below_ = true;
+  bool neighbourhood_is_below_ = true, latest_decides_ = false;
 };
 
 /// A map as it was at some time, and the rules of that time.

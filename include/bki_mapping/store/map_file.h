@@ -217,7 +217,8 @@ void copyMap(MapFile& file, const std::string& path);
 
 /// Reads a whole map (part 0) and checks every byte of it.
 /// @param memory_limit for the map [bytes]; 0: no limit. @throws MapFileError, also if the map would exceed
-/// the limit, and then before its memory is allocated; std::bad_alloc.
+/// the limit, and then before its memory is allocated (that of looks: when a tile has been read);
+/// std::bad_alloc.
 StoredMap loadMap(const std::string& path, std::size_t memory_limit = 0);
 /// The same of an open file.
 StoredMap readMap(MapFile& file, std::size_t memory_limit = 0);
@@ -234,8 +235,11 @@ void checkSameGrid(const std::string& name, const MapInfo& info, const std::stri
 /// @throws MapFileError in one sentence with the file and both values.
 void checkFits(const MapFile& file, const MapInfo& own);
 
-/// The memory of a tile in a map, without the map's index [bytes].
+/// The memory of a tile in a map, without the map's index and the looks, of which the list of tiles says
+/// nothing [bytes].
 std::size_t memoryOf(const TileEntry& tile);
+/// The memory of the looks that a map has in a tile [bytes].
+std::size_t memoryOfLooks(const SemanticMap& map, const GridIndex& tile);
 
 /// The tiles in which a map has blocks, sorted by index.
 std::vector<GridIndex> tilesOf(const SemanticMap& map);

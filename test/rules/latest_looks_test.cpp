@@ -1,0 +1,139 @@
+// What the latest looks say of a voxel (12c), by hand and against a slow reading of its definition.
+#include "rules/latest_looks.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+#include <vector>
+
+namespace bki_mapping {
+namespace {
+
+constexpr std::uint64_t kStart = 1 << 20;
+
+/// One letter a tick, the last one the latest: h hit, v void, c crossed, - not seen.
+Looks looksOf(const std::string& sights, std::size_t voxel = 0, std::uint64_t start = kStart) {
+  Looks looks;
+  for (std::size_t n = 0; n < sights.size(); ++n) {
+    Look::Voxels crossed, voids, hit;
+    crossed[voxel] = sights[n] == 'c';
+    voids[voxel] = sights[n] == 'v';
+    hit[voxel] = sights[n] == 'h';
+    looks.add(Look(start + n, crossed, voids, hit));
+  }
+  // Scans that see another voxel, so that the block is looked at to the end.
+  Look::Voxels other;
+  other[kBlockVoxels - 1] = true;
+  looks.add(Look(start + sights.size() - 1, other, {}, {}));
+  return looks;
+}
+
+std::string verdict(const std::string& sights, bool has_stayed = false) {
+  const std::int32_t verdict = verdictOf(looksOf(sights), 0, has_stayed);
+  return verdict == kKept ? "occupied" : verdict == kCleared ? "free" : "the sum";
+}
+
+TEST(LatestLooks, AHitNowOccupies) {
+  EXPECT_EQ(verdict("h"), "occupied");
+  EXPECT_EQ(verdict(std::string(4000, 'v') + 'h'), "occupied") << "after 18 minutes of free view";
+  EXPECT_EQ(verdict("ccch-"), "occupied") << "the tick before the latest";
+}
+
+TEST(LatestLooks, WithoutAnyHitTheSumDecides) {
+  EXPECT_EQ(verdict("c"), "the sum");
+  EXPECT_EQ(verdict(std::string(50, 'v')), "the sum");
+  EXPECT_EQ(verdict("----"), "the sum");
+}
+
+TEST(LatestLooks, TwoVoidIntervalsClear) {
+  const std::string parked(4000, 'h');
+  EXPECT_NE(verdict(parked + "v"), "free") << "one may be an error";
+  EXPECT_EQ(verdict(parked + "vv"), "free");
+  EXPECT_EQ(verdict(parked + "vcccv"), "free");
+  EXPECT_EQ(verdict(parked + "vvh"), "occupied") << "it is back";
+}
+
+TEST(LatestLooks, GrazingBeamsDoNotClearWhatStoodLonger) {
+  const std::string parked(200, 'h');  // 54 s
+  EXPECT_EQ(verdict(parked + std::string(10, 'c'), true), "occupied");
+  EXPECT_EQ(verdict(parked + std::string(10, 'c'), false), "the sum") << "hit in few scans";
+  EXPECT_EQ(verdict("hhc"), "the sum") << "a passer-by";
+  EXPECT_EQ(verdict("hhhh" + std::string(10, 'c'), true), "the sum");
+  EXPECT_EQ(verdict(parked + std::string(200, 'c'), true), "the sum");
+}
+
+TEST(LatestLooks, WhatStayedAndIsNotSeenAgainIsThereStill) {
+  const std::string unseen(3000, '-');
+  EXPECT_EQ(verdict("hhhhh" + unseen, true), "occupied");
+  EXPECT_EQ(verdict("h" + unseen, false), "the sum") << "a passer-by that is hidden since";
+}
+
+/// The definition in docs/method.md, voxel by voxel and look by look.
+std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, bool has_stayed) {
+  std::vector<std::pair<Sight, Look>> seen;  // from the latest
+  for (auto look = looks.all().rbegin(); look != looks.all().rend(); ++look) {
+    if (look->at(voxel) != Sight::kNothing) seen.emplace_back(look->at(voxel), *look);
+  }
+  std::size_t last_hit = 0;
+  while (last_hit < seen.size() && seen[last_hit].first != Sight::kHit) ++last_hit;
+  if (last_hit == seen.size()) return kNotOverruled;
+  if (last_hit == 0) return seen[0].second.level() == 0 || has_stayed ? kKept : kNotOverruled;
+  std::uint64_t crossed = 0, voids = 0;
+  for (std::size_t n = 0; n < last_hit; ++n) {
+    crossed += seen[n].second.length();
+    voids += seen[n].first == Sight::kVoid;
+  }
+  if (voids >= 2) return kCleared;
+  if (!has_stayed) return kNotOverruled;
+  std::vector<std::uint64_t> run;
+  for (std::size_t n = last_hit; n < seen.size() && seen[n].first != Sight::kVoid; ++n) {
+    if (seen[n].first == Sight::kHit) run.push_back(seen[n].second.length());
+  }
+  std::uint64_t hit = 1;
+  for (std::size_t n = 1; n + 1 < run.size(); ++n) hit += run[n];
+  return hit >= 3 * crossed ? kKept : kNotOverruled;
+}
+
+TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 200; ++round) {
+    Block block;
+    std::uint64_t tick = 1000000;
+    const unsigned longest = 1u << random() % 8;
+    // Runs, so that long stays occur.
+    std::vector<int> sight(kBlockVoxels);
+    for (int scans = static_cast<int>(random() % 80); scans > 0; --scans) {
+      Look::Voxels crossed, voids, hit;
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        if (random() % 6 == 0) sight[v] = static_cast<int>(random() % 5);
+        crossed[v] = sight[v] == 1;
+        voids[v] = sight[v] == 2;
+        hit[v] = sight[v] >= 3;
+      }
+      block.looks().add(Look(tick, crossed, voids, hit));
+      tick += random() % longest + 1;
+    }
+    std::vector<EvidenceUnits> plane(kBlockVoxels);
+    constexpr EvidenceUnits kMost = 200;  // so that kStay times as much is 1200
+    for (const int id : {3, 7, static_cast<int>(kFreeClass)}) {
+      for (EvidenceUnits& units : plane) units = static_cast<EvidenceUnits>(random() % 1500);
+      block.add(static_cast<ClassId>(id), plane.data());
+    }
+    Overruled overruled;
+    overruled.fill(kNotOverruled);
+    const bool any = overruleByLooks(block, kMost, overruled);
+    bool expected_any = false;
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      const bool has_stayed = std::max(block.evidence(3)[v], block.evidence(7)[v]) >= 6 * kMost;
+      const std::int32_t expected = slowVerdict(block.looks(), v, has_stayed);
+      ASSERT_EQ(verdictOf(block.looks(), v, has_stayed), expected);
+      ASSERT_EQ(overruled[v], expected) << "round " << round << ", voxel " << v;
+      expected_any |= expected != kNotOverruled;
+    }
+    EXPECT_EQ(any, expected_any);
+  }
+}
+
+}  // namespace
+}  // namespace bki_mapping
