@@ -28,7 +28,7 @@ std::shared_ptr<const ClassTable> movableTable() {
 
 /// Scans at 10 Hz of a sensor at (0.5, 0.5, 0.5), by the x of its points on a line, and the occupied voxels
 /// of the map after each.
-class Drive {
+class ScriptedDrive {
  public:
   void add(const std::vector<std::pair<double, std::uint32_t>>& points, const std::set<int>& occupied) {
     Scan scan;
@@ -51,7 +51,7 @@ class Drive {
 };
 
 TEST(Presence, CountsTheScansOwnPoints) {
-  Drive drive;
+  ScriptedDrive drive;
   for (std::size_t n = 0; n < PresenceEvaluation::kFirstScans; ++n) drive.add({{5.5, 21}}, {});
   drive.add({{5.5, 21}, {6.5, 20}, {7.5, 10}, {30.5, 21}, {60.5, 21}}, {5, 30});
   const PresenceQuality quality = drive.quality();
@@ -61,11 +61,11 @@ TEST(Presence, CountsTheScansOwnPoints) {
   EXPECT_EQ(quality.moving[1].present, 2u);
   EXPECT_EQ(quality.standing[0].points, 1u);
   EXPECT_EQ(quality.standing[0].present, 0u);
-  EXPECT_TRUE(std::isnan(Drive().quality().moving[0].accuracy()));
+  EXPECT_TRUE(std::isnan(ScriptedDrive().quality().moving[0].accuracy()));
 }
 
 TEST(Presence, TimesWhatAppearsAndClears) {
-  Drive drive;
+  ScriptedDrive drive;
   drive.add({{9.5, 10}}, {9});
   drive.add({{9.5, 10}}, {9});
   drive.add({{5.5, 21}}, {9});
@@ -86,7 +86,7 @@ TEST(Presence, TimesWhatAppearsAndClears) {
 }
 
 TEST(Presence, KnowsWhatNeverAppearsAndNeverClears) {
-  Drive drive;
+  ScriptedDrive drive;
   for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
   drive.add({{5.5, 21}, {7.5, 21}}, {7});
   for (int n = 0; n < 15; ++n) drive.add({{9.5, 10}}, {7});
@@ -99,7 +99,7 @@ TEST(Presence, KnowsWhatNeverAppearsAndNeverClears) {
 }
 
 TEST(Presence, LeavesOutVoxelsThatSomethingStaticShares) {
-  Drive drive;
+  ScriptedDrive drive;
   for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
   drive.add({{5.5, 21}, {5.6, 10}}, {5});
   for (int n = 0; n < 15; ++n) drive.add({{9.5, 10}}, {5});
