@@ -256,7 +256,8 @@ class DrivingRobot {
     scan();
     const MapSnapshot now = mapper_->snapshot();
     const Eigen::AlignedBox3d area(Eigen::Vector3d(-5.0, -9.0, -2.5), Eigen::Vector3d(45.0, 12.0, 1.0));
-    const planner::Street street(now.map, now.rules, mapper_->classes(), area);
+    // It knows where what moves is going; of the map it asks what stands, or each walker would block its way.
+    const planner::Street street(now.map, now.rules.withLatest(false), mapper_->classes(), area);
     if (isStillGood(street)) return;
     way_.clear();
     try {
