@@ -181,12 +181,12 @@ class Made(MadeCity):
 
     def interrupted(self, process):
         """Waits until a program maps, and interrupts map_city as a terminal does: all of its processes. Returns them."""
-        children, end = [], time.monotonic() + 60
-        while not any(child.name() == 'map_sequence' for child in children):
+        children, names, end = [], [], time.monotonic() + 60
+        while 'map_sequence' not in names:
             self.assertLess(time.monotonic(), end)
-            with contextlib.suppress(psutil.Error):
+            with contextlib.suppress(psutil.Error):  # some end meanwhile
                 children = psutil.Process(process.pid).children(recursive=True)
-                children = [child for child in children if child.name()]
+                names = [child.name() for child in children]
         os.killpg(process.pid, signal.SIGINT)
         return children
 
