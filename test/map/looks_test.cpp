@@ -130,7 +130,8 @@ TEST(Looks, ForgetNothingButTheErasedVoxels) {
     for (std::size_t v = 0; v < kBlockVoxels; v += 3) scan.sights[v] = Sight::kNothing;
   }
   EXPECT_TRUE(looks.all() == expectedLooks(scans));
-  // What only the latest scan saw is gone; its time remains, so that the intervals are those of the set of scans.
+  // What only the latest scan saw is gone; its time remains, so that the intervals are those of the set of
+  // scans.
   Look::Voxels one, other;
   one[7] = other[8] = true;
   Looks few;
