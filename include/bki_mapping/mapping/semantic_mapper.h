@@ -29,7 +29,8 @@ class SemanticMapper {
   /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
   ScanStats integrate(const ScanView& scan);
 
-  /// Withdraws a scan that was integrated with the current settings. The map is then the same, to the bit, as
+  /// Withdraws a scan that was integrated with the current settings. Looks stay (free_gain/latest); otherwise
+  /// the map is then the same, to the bit, as
   /// if the scan had never been integrated, regardless of later scans; voxels whose evidence had saturated
   /// are an exception (ScanStats::saturated). Withdrawing a scan that is not in the map leaves negative
   /// evidence, which counts as 0 (ScanStats::negative). @throws as integrate(), and std::logic_error with
