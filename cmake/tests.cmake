@@ -154,7 +154,8 @@ bki_mapping_unit_tests(map looks semantic_map)
 bki_mapping_unit_tests(map clear_box LINK bki_mapping_store)
 bki_mapping_unit_tests(store damaged_file full_disk map_clear map_file migration
   LINK SQLite::SQLite3 ZLIB::ZLIB)
-bki_mapping_unit_tests(store map_keeper LINK bki_mapping_io)  # scripts/test runs a part of it
+bki_mapping_unit_tests(store map_keeper)  # scripts/test runs a part of it
+bki_mapping_unit_tests(store kept_looks LINK bki_mapping_io)
 foreach(name hostile_file map_merge tile_codec)  # each counts what is allocated, as damaged_file and allocation do
   bki_mapping_unit_tests(store ${name} LINK SQLite::SQLite3 ZLIB::ZLIB)
 endforeach()
