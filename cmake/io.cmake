@@ -18,9 +18,11 @@ target_include_directories(bki_mapping_io SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS}
 set_source_files_properties(src/io/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
 bki_mapping_room(simulation SOURCES city.cpp drive_file.cpp lidar.cpp scene.cpp street.cpp street_parts.cpp voxel_truth.cpp LINK bki_mapping_io)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
-bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp reliability.cpp semantic_evaluation.cpp truth_evaluation.cpp
+bki_mapping_room(evaluation SOURCES cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp occupants.cpp octomap_mapper.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp reliability.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation bki_mapping_beams)
-target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree)
+target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+set_source_files_properties(src/evaluation/octomap_mapper.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
+target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 bki_mapping_join(bki_mapping_io bki_mapping_simulation bki_mapping_evaluation)
 bki_mapping_precompile(bki_mapping_io
   <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)

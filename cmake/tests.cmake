@@ -230,7 +230,8 @@ bki_mapping_unit_tests(io class_table display_colors grid_export html_export lab
   LINK bki_mapping_simulation nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
 bki_mapping_unit_tests(io cleaned_points map_export pcd_file LINK pcl_io)
 bki_mapping_unit_tests(io octomap_export LINK ${OCTOMAP_LIBRARIES})
-bki_mapping_unit_tests(simulation city_scene simulation without_labels)
+bki_mapping_unit_tests(simulation city_scene coming_and_going simulation without_labels)
+bki_mapping_unit_tests(simulation days LINK bki_mapping_evaluation bki_mapping_store)
 bki_mapping_unit_tests(simulation navigation LINK bki_mapping_query)
 add_executable(plan_path_example examples/plan_path.cpp)
 set_target_properties(plan_path_example PROPERTIES OUTPUT_NAME plan_path)
@@ -246,7 +247,7 @@ set_tests_properties(traffic_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*Traffic*
   COST 80)
 bki_mapping_long_tests(navigation_test traffic_test)
 bki_mapping_long_programs(navigation_test)
-bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy presence semantics truth)
+bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy octomap_mapper presence semantics truth)
 target_include_directories(octomap_export_test SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.

@@ -81,14 +81,13 @@ std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const Se
   return fates;
 }
 
-DynamicsQuality DynamicsEvaluation::compare(const SemanticMap& map, const StateRules& rules,
-                                            const Taken& taken) const {
+DynamicsQuality DynamicsEvaluation::compare(Occupants& map, const Taken& taken) const {
   const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   DynamicsQuality quality;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const Voxel& voxel = voxels_[n];
     const std::uint32_t moving = early_moving_points[n];
-    const bool occupied = viewWithoutEntropy(map, rules, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = map.at(voxel.index).has_value();
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
     quality.other_points += voxel.other_points;

@@ -10,7 +10,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/rules/state_rules.h"
+#include "evaluation/occupants.h"
 #include "evaluation/passing_beams.h"
 #include "io/truth_cloud.h"
 
@@ -98,7 +98,11 @@ class DynamicsEvaluation {
   /// neither this nor hasBeenLeft() needs to be true. @param taken may be empty.
   bool isStillThere(const VoxelIndex& index, const Taken& taken = {}) const;
   /// @param taken may be empty.
-  DynamicsQuality compare(const SemanticMap& map, const StateRules& rules, const Taken& taken = {}) const;
+  DynamicsQuality compare(Occupants& map, const Taken& taken = {}) const;
+  DynamicsQuality compare(const SemanticMap& map, const StateRules& rules, const Taken& taken = {}) const {
+    MapOccupants occupants(map, rules);
+    return compare(occupants, taken);
+  }
   /// The outcome for each voxel that has points of static or of early moving objects.
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map, const StateRules& rules,
                                                       const Taken& taken = {}) const;

@@ -29,21 +29,6 @@ std::uint32_t PresenceEvaluation::voxelAt(const VoxelIndex& index) {
   return n;
 }
 
-bool PresenceEvaluation::isOccupied(const VoxelIndex& voxel, const SemanticMap& map,
-                                    const StateRules& rules) {
-  const BlockIndex index = GridGeometry::blockOf(voxel);
-  const Block* const block = map.find(index);
-  if (!block) return false;
-  const auto fresh = static_cast<std::uint32_t>(views_.size());
-  const std::uint32_t n = view_of_.insert(index, fresh);
-  if (n == fresh) {
-    views_.emplace_back();
-    readBlock(map, rules, index, *block, BlockFields::kStates, views_.back());
-  }
-  return views_[n].state[static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel))] ==
-         VoxelState::kOccupied;
-}
-
 void PresenceEvaluation::start(std::uint32_t n, Wait wait, double time) {
   Voxel& voxel = voxels_[n];
   voxel.wait = wait;
@@ -52,14 +37,13 @@ void PresenceEvaluation::start(std::uint32_t n, Wait wait, double time) {
   voxel.waits = true;
 }
 
-void PresenceEvaluation::follow(const Scan& scan, double time, const SemanticMap& map,
-                                const StateRules& rules) {
+void PresenceEvaluation::follow(const Scan& scan, double time, Occupants& map) {
   beams_.build(scan);
   const auto isDone = [&](std::uint32_t n) {
     Voxel& voxel = voxels_[n];
     const bool is_hit = voxel.last_hit == time;
     if (voxel.wait == Wait::kToAppear) {
-      if (isOccupied(voxel.index, map, rules)) {
+      if (map.at(voxel.index)) {
         delays_.push_back({n, true, time - voxel.since});
         voxel.wait = Wait::kToBeSeen;
       } else if (time - voxel.last_hit > kAnew) {
@@ -73,7 +57,7 @@ void PresenceEvaluation::follow(const Scan& scan, double time, const SemanticMap
         beams_.anyPasses(geometry_.voxelCentre(voxel.index), geometry_.resolution())) {
       start(n, Wait::kToClear, time);
     }
-    if (voxel.wait == Wait::kToClear && !isOccupied(voxel.index, map, rules)) {
+    if (voxel.wait == Wait::kToClear && !map.at(voxel.index)) {
       delays_.push_back({n, false, time - voxel.since});
       voxel.wait = Wait::kNone;
     }
@@ -83,11 +67,8 @@ void PresenceEvaluation::follow(const Scan& scan, double time, const SemanticMap
   waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), isDone), waiting_.end());
 }
 
-void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, const SemanticMap& map,
-                             const StateRules& rules) {
+void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupants& map) {
   const double time = 1e-9 * static_cast<double>(scan.stamp);
-  view_of_ = GridTable();
-  views_.clear();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto id = classes.classOf(scan.labels[i], labelValues(scan));
@@ -99,22 +80,26 @@ void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     voxel.last_hit = time;
     voxel.is_shared |= !moves;
     if (scans_ < kFirstScans) continue;
-    if (moves && before != time && time - before > kAnew) start(n, Wait::kToAppear, time);
+    if (moves && before != time && time - before > kAnew) {
+      voxel.came = true;
+      start(n, Wait::kToAppear, time);
+    }
     if (!moves && !classes.find(*id)->dynamic) continue;
-    const bool occupied = isOccupied(voxel.index, map, rules);
+    const std::optional<ClassId> shown = map.at(voxel.index);
     for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
       if (static_cast<double>(scan.points[i].norm()) > PresenceQuality::kDistances[bin]) continue;
       PresentPoints& points = (moves ? quality_.moving : quality_.standing)[bin];
       ++points.points;
-      points.present += occupied;
+      points.present += shown.has_value();
+      points.named += shown == id;
     }
   }
-  follow(scan, time, map, rules);
+  follow(scan, time, map);
   last_time_ = time;
   ++scans_;
 }
 
-PresenceQuality PresenceEvaluation::quality() const {
+PresenceQuality PresenceEvaluation::quality(Occupants& map, const TakenFor& taken_for) const {
   PresenceQuality quality = quality_;
   for (const Delay& delay : delays_) {
     if (voxels_[delay.voxel].is_shared) continue;
@@ -124,6 +109,12 @@ PresenceQuality PresenceEvaluation::quality() const {
     } else {
       ++all.never;
     }
+  }
+  for (const Voxel& voxel : voxels_) {
+    if (!taken_for || !voxel.came || voxel.is_shared) continue;
+    if (!taken_for(voxel.index, last_time_ - voxel.last_hit)) continue;
+    ++quality.stayed;
+    quality.stayed_present += map.at(voxel.index).has_value();
   }
   // What is not cleared by the end, although beams have been near for as long as clearing may take.
   for (const std::uint32_t n : waiting_) {

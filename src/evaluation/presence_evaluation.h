@@ -3,13 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
-#include "bki_mapping/rules/voxel_state.h"
+#include "evaluation/occupants.h"
 #include "evaluation/passing_beams.h"
 #include "io/truth_cloud.h"
 
@@ -18,8 +19,10 @@ namespace bki_mapping {
 /// Points of a scan, and those of them in occupied voxels of the map right after that scan.
 struct PresentPoints {
   std::size_t points = 0, present = 0;
+  std::size_t named = 0;  ///< of those present, those whose class the voxel has
 
   double accuracy() const { return static_cast<double>(present) / static_cast<double>(points); }  ///< PA
+  double namedShare() const { return static_cast<double>(named) / static_cast<double>(present); }
 };
 
 /// Times until something happened in a voxel [s]; never counts as infinite.
@@ -39,6 +42,10 @@ struct PresenceQuality {
 
   /// Points of classes that can move, up to each distance of kDistances from the sensor.
   std::array<PresentPoints, 2> moving, standing;
+  /// Voxels into which something moved that has not left them since it was last hit, hidden or not, and those
+  /// of them that are occupied in the map at the end. Only where the truth is known.
+  std::size_t stayed = 0, stayed_present = 0;
+  double stayedShare() const { return static_cast<double>(stayed_present) / static_cast<double>(stayed); }
   Delays appear;  ///< from the first hit of something moving in a voxel until the voxel is occupied
   Delays clear;  ///< from the first beam near a voxel that something moving has left until it is not occupied
 };
@@ -46,13 +53,18 @@ struct PresenceQuality {
 /// Follows a drive scan by scan, with the map after each.
 class PresenceEvaluation {
  public:
+  /// Whether a voxel has contained an object that can move during the last seconds of the drive, all the
+  /// time.
+  using TakenFor = std::function<bool(const VoxelIndex& voxel, double seconds)>;
+
   PresenceEvaluation(const GridGeometry& geometry, KittiLabels moving)
       : geometry_(geometry), moving_(std::move(moving)) {}
 
   /// Adds the next scan, after it is in the map. The first scans only show what is there: kFirstScans.
-  /// @param scan with true labels.
-  void add(const Scan& scan, const ClassTable& classes, const SemanticMap& map, const StateRules& rules);
-  PresenceQuality quality() const;
+  /// @param scan with true labels. @param map what the map shows right after the scan.
+  void add(const Scan& scan, const ClassTable& classes, Occupants& map);
+  /// @param map what the map shows at the end. @param taken_for may be empty: the truth is not known.
+  PresenceQuality quality(Occupants& map, const TakenFor& taken_for = {}) const;
 
   /// Scans before the first that counts.
   static constexpr std::size_t kFirstScans = 2;
@@ -66,6 +78,7 @@ class PresenceEvaluation {
     double last_hit = 0.0, since = 0.0;  ///< of the last point, and of the wait [s]
     bool is_shared = false;              ///< with static points
     bool waits = false;                  ///< is in waiting_
+    bool came = false;                   ///< something moved into it while the drive went on
     Wait wait = Wait::kNone;
   };
   struct Delay {
@@ -75,10 +88,8 @@ class PresenceEvaluation {
   };
 
   std::uint32_t voxelAt(const VoxelIndex& index);
-  /// The state of a voxel after the present scan; blocks are read once.
-  bool isOccupied(const VoxelIndex& voxel, const SemanticMap& map, const StateRules& rules);
   void start(std::uint32_t n, Wait wait, double time);
-  void follow(const Scan& scan, double time, const SemanticMap& map, const StateRules& rules);
+  void follow(const Scan& scan, double time, Occupants& map);
 
   GridGeometry geometry_;
   KittiLabels moving_;
@@ -90,8 +101,6 @@ class PresenceEvaluation {
   std::vector<Delay> delays_;
   PresenceQuality quality_;  ///< all but the delays
   PassingBeams beams_;
-  GridTable view_of_;
-  std::vector<BlockView> views_;
 };
 
 }  // namespace bki_mapping

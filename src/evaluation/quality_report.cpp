@@ -104,8 +104,10 @@ Json presenceJson(const PresenceQuality& p) {
     json["by_distance"].push_back({{"up_to", PresenceQuality::kDistances[bin]},
                                    {"moving_points", p.moving[bin].points},
                                    {"pa_moving", p.moving[bin].accuracy()},
+                                   {"moving_named", p.moving[bin].namedShare()},
                                    {"standing_points", p.standing[bin].points},
-                                   {"pa_standing", p.standing[bin].accuracy()}});
+                                   {"pa_standing", p.standing[bin].accuracy()},
+                                   {"standing_named", p.standing[bin].namedShare()}});
   }
   for (const auto& [name, delays] : {std::pair("appear", &p.appear), std::pair("clear", &p.clear)}) {
     json[name] = {{"voxels", delays->count()},
@@ -113,7 +115,17 @@ Json presenceJson(const PresenceQuality& p) {
                   {"median", delayJson(delays->quantile(0.5))},
                   {"p95", delayJson(delays->quantile(0.95))}};
   }
+  json["stayed_voxels"] = p.stayed;
+  json["stayed_present"] = p.stayedShare();
   return json;
+}
+
+Json octomapJson(const OctomapQuality& octomap) {
+  Json figures = dynamicsJson(octomap.dynamics);
+  figures["presence"] = presenceJson(octomap.presence);
+  figures["median_ms"] = octomap.median_ms;
+  figures["bytes"] = octomap.bytes;
+  return figures;
 }
 
 /// One decimal; "-" for a fraction of nothing.
@@ -150,6 +162,12 @@ class Table {
   std::ostringstream out_;
 };
 
+std::string delayText(const Delays& delays) {
+  const auto text = [](double seconds) { return std::isinf(seconds) ? "never" : figureText(seconds) + " s"; };
+  return "median " + text(delays.quantile(0.5)) + ", 95 % within " + text(delays.quantile(0.95)) + "; " +
+         std::to_string(delays.never) + " of " + std::to_string(delays.count()) + " voxels never";
+}
+
 void addPresence(const PresenceQuality& presence, Table& table) {
   for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
     const std::string within = " within " + numberText(PresenceQuality::kDistances[bin]) + " m";
@@ -159,15 +177,26 @@ void addPresence(const PresenceQuality& presence, Table& table) {
     table.percent("   standing", presence.standing[bin].accuracy(),
                   "of those of objects that could move, but stand still");
   }
-  const auto delays = [&](const Delays& d, const std::string& what) {
-    const auto text = [](double seconds) {
-      return std::isinf(seconds) ? "never" : figureText(seconds) + " s";
-    };
-    table.text(what + ": median " + text(d.quantile(0.5)) + ", 95 % within " + text(d.quantile(0.95)) + "; " +
-               std::to_string(d.never) + " of " + std::to_string(d.count()) + " voxels never");
-  };
-  delays(presence.appear, "to appear");
-  delays(presence.clear, "to clear, once beams come near again");
+  table.percent("   with its class", presence.moving.back().namedShare(),
+                "of the moving points in occupied voxels have the class of their voxel");
+  if (presence.stayed > 0) {
+    table.percent("PA stayed", presence.stayedShare(),
+                  "of the voxels into which something moved and stayed are occupied at the end");
+  }
+  table.text("to appear: " + delayText(presence.appear));
+  table.text("to clear, once beams come near again: " + delayText(presence.clear));
+}
+
+void addOctomap(const OctomapQuality& octomap, Table& table) {
+  const DynamicsQuality& d = octomap.dynamics;
+  const auto percent = [](double fraction) { return figureText(100.0 * fraction); };
+  table.text("OctoMap of the same scans: SA " + percent(d.staticAccuracy()) + ", standing " +
+             percent(d.standingAccuracy()) + ", holes " + percent(d.holes()) + ", DA " +
+             percent(d.dynamicAccuracy()) + ", AA " + percent(d.accuracy()) + ", PA moving within 50 m " +
+             percent(octomap.presence.moving.back().accuracy()) + ", PA stayed " +
+             percent(octomap.presence.stayedShare()) + "; to appear: " + delayText(octomap.presence.appear) +
+             "; to clear: " + delayText(octomap.presence.clear) + "; median " +
+             figureText(octomap.median_ms) + " ms a scan");
 }
 
 void addCloud(const CloudQuality& cloud, Table& table) {
@@ -258,6 +287,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   if (quality.cloud) addCloud(*quality.cloud, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
              " of moving objects; median " + figureText(quality.median_ms) + " ms a scan");
+  if (quality.octomap) addOctomap(*quality.octomap, table);
   for (const JudgedMap& judged : quality.judged) {
     const DynamicsQuality& with = judged.dynamics;
     table.text("with " + judged.settings + ": SA " + figureText(100.0 * with.staticAccuracy()) +
@@ -314,6 +344,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
     figures["judged"].push_back(dynamicsJson(judged.dynamics));
     figures["judged"].back()["settings"] = judged.settings;
   }
+  if (quality.octomap) figures["octomap"] = octomapJson(*quality.octomap);
   if (quality.cloud) figures["cloud"] = cloudJson(*quality.cloud);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";

@@ -20,13 +20,22 @@ struct JudgedMap {
   DynamicsQuality dynamics;
 };
 
+/// The same scans in an OctoMap.
+struct OctomapQuality {
+  DynamicsQuality dynamics;
+  PresenceQuality presence;
+  double median_ms = 0.0;  ///< median time of a scan [ms]
+  std::size_t bytes = 0;   ///< of memory
+};
+
 struct MapQuality {
   DynamicsQuality dynamics;
   std::vector<JudgedMap> judged;
   PresenceQuality presence;
   SemanticQuality semantics;
-  Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
-  std::optional<CloudQuality> cloud;               ///< compared with a ground-truth cloud
+  Reliability occupancy;              ///< by the points, see OccupancyEvaluation
+  std::optional<CloudQuality> cloud;  ///< compared with a ground-truth cloud
+  std::optional<OctomapQuality> octomap;
   std::optional<simulation::TruthQuality> truth;   ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< median time of a scan [ms]

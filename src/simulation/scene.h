@@ -64,7 +64,7 @@ enum class SceneKind {
   kStreet,    ///< cars that pass or are parked, and a few pedestrians
   kTraffic,   ///< stop-and-go traffic in both directions, and parked cars of which some drive off
   kCrowd,     ///< many pedestrians, who walk and stand, and cyclists
-  kArrivals,  ///< cars that come, park and leave, people who stop and walk on, trolleys that are left
+  kArrivals,  ///< cars that come, park and leave, people who stop or sit down, trolleys, gates
 };
 /// @throws std::invalid_argument if there is no kind of this name.
 SceneKind sceneKindNamed(const std::string& name);

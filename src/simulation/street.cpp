@@ -67,7 +67,7 @@ void addCrowd(double length, double duration, Dice& dice, std::vector<Shape>& sh
 }
 
 /// What comes, stands for a while, and goes or stays: cars beside the road, people and trolleys on the
-/// pavement.
+/// pavement, people who sit down, and gates that open and close.
 void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>& shapes) {
   using Add = void (*)(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
   const auto add = [&](Add visitor, double x, double y, double speed, double aside, double longest) {
@@ -85,6 +85,13 @@ void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>&
   }
   for (double x = kStart + 3.0; x < kStart + length; x += dice.between(10.0, 16.0))
     add(addTrolley, x, -dice.between(5.7, 7.0), 1.0, 0.0, 0.5 * duration);
+  for (double x = kStart + 2.0; x < kStart + length; x += dice.between(9.0, 15.0)) {
+    const double arrival = dice.between(0.05, 0.4) * duration;
+    const Motion motion = Motion::sitting(arrival, arrival + dice.between(4.0, 9.0), 1.2, 0.6);
+    addPedestrian(x - motion.wayUntil(arrival).x(), dice.between(6.0, 7.8), motion, shapes);
+  }
+  for (double x = kStart + 6.0; x < kStart + length; x += dice.between(12.0, 20.0))
+    addGate(x, 8.5, Motion::sliding(2.3, dice.between(2.0, 6.0), dice.between(2.0, 6.0), duration), shapes);
 }
 
 constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals"};

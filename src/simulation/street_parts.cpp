@@ -39,6 +39,33 @@ Motion Motion::visiting(double arrival, double departure, double speed, double a
   return motion;
 }
 
+Motion Motion::sitting(double arrival, double departure, double speed, double down) {
+  constexpr double kBefore = 1.0, kSinking = 0.5;  // [s]
+  const Eigen::Vector3d along(speed, 0.0, 0.0), sink(0.0, 0.0, -down / kSinking);
+  Motion motion = constant(speed);
+  motion.legs = {{arrival, along},
+                 {arrival + kBefore, Eigen::Vector3d::Zero()},
+                 {arrival + kBefore + kSinking, sink},
+                 {departure - kSinking, Eigen::Vector3d::Zero()},
+                 {departure, -sink}};
+  return motion;
+}
+
+Motion Motion::sliding(double way, double closed, double open, double end) {
+  Motion motion;
+  double at = 0.0;
+  const auto leg = [&](double duration, double speed) {
+    motion.legs.push_back({at += duration, {speed, 0.0, 0.0}});
+  };
+  while (at < end) {
+    leg(closed, 0.0);
+    leg(1.0, way);
+    leg(open, 0.0);
+    leg(1.0, -way);
+  }
+  return motion;
+}
+
 Eigen::Vector3d Motion::wayUntil(double time) const {
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   double begin = 0.0;
@@ -69,6 +96,11 @@ void addCar(double x, double y, const Motion& motion, std::vector<Shape>& shapes
 
 void addPedestrian(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {
   addMoving(pillar(x, y, 0.28, 1.75, kPerson), motion, kMovingPerson, shapes);
+}
+
+void addGate(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {
+  addMoving(box(x, y, 1.0, 2.4, 0.1, 2.0, kMovingVehicle), motion, kMovingVehicle, shapes);
+  for (const double side : {-1.35, 1.35}) shapes.push_back(pillar(x + side, y, 0.1, 2.2, kPole));
 }
 
 void addTrolley(double x, double y, const Motion& motion, std::vector<Shape>& shapes) {

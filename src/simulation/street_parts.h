@@ -46,6 +46,12 @@ struct Motion {
   /// @param arrival, departure when it comes to a stand, and when it moves again [s]. @param aside from its
   /// way to its place [m].
   static Motion visiting(double arrival, double departure, double speed, double aside);
+  /// The same, but sits down after a second, and gets up before it goes.
+  /// @param down by how much its head sinks [m]. @param departure at least 3 s after the arrival [s].
+  static Motion sitting(double arrival, double departure, double speed, double down);
+  /// Slides along x and back in turn until the end. @param way [m], which takes a second.
+  /// @param closed, open how long it stands at either end [s].
+  static Motion sliding(double way, double closed, double open, double end);
   /// How far it goes in the legs that end by a time.
   Eigen::Vector3d wayUntil(double time) const;
   bool moves() const { return !velocity.isZero() || !legs.empty(); }
@@ -57,6 +63,8 @@ Shape pillar(double x, double y, double radius, double height, std::uint32_t lab
 /// Body and cabin of a car along x.
 void addCar(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 void addPedestrian(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
+/// A gate between two posts, along x, whose wing slides.
+void addGate(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 /// A trolley, as large as a cupboard.
 void addTrolley(double x, double y, const Motion& motion, std::vector<Shape>& shapes);
 /// A bicycle, alone or with its rider.

@@ -13,6 +13,7 @@
 #include "core/quantile.h"
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/label_noise.h"
+#include "evaluation/octomap_mapper.h"
 #include "evaluation/pose_noise.h"
 #include "evaluation/presence_evaluation.h"
 #include "evaluation/quality_report.h"
@@ -61,6 +62,8 @@ po::options_description options() {
       "cloud-distance",
       tools::realOption("--cloud-distance", 0.0, 10.0)->value_name("M")->default_value(0.05),
       "distance within which points of the two clouds match [m]")(
+      "octomap", po::bool_switch(),
+      "also map the same points with OctoMap, with its defaults, and measure that map")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
       "also give SA and DA of the same map with other free_gain settings; repeatable")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
@@ -68,6 +71,15 @@ po::options_description options() {
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
+
+/// An OctoMap of the same scans, and what only it has.
+struct OctomapRun {
+  OctomapRun(const GridGeometry& geometry, const KittiLabels& moving)
+      : mapper(geometry.resolution()), presence(geometry, moving) {}
+  OctomapMapper mapper;
+  PresenceEvaluation presence;
+  std::vector<double> times;  ///< of the scans [ms]
+};
 
 /// The measures of one run.
 struct Evaluation {
@@ -77,6 +89,7 @@ struct Evaluation {
   OccupancyEvaluation occupancy;
   std::optional<simulation::TruthEvaluation> truth;
   std::optional<CloudEvaluation> cloud;
+  std::optional<OctomapRun> octomap;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
   std::size_t labels = 0, unknown_labels = 0;
@@ -113,12 +126,29 @@ struct Evaluation {
     return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
   }
 
-  tools::MapQuality compare(const SemanticMapper& mapper) const {
+  /// Whether that is so for the last seconds of the drive, by samples of half a second.
+  PresenceEvaluation::TakenFor takenFor() const {
+    if (!truth) return {};
+    return [this](const VoxelIndex& voxel, double seconds) {
+      for (double before = 0.0; before < seconds; before += 0.5) {
+        if (!truth->isTaken(voxel, end - before)) return false;
+      }
+      return truth->isTaken(voxel, end - seconds);
+    };
+  }
+
+  tools::MapQuality compare(const SemanticMapper& mapper) {
     const SemanticMap& map = mapper.map();
     const StateRules& rules = mapper.rules();
     tools::MapQuality quality;
     quality.dynamics = dynamics.compare(map, rules, taken());
-    quality.presence = presence.quality();
+    MapOccupants occupants(map, rules);
+    quality.presence = presence.quality(occupants, takenFor());
+    if (octomap) {
+      quality.octomap = {dynamics.compare(octomap->mapper, taken()),
+                         octomap->presence.quality(octomap->mapper, takenFor()),
+                         quantile(octomap->times, 0.5), octomap->mapper.bytes()};
+    }
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
     quality.semantics = semantics.compare(map, rules, still_there);
@@ -267,7 +297,9 @@ int evaluate(const po::variables_map& given) {
                         SemanticEvaluation(geometry, moving),
                         OccupancyEvaluation(geometry, moving),
                         std::nullopt,
-                        cloudEvaluation(given, sequence, mapper.config())};
+                        cloudEvaluation(given, sequence, mapper.config()),
+                        std::nullopt};
+  if (given["octomap"].as<bool>()) evaluation.octomap.emplace(geometry, moving);
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   // A map that drifts is in no frame of the true scene.
@@ -291,10 +323,15 @@ int evaluate(const po::variables_map& given) {
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
     const ScanStats stats = mapper.integrate(input);
     times.push_back(stats.totalMs());
+    if (OctomapRun* const octomap = evaluation.octomap ? &*evaluation.octomap : nullptr) {
+      octomap->times.push_back(octomap->mapper.integrate(input));
+      if (sequence.labelled()) octomap->presence.add(scan, mapper.classes(), octomap->mapper);
+    }
     tools::warn(watch.report(mapper, input, stats.counts));
     if (sequence.labelled()) {
       evaluation.add(scan, input.labels, mapper.classes());
-      evaluation.presence.add(scan, mapper.classes(), mapper.map(), mapper.rules());
+      MapOccupants occupants(mapper.map(), mapper.rules());
+      evaluation.presence.add(scan, mapper.classes(), occupants);
     } else {
       evaluation.addUnlabelled(scan, mapper.classes());
     }

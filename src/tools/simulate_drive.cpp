@@ -24,9 +24,8 @@ po::options_description options() {
   options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
       "scene", value<std::string>("KIND", "street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
-      "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop, trolleys "
-      "that "
-      "are left")("scans", value<int>("N", 100), "number of scans")(
+      "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop or "
+      "sit down, trolleys, gates")("scans", value<int>("N", 100), "number of scans")(
       "lidar", value<std::string>("NAME", "hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
       "columns", value("N", lidar.columns), "azimuth steps per revolution")(

@@ -40,13 +40,20 @@ class ScriptedDrive {
       scan.points.emplace_back(static_cast<float>(x - 0.5), 0.0f, 0.0f);
       scan.labels.push_back(label);
     }
-    evaluation_.add(scan, *classes_, mapOf(voxels), StateRules());
+    map_ = mapOf(voxels);
+    MapOccupants map(map_, rules_);
+    evaluation_.add(scan, *classes_, map);
   }
-  PresenceQuality quality() const { return evaluation_.quality(); }
+  PresenceQuality quality(const PresenceEvaluation::TakenFor& taken_for = {}) const {
+    MapOccupants map(map_, rules_);
+    return evaluation_.quality(map, taken_for);
+  }
 
  private:
   std::shared_ptr<const ClassTable> classes_ = movableTable();
   PresenceEvaluation evaluation_{GridGeometry(1.0), {21}};
+  SemanticMap map_ = mapOf({});
+  const StateRules rules_;
   std::uint64_t n_ = 0;
 };
 
@@ -107,6 +114,32 @@ TEST(Presence, LeavesOutVoxelsThatSomethingStaticShares) {
   EXPECT_EQ(quality.appear.count(), 0u);
   EXPECT_EQ(quality.clear.count(), 0u);
   EXPECT_EQ(quality.moving[0].present, 1u);
+}
+
+TEST(Presence, AsksForTheClassOfWhatIsPresent) {
+  ScriptedDrive drive;
+  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
+  drive.add({{5.5, 21}, {6.5, 20}}, {5});  // the map's only class is that of the ground
+  const PresenceQuality quality = drive.quality();
+  EXPECT_EQ(quality.moving[1].present, 1u);
+  EXPECT_EQ(quality.moving[1].named, 0u);
+  EXPECT_EQ(quality.moving[1].namedShare(), 0.0);
+  EXPECT_TRUE(std::isnan(quality.standing[1].namedShare()));
+}
+
+TEST(Presence, AsksAtTheEndForWhatCameAndStayed) {
+  ScriptedDrive drive;
+  for (int n = 0; n < 2; ++n) drive.add({{3.5, 21}, {9.5, 10}}, {3});
+  drive.add({{5.5, 21}, {6.5, 21}, {7.5, 21}}, {});
+  drive.add({{2.5, 10}}, {2, 3, 5, 7});  // hides them all
+  const auto all_but_7 = [](const VoxelIndex& voxel, double seconds) {
+    EXPECT_NEAR(seconds, 0.1, 1e-6) << "since the last hit";
+    return voxel.x != 7;
+  };
+  const PresenceQuality quality = drive.quality(all_but_7);
+  EXPECT_EQ(quality.stayed, 2u) << "of 5, 6, 7, and 3, which was there from the start";
+  EXPECT_EQ(quality.stayed_present, 1u);
+  EXPECT_EQ(drive.quality().stayed, 0u) << "the truth is not known";
 }
 
 TEST(Delays, HaveQuantiles) {

@@ -1,0 +1,114 @@
+// With the preset robot, a map shows within a scan or two what comes back to a place, and clears within two
+// seconds what leaves it: a door of a class that cannot move, and a person who sits down.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <set>
+
+#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
+#include "simulation/lidar.h"
+#include "simulation/street_parts.h"
+
+namespace bki_mapping::simulation {
+namespace {
+
+const std::string kTables = std::string(BKI_MAPPING_SOURCE_DIR) + "/config/";
+
+/// A place that a standing lidar of 32 rows maps ten times a second; map and world frame are one.
+class Place {
+ public:
+  explicit Place(std::vector<Shape> shapes) {
+    scene_.shapes = std::move(shapes);
+    lidar_ = lidarNamed("hdl32");
+    lidar_.columns = 720;
+    MapperConfig settings;
+    setParameters(settings, loadParameterFile(kTables + "presets/robot.yaml"));
+    mapper_ = std::make_unique<SemanticMapper>(
+        settings,
+        std::make_shared<const ClassTable>(loadClassTable(kTables + "classes/semantic_kitti.yaml")));
+  }
+  double time() const { return 0.1 * static_cast<double>(scans_); }
+  /// Maps until a time [s]. @return the voxels within a box that were hit meanwhile.
+  std::set<VoxelIndex> mapUntil(double time, const Eigen::AlignedBox3d& box = {}) {
+    std::set<VoxelIndex> hit;
+    while (this->time() < time) {
+      Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+      T_world_sensor.translation().z() = 1.2;
+      SequenceFrame frame = scan(scene_, lidar_, T_world_sensor, this->time(), scans_);
+      frame.T_map_sensor = T_world_sensor;
+      frame.stamp = Sequence::kFirstStamp + 100'000'000 * scans_;
+      mapper_->integrate(frame.scan());
+      for (const Eigen::Vector3f& point : frame.points) {
+        const Eigen::Vector3d at = T_world_sensor * point.cast<double>();
+        if (box.contains(at)) hit.insert(mapper_->map().geometry().voxelAt(at));
+      }
+      ++scans_;
+    }
+    return hit;
+  }
+  /// The share of voxels that the map shows occupied.
+  double occupied(const std::set<VoxelIndex>& voxels) const {
+    std::size_t count = 0;
+    for (const VoxelIndex& voxel : voxels) {
+      count += viewWithoutEntropy(mapper_->map(), mapper_->rules(), voxel).state == VoxelState::kOccupied;
+    }
+    return static_cast<double>(count) / static_cast<double>(voxels.size());
+  }
+
+ private:
+  Scene scene_;
+  LidarConfig lidar_;
+  std::unique_ptr<SemanticMapper> mapper_;
+  std::uint64_t scans_ = 0;
+};
+
+TEST(ComingAndGoing, ADoorOfAClassThatCannotMoveOpensAndCloses) {
+  Shape door = box(6.15, 0.0, 1.05, 0.1, 1.4, 2.1, kBuilding);
+  const Eigen::Vector3d slide(0.0, 1.4, 0.0);
+  door.legs = {{5.0, Eigen::Vector3d::Zero()}, {6.0, slide}, {11.0, Eigen::Vector3d::Zero()}, {12.0, -slide}};
+  Place place({door, box(6.15, 3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
+               box(6.15, -3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
+               box(10.0, 0.0, 1.2, 0.2, 12.0, 2.4, kBuilding)});
+  const auto doorway =
+      place.mapUntil(5.0, {Eigen::Vector3d(6.0, -0.45, 0.35), Eigen::Vector3d(6.3, 0.45, 1.7)});
+  ASSERT_GT(doorway.size(), 8u);
+  EXPECT_EQ(place.occupied(doorway), 1.0) << "closed";
+  place.mapUntil(8.0);
+  EXPECT_EQ(place.occupied(doorway), 0.0) << "open for two seconds";
+  place.mapUntil(11.0);
+  EXPECT_EQ(place.occupied(doorway), 0.0);
+  place.mapUntil(12.3);
+  EXPECT_GT(place.occupied(doorway), 0.95) << "closed for three scans";
+  place.mapUntil(15.0);
+  EXPECT_EQ(place.occupied(doorway), 1.0);
+}
+
+TEST(ComingAndGoing, APersonSitsDownOnTheGroundAndGetsUp) {
+  std::vector<Shape> shapes = {box(9.0, 0.0, 1.5, 0.2, 12.0, 3.0, kBuilding)};
+  Shape person = pillar(4.0, 0.2, 0.28, 1.75, kMovingPerson);
+  const Eigen::Vector3d down(0.0, 0.0, -2.0);  // for half a second: onto the ground
+  person.legs = {{4.0, Eigen::Vector3d::Zero()}, {4.5, down}, {9.0, Eigen::Vector3d::Zero()}, {9.5, -down}};
+  shapes.push_back(person);
+  Place place(shapes);
+  const auto column = [](double low, double high) {
+    return Eigen::AlignedBox3d(Eigen::Vector3d(3.6, -0.2, low), Eigen::Vector3d(4.4, 0.6, high));
+  };
+  place.mapUntil(2.0);
+  const auto head = place.mapUntil(4.0, column(1.5, 1.8));
+  ASSERT_GT(head.size(), 2u);
+  EXPECT_EQ(place.occupied(head), 1.0) << "stands";
+  const auto trunk = place.mapUntil(6.5, column(0.35, 0.55));
+  EXPECT_EQ(place.occupied(head), 0.0) << "has sat for two seconds";
+  EXPECT_GT(place.occupied(trunk), 0.95);
+  place.mapUntil(9.0);
+  EXPECT_EQ(place.occupied(head), 0.0);
+  EXPECT_GT(place.occupied(trunk), 0.95) << "still sits";
+  place.mapUntil(9.8);
+  EXPECT_GT(place.occupied(head), 0.95) << "has stood for three scans";
+}
+
+}  // namespace
+}  // namespace bki_mapping::simulation
