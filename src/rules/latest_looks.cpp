@@ -1,11 +1,47 @@
 #include "rules/latest_looks.h"
 
 #include <algorithm>
-#include <array>
+#include <utility>
 
 namespace bki_mapping {
 
-std::int32_t verdictOf(const Looks& looks, std::size_t offset, bool has_stayed) {
+namespace {
+
+using LatestFirst = std::vector<Look>::const_reverse_iterator;
+
+/// The latest look of the visit before that of a look, or the end.
+LatestFirst visitBefore(LatestFirst look, LatestFirst end) {
+  for (; look != end; ++look) {
+    const LatestFirst before = look + 1;
+    if (before != end && before->level() >= kVisitLevel && before->level() >= look->level() + kVisitLevels)
+      return before;
+  }
+  return end;
+}
+
+/// Whether an earlier visit saw the voxel without a hit, so that its evidence for free is out of date.
+bool wasFreeBefore(LatestFirst hit, LatestFirst end, std::size_t offset) {
+  return std::any_of(visitBefore(hit, end), end, [&](const Look& look) {
+    const Sight sight = look.at(offset);
+    return sight == Sight::kCrossed || sight == Sight::kVoid;
+  });
+}
+
+/// The class with the most evidence in a voxel, of equal ones that with the smallest id, and its evidence.
+std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t offset) {
+  std::pair<ClassId, EvidenceUnits> likeliest{kFreeClass, 0};
+  for (std::size_t p = 0; p < block.classes().size(); ++p) {
+    const ClassId id = block.classes()[p];
+    const EvidenceUnits units = id == kFreeClass ? 0 : block.plane(p)[offset];
+    const bool wins = units > likeliest.second || (units == likeliest.second && id < likeliest.first);
+    if (units > 0 && wins) likeliest = {id, units};
+  }
+  return likeliest;
+}
+
+}  // namespace
+
+std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_move) {
   const auto& all = looks.all();
   std::uint64_t crossed = 0;  // since the last hit, at most [ticks]
   int voids = 0;
@@ -16,9 +52,14 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, bool has_stayed) 
     voids += sight == Sight::kVoid;
   }
   if (look == all.rend()) return kNotOverruled;
-  if (crossed == 0) return look->level() == 0 || has_stayed ? kKept : kNotOverruled;
+  const auto has_stayed = [&] {
+    return stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, all.rend(), offset));
+  };
+  if (crossed == 0) return look->level() == 0 || has_stayed() ? kKept : kNotOverruled;
   if (voids >= kVoidsToClear) return kCleared;
-  if (!has_stayed) return kNotOverruled;
+  if (can_move && crossed >= kCrossedToClear && visitBefore(all.rbegin(), all.rend()) <= look)
+    return kCleared;
+  if (!has_stayed()) return kNotOverruled;
   // Hits at the ends of a run may have been at the ends of their intervals: those between count, and a tick.
   std::uint64_t hits = 1, last = 0;
   int intervals = 0;
@@ -30,7 +71,7 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, bool has_stayed) 
   return hits >= kHitsOverCrossed * crossed ? kKept : kNotOverruled;
 }
 
-bool overruleByLooks(const Block& block, EvidenceUnits most_vote, Overruled& overruled) {
+bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled) {
   const auto& all = block.looks().all();
   Look::Voxels ever_hit, just_hit;
   for (const Look& look : all) ever_hit |= look.hit();
@@ -40,17 +81,14 @@ bool overruleByLooks(const Block& block, EvidenceUnits most_vote, Overruled& ove
     if (look->level() == 0) just_hit |= undecided & look->hit();
     undecided &= ~look->seen();
   }
-  std::array<EvidenceUnits, kBlockVoxels> best{};  // of any class
-  for (std::size_t p = 0; p < block.classes().size(); ++p) {
-    if (block.classes()[p] == kFreeClass) continue;
-    const EvidenceUnits* const plane = block.plane(p);
-    for (std::size_t v = 0; v < kBlockVoxels; ++v) best[v] = std::max(best[v], plane[v]);
-  }
   bool decides = false;
   for (std::size_t v = 0; v < overruled.size(); ++v) {
     if (!ever_hit[v]) continue;
-    const std::int32_t verdict =
-        just_hit[v] ? kKept : verdictOf(block.looks(), v, best[v] >= kStay * most_vote);
+    std::int32_t verdict = kKept;
+    if (!just_hit[v]) {
+      const auto [label, best] = likeliestClass(block, v);
+      verdict = verdictOf(block.looks(), v, stayOf(best, rules.mostVote()), rules.canLeave(label));
+    }
     if (verdict == kNotOverruled) continue;
     overruled[v] = verdict;
     decides = true;

@@ -5,25 +5,43 @@
 #include <cstddef>
 
 #include "bki_mapping/map/block.h"
+#include "bki_mapping/rules/state_rules.h"
 #include "rules/view_kernels.h"
 
 namespace bki_mapping {
 
 /// Number of intervals since the last hit in which a voxel was seen void, from which on it is free.
 constexpr int kVoidsToClear = 2;
-/// What has at least this many times StateRules::mostVote has stayed: with the preset `robot`, what about a
-/// hundred scans have hit.
-constexpr EvidenceUnits kStay = 6;
-/// What has stayed remains as long as it was hit for this many times as long as it has been crossed since.
+/// What has stayed long remains as long as it was hit for this many times as long as it has been crossed
+/// since.
 constexpr std::uint64_t kHitsOverCrossed = 3;
+/// A visit ends where the level of an interval is at least kVisitLevel, and at least kVisitLevels above that
+/// of the next one of its block: then nobody looked at the block in between for 2^(kVisitLevel - 2) ticks, 69
+/// s, or longer.
+constexpr unsigned kVisitLevel = 10, kVisitLevels = 3;
+/// Ticks for which beams must have crossed what can move and was last hit in an earlier visit, to clear it.
+constexpr std::uint64_t kCrossedToClear = 2;
+
+/// How long a voxel has been hit, by the evidence of its likeliest class.
+enum class Stay : std::uint8_t {
+  kPassing,  ///< in less than about eight scans
+  kSome,
+  kLong,  ///< in about a hundred scans or more
+};
+/// @param best evidence of the likeliest class. @param most_vote StateRules::mostVote, with the preset
+/// `robot` what about 16 scans add.
+constexpr Stay stayOf(EvidenceUnits best, EvidenceUnits most_vote) {
+  if (best >= 6 * most_vote) return Stay::kLong;
+  return 2 * std::int64_t{best} >= most_vote ? Stay::kSome : Stay::kPassing;
+}
 
 /// What the looks say of a voxel: kKept, kCleared, or kNotOverruled where the sum decides.
-/// @param offset of the voxel in its block. @param has_stayed whether the likeliest class of
-/// the voxel has at least kStay times StateRules::mostVote.
-std::int32_t verdictOf(const Looks& looks, std::size_t offset, bool has_stayed);
+/// @param offset of the voxel in its block. @param can_move whether the gain of its likeliest class is
+/// above 1.
+std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_move);
 
 /// The same for all voxels of a block: where looks decide, overwrites what the voxels around say.
-/// @param most_vote StateRules::mostVote. @return whether they decide anywhere.
-bool overruleByLooks(const Block& block, EvidenceUnits most_vote, Overruled& overruled);
+/// @return whether they decide anywhere.
+bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled);
 
 }  // namespace bki_mapping

@@ -147,7 +147,7 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRu
   bool overrules = findOverruled(kernels, map, rules, index, block, overruled);
   if (rules.latestDecides() && !block.looks().empty()) {
     if (!overrules) overruled.fill(kNotOverruled);
-    overrules |= overruleByLooks(block, rules.mostVote(), overruled);
+    overrules |= overruleByLooks(block, rules, overruled);
   }
   if (overrules) planes.overruled = &overruled;
   read(planes, view);
@@ -177,8 +177,8 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
     has_left = !holds && own.holds;
   }
   if (rules.latestDecides() && own.best > 0) {
-    const std::int32_t verdict =
-        verdictOf(block.looks(), static_cast<std::size_t>(offset), own.best >= kStay * rules.mostVote());
+    const std::int32_t verdict = verdictOf(block.looks(), static_cast<std::size_t>(offset),
+                                           stayOf(own.best, rules.mostVote()), rules.canLeave(own.label));
     if (verdict != kNotOverruled) {
       holds = verdict == kKept;
       restored = holds && !own.holds;

@@ -29,8 +29,8 @@ Looks looksOf(const std::string& sights, std::size_t voxel = 0, std::uint64_t st
   return looks;
 }
 
-std::string verdict(const std::string& sights, bool has_stayed = false) {
-  const std::int32_t verdict = verdictOf(looksOf(sights), 0, has_stayed);
+std::string verdict(const std::string& sights, Stay stay = Stay::kPassing, bool can_move = true) {
+  const std::int32_t verdict = verdictOf(looksOf(sights), 0, stay, can_move);
   return verdict == kKept ? "occupied" : verdict == kCleared ? "free" : "the sum";
 }
 
@@ -56,21 +56,44 @@ TEST(LatestLooks, TwoVoidIntervalsClear) {
 
 TEST(LatestLooks, GrazingBeamsDoNotClearWhatStoodLonger) {
   const std::string parked(200, 'h');  // 54 s
-  EXPECT_EQ(verdict(parked + std::string(10, 'c'), true), "occupied");
-  EXPECT_EQ(verdict(parked + std::string(10, 'c'), false), "the sum") << "hit in few scans";
+  EXPECT_EQ(verdict(parked + std::string(10, 'c'), Stay::kLong), "occupied");
+  EXPECT_EQ(verdict(parked + std::string(10, 'c'), Stay::kSome), "the sum") << "hit in few scans";
   EXPECT_EQ(verdict("hhc"), "the sum") << "a passer-by";
-  EXPECT_EQ(verdict("hhhh" + std::string(10, 'c'), true), "the sum");
-  EXPECT_EQ(verdict(parked + std::string(200, 'c'), true), "the sum");
+  EXPECT_EQ(verdict("hhhh" + std::string(10, 'c'), Stay::kLong), "the sum");
+  EXPECT_EQ(verdict(parked + std::string(200, 'c'), Stay::kLong), "the sum");
 }
 
 TEST(LatestLooks, WhatStayedAndIsNotSeenAgainIsThereStill) {
   const std::string unseen(3000, '-');
-  EXPECT_EQ(verdict("hhhhh" + unseen, true), "occupied");
-  EXPECT_EQ(verdict("h" + unseen, false), "the sum") << "a passer-by that is hidden since";
+  EXPECT_EQ(verdict("hhhhh" + unseen, Stay::kLong), "occupied");
+  EXPECT_EQ(verdict("h" + unseen), "the sum") << "a passer-by that is hidden since";
+}
+
+// Of 20 minutes, of which the first few are another visit.
+TEST(LatestLooks, WhatAnEarlierVisitSawFreeCountsNoMore) {
+  const std::string before = "vvvv" + std::string(4000, '-'), after(60, '-');
+  EXPECT_EQ(verdict(before + "hhh" + after, Stay::kSome), "occupied") << "parked here today";
+  EXPECT_EQ(verdict("cc" + before + "hhh" + after, Stay::kSome), "occupied");
+  EXPECT_EQ(verdict(before + "hhh" + after, Stay::kPassing), "the sum") << "a passer-by of today";
+  EXPECT_EQ(verdict(before + std::string(40, 'h') + "ccc", Stay::kSome), "occupied") << "beams graze it";
+  EXPECT_EQ(verdict(before + "hhh--------cc", Stay::kSome), "the sum");
+  EXPECT_EQ(verdict("vvvv" + std::string(20, '-') + "hhh" + after, Stay::kSome), "the sum") << "one visit";
+  EXPECT_EQ(verdict("hhhh" + before.substr(4) + "hhh" + after, Stay::kSome), "the sum")
+      << "it never was free";
+}
+
+TEST(LatestLooks, WhatAnEarlierVisitHitIsClearedSooner) {
+  const std::string hour(13000, '-');
+  for (const Stay stay : {Stay::kPassing, Stay::kSome, Stay::kLong}) {
+    EXPECT_EQ(verdict(std::string(300, 'h') + hour + "cc", stay), "free");
+    EXPECT_NE(verdict(std::string(300, 'h') + hour + "c", stay), "free") << "a tick may be an error";
+  }
+  EXPECT_EQ(verdict(std::string(300, 'h') + hour + "hcc", Stay::kSome), "the sum")
+      << "hit in this visit, too";
 }
 
 /// The definition in docs/method.md, voxel by voxel and look by look.
-std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, bool has_stayed) {
+std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool can_move) {
   std::vector<std::pair<Sight, Look>> seen;  // from the latest
   for (auto look = looks.all().rbegin(); look != looks.all().rend(); ++look) {
     if (look->at(voxel) != Sight::kNothing) seen.emplace_back(look->at(voxel), *look);
@@ -78,13 +101,30 @@ std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, bool has_stayed)
   std::size_t last_hit = 0;
   while (last_hit < seen.size() && seen[last_hit].first != Sight::kHit) ++last_hit;
   if (last_hit == seen.size()) return kNotOverruled;
-  if (last_hit == 0) return seen[0].second.level() == 0 || has_stayed ? kKept : kNotOverruled;
+  const Look& hit_look = seen[last_hit].second;
+  // The begins of visits, from the latest to the earliest.
+  std::vector<std::uint64_t> begins;
+  const auto& all = looks.all();
+  for (std::size_t n = all.size() - 1; n > 0; --n) {
+    if (all[n - 1].length() >= 1024 && all[n - 1].length() >= 8 * all[n].length())
+      begins.push_back(all[n].begin());
+  }
+  const auto visit_of = [&](const Look& look) {
+    return std::count_if(begins.begin(), begins.end(),
+                         [&](std::uint64_t begin) { return look.begin() < begin; });
+  };
+  bool was_free = false;
+  for (const auto& [sight, look] : seen)
+    was_free |= sight != Sight::kHit && visit_of(look) > visit_of(hit_look);
+  const bool has_stayed = stay == Stay::kLong || (stay == Stay::kSome && was_free);
+  if (last_hit == 0) return hit_look.length() == 1 || has_stayed ? kKept : kNotOverruled;
   std::uint64_t crossed = 0, voids = 0;
   for (std::size_t n = 0; n < last_hit; ++n) {
     crossed += seen[n].second.length();
     voids += seen[n].first == Sight::kVoid;
   }
   if (voids >= 2) return kCleared;
+  if (can_move && visit_of(hit_look) > 0 && crossed >= 2) return kCleared;
   if (!has_stayed) return kNotOverruled;
   std::vector<std::uint64_t> run;
   for (std::size_t n = last_hit; n < seen.size() && seen[n].first != Sight::kVoid; ++n) {
@@ -100,7 +140,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
   for (int round = 0; round < 200; ++round) {
     Block block;
     std::uint64_t tick = 1000000;
-    const unsigned longest = 1u << random() % 8;
+    const unsigned longest = 1u << random() % 12;
     // Runs, so that long stays occur.
     std::vector<int> sight(kBlockVoxels);
     for (int scans = static_cast<int>(random() % 80); scans > 0; --scans) {
@@ -113,21 +153,29 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
       }
       block.looks().add(Look(tick, crossed, voids, hit));
       tick += random() % longest + 1;
+      if (random() % 40 == 0) tick += 2048 << random() % 6;  // until the next visit
     }
     std::vector<EvidenceUnits> plane(kBlockVoxels);
-    constexpr EvidenceUnits kMost = 200;  // so that kStay times as much is 1200
+    constexpr EvidenceUnits kMost = 200;  // so that a long stay has 1200
     for (const int id : {3, 7, static_cast<int>(kFreeClass)}) {
-      for (EvidenceUnits& units : plane) units = static_cast<EvidenceUnits>(random() % 1500);
+      for (EvidenceUnits& units : plane)
+        units = static_cast<EvidenceUnits>(random() % (round % 2 == 0 ? 1500 : 300));
       block.add(static_cast<ClassId>(id), plane.data());
     }
+    // With a persistence of an eighth of the most that a voxel counts for among others.
+    const StateRules rules =
+        StateRules().withPersistence(kMost * kEvidenceUnit / 8.0).withFreeGain(3, 2.0).withFreeGain(7, 0.5);
+    ASSERT_EQ(rules.mostVote(), kMost);
     Overruled overruled;
     overruled.fill(kNotOverruled);
-    const bool any = overruleByLooks(block, kMost, overruled);
+    const bool any = overruleByLooks(block, rules, overruled);
     bool expected_any = false;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-      const bool has_stayed = std::max(block.evidence(3)[v], block.evidence(7)[v]) >= 6 * kMost;
-      const std::int32_t expected = slowVerdict(block.looks(), v, has_stayed);
-      ASSERT_EQ(verdictOf(block.looks(), v, has_stayed), expected);
+      const EvidenceUnits best = std::max(block.evidence(3)[v], block.evidence(7)[v]);
+      const Stay stay = best >= 6 * kMost ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
+      const bool can_move = best > 0 && block.evidence(3)[v] == best;
+      const std::int32_t expected = slowVerdict(block.looks(), v, stay, can_move);
+      ASSERT_EQ(verdictOf(block.looks(), v, stay, can_move), expected);
       ASSERT_EQ(overruled[v], expected) << "round " << round << ", voxel " << v;
       expected_any |= expected != kNotOverruled;
     }

@@ -28,6 +28,8 @@ class StateRules {
     if (gain <= 1.0f || persistence_ <= 0.0f) return gain;
     return 1.0f + (gain - 1.0f) * std::exp(-hits / persistence_);
   }
+  /// Whether the gain of a class without hits is above 1, as that of classes that can move should be.
+  bool canLeave(ClassId id) const { return free_gains_[id] > 1.0f; }
   StateRules withFreeGain(ClassId id, double gain) const;
   /// @param persistence in units of evidence; 0: gains do not decay.
   StateRules withPersistence(double persistence) const;
