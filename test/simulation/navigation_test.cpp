@@ -20,6 +20,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "examples/planner.h"
 #include "simulation/lidar.h"
+#include "simulation/street_parts.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping::simulation {
@@ -46,13 +47,16 @@ class Navigation : public testing::Test {
     const auto mapper = mapped(&record);
     saveMap(mapFile(), mapInfoOf(*mapper, "map"), {record}, mapper->map());
   }
-  /// A mapper that has mapped the drive.
-  static std::unique_ptr<SemanticMapper> mapped(DriveRecord* record = nullptr) {
+  static std::unique_ptr<SemanticMapper> emptyMapper() {
     MapperConfig settings;
     setParameters(settings, loadParameterFile(kTables + "presets/robot.yaml"));
-    auto mapper = std::make_unique<SemanticMapper>(
+    return std::make_unique<SemanticMapper>(
         settings,
         std::make_shared<const ClassTable>(loadClassTable(kTables + "classes/semantic_kitti.yaml")));
+  }
+  /// A mapper that has mapped the drive.
+  static std::unique_ptr<SemanticMapper> mapped(DriveRecord* record = nullptr) {
+    auto mapper = emptyMapper();
     for (std::size_t i = 0; i < drive_->size(); ++i) {
       const SequenceFrame frame = drive_->frame(i);
       mapper->integrate(frame.scan());
@@ -239,10 +243,20 @@ TEST_F(Navigation, RefusesPlacesWhereTheRobotCannotStand) {
 /// A robot that maps the street while it drives, with a lidar on a mast, and plans anew when it must.
 class DrivingRobot {
  public:
-  /// @param sees_movers whether it plans around what its last scans hit of classes that can move.
-  DrivingRobot(const Drive& drive, std::unique_ptr<SemanticMapper> mapper, const planner::Pose& start,
-               double time, bool sees_movers)
-      : drive_(drive), mapper_(std::move(mapper)), at_(start), time_(time), sees_movers_(sees_movers) {
+  /// How it knows what moves.
+  struct Senses {
+    bool movers = false;  ///< plans around what its last scans hit of classes that can move
+    bool latest = false;  ///< plans on a map in which the latest looks decide
+  };
+  DrivingRobot(const Scene& scene, const Eigen::Isometry3d& T_world_map,
+               std::unique_ptr<SemanticMapper> mapper, const planner::Pose& start, double time,
+               const Senses& senses)
+      : scene_(scene),
+        T_world_map_(T_world_map),
+        mapper_(std::move(mapper)),
+        at_(start),
+        time_(time),
+        senses_(senses) {
     lidar_.columns = 720;
     lidar_.lowest = -1.0;
   }
@@ -256,12 +270,12 @@ class DrivingRobot {
     scan();
     const MapSnapshot now = mapper_->snapshot();
     const Eigen::AlignedBox3d area(Eigen::Vector3d(-5.0, -9.0, -2.5), Eigen::Vector3d(45.0, 12.0, 1.0));
-    // It knows where what moves is going; of the map it asks what stands, or each walker would block its way.
-    const planner::Street street(now.map, now.rules.withLatest(false), mapper_->classes(), area);
+    // Who knows where what moves is going asks the map what stands, or each walker would block its way.
+    const planner::Street street(now.map, now.rules.withLatest(senses_.latest), mapper_->classes(), area);
     if (isStillGood(street)) return;
     way_.clear();
     try {
-      way_ = planner::plan(street, at_, goal, sees_movers_ ? &movers_ : nullptr, 2.5, 6000);
+      way_ = planner::plan(street, at_, goal, senses_.movers ? &movers_ : nullptr, 2.5, 6000);
       way_.erase(way_.begin());
     } catch (const std::runtime_error&) {  // it waits
     }
@@ -280,8 +294,8 @@ class DrivingRobot {
     Eigen::Isometry3d T_map_robot = Eigen::Isometry3d::Identity();
     T_map_robot.translation() = Eigen::Vector3d(at_.x(), at_.y(), 0.0);
     T_map_robot.linear() = Eigen::AngleAxisd(at_.z(), Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    SequenceFrame frame = simulation::scan(drive_.scene(), lidar_, drive_.T_world_sensor(0) * T_map_robot,
-                                           time_, 1000 + scans_++);
+    SequenceFrame frame =
+        simulation::scan(scene_, lidar_, T_world_map_ * T_map_robot, time_, 1000 + scans_++);
     frame.T_map_sensor = T_map_robot;
     frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(time_ * 1e9));
     mapper_->integrate(frame.scan());
@@ -297,16 +311,17 @@ class DrivingRobot {
     double after = 0.0;
     for (const planner::Pose& pose : way_) {
       after += planner::kPeriod / planner::kSpeed;
-      if (!street.isDrivable(pose) || (sees_movers_ && !movers_.areClearOf(pose, after))) return false;
+      if (!street.isDrivable(pose) || (senses_.movers && !movers_.areClearOf(pose, after))) return false;
     }
     return !way_.empty();
   }
 
-  const Drive& drive_;
+  const Scene& scene_;
+  const Eigen::Isometry3d T_world_map_;
   std::unique_ptr<SemanticMapper> mapper_;
   planner::Pose at_;
   double time_;
-  bool sees_movers_;
+  const Senses senses_;
   LidarConfig lidar_;
   planner::Movers movers_;
   std::vector<planner::Pose> way_;
@@ -346,7 +361,8 @@ TEST_F(Navigation, DrivesThroughTrafficAndHitsNothing) {
   const planner::Pose start(2.0, -5.3, 0.0), goal(30.0, 8.0, 0.0);
   const auto drive = [&](bool sees_movers) {
     std::vector<DrivenPose> driven;
-    DrivingRobot robot(*drive_, mapped(), start, 6.0, sees_movers);
+    DrivingRobot robot(drive_->scene(), drive_->T_world_sensor(0), mapped(), start, 6.0,
+                       {sees_movers, false});
     while (robot.time() < 120.0 && (robot.at() - goal).head<2>().norm() >= 0.6) {
       robot.look(goal);
       for (int n = 0; n < 3; ++n) {
@@ -369,6 +385,58 @@ TEST_F(Navigation, DrivesThroughTrafficAndHitsNothing) {
                            << " s";
   }
   EXPECT_GT(hits(drive(false)), 0) << "there is nothing that it must wait for or drive around";
+}
+
+// A yard that has been mapped and is empty; then somebody walks into its way, and stands there.
+TEST_F(Navigation, BrakesForAPedestrianBecauseOfTheMap) {
+  Scene yard;
+  for (const double side : {-1.0, 1.0}) {
+    yard.shapes.push_back(box(5.0, 9.0 * side, 1.5, 40.0, 0.4, 3.0, kBuilding));
+    yard.shapes.push_back(box(5.0 + 18.0 * side, 0.0, 1.5, 0.4, 18.0, 3.0, kBuilding));
+  }
+  Motion motion;
+  motion.velocity = Eigen::Vector3d(0.0, 1.4, 0.0);
+  motion.legs = {{24.0, motion.velocity}, {29.0, Eigen::Vector3d::Zero()}};
+  addPedestrian(6.5, -24.0 * 1.4, motion, yard.shapes);
+  const Shape& pedestrian = yard.shapes.back();
+  Eigen::Isometry3d T_world_map = Eigen::Isometry3d::Identity();
+  T_world_map.translation().z() = 1.73;
+  const planner::Pose goal(14.0, 0.0, 0.0);
+  struct Outcome {
+    double least = 1e9, end = 0.0;  ///< distance from the pedestrian [m], and from the goal [m]
+  };
+  const auto drive = [&](const DrivingRobot::Senses& senses) {
+    auto mapper = emptyMapper();
+    for (int n = 0; n < 40; ++n) {
+      Eigen::Isometry3d T_map_sensor = Eigen::Isometry3d::Identity();
+      T_map_sensor.translation().x() = -6.0 + 0.5 * n;
+      LidarConfig lidar;
+      lidar.columns = 720;
+      SequenceFrame frame =
+          simulation::scan(yard, lidar, T_world_map * T_map_sensor, 0.1 * n, static_cast<std::uint64_t>(n));
+      frame.T_map_sensor = T_map_sensor;
+      frame.stamp = Sequence::kFirstStamp + 100'000'000 * static_cast<std::uint64_t>(n);
+      mapper->integrate(frame.scan());
+    }
+    DrivingRobot robot(yard, T_world_map, std::move(mapper), planner::Pose(0.0, 0.0, 0.0), 20.0, senses);
+    Outcome outcome;
+    while (robot.time() < 60.0 && (robot.at() - goal).head<2>().norm() >= 0.6) {
+      robot.look(goal);
+      for (int n = 0; n < 3; ++n) {
+        robot.move();
+        const Eigen::Vector3d to = pedestrian.centreAt(robot.time()) - robot.at();
+        const Eigen::Vector2d beside =
+            (Eigen::Rotation2Dd(-robot.at().z()) * to.head<2>()).cwiseAbs() - planner::kHalf.head<2>();
+        outcome.least = std::min(outcome.least, beside.cwiseMax(0.0).norm() - pedestrian.half.x());
+      }
+    }
+    outcome.end = (robot.at() - goal).head<2>().norm();
+    return outcome;
+  };
+  const Outcome with = drive({false, true}), without = drive({false, false});
+  EXPECT_GT(with.least, 0.0) << "it hits the pedestrian";
+  EXPECT_LT(with.end, 0.6) << "it goes on";
+  EXPECT_LE(without.least, 0.0) << "it would not meet the pedestrian anyway";
 }
 
 }  // namespace
