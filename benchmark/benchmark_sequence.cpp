@@ -31,9 +31,21 @@ struct Timing {
   double ratio() const { return median() / quantile(yardstick, 0.5); }
 };
 
+/// A preset with other settings on top of its own. @param name of the preset, by which the tables call it.
+Case presetCase(const std::string& name, const std::map<std::string, std::string>& changes) {
+  Case preset = {name, loadParameterFile(name)};
+  for (const auto& [parameter, value] : changes) preset.settings[parameter] = value;
+  return preset;
+}
+
+/// The modes with default settings, and what robots run.
 std::vector<Case> cases() {
   std::vector<Case> all = benchmark::modeCases();
   all.push_back({"line, bilinear, mapped", {{"free_space/extent", "mapped"}, {"resolution", "0.1"}}});
+  all.push_back(presetCase("robot", {}));
+  all.push_back(presetCase("robot", {{"resolution", "0.1"}}));
+  // The paper's kernel reaches three of these voxels to each side: it takes the loops of wide kernels.
+  all.push_back(presetCase("paper_line", {{"resolution", "0.1"}, {"kernel/length", "0.3"}}));
   return all;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "parallel/chunks.h"
 
@@ -24,6 +25,7 @@ Segment segmentOf(const Beams& beams, std::size_t b, const BeamPiece& piece) {
 
 /// Block coordinates in fixed point with 32 fractional bits, whose sums and floors are cheap and exact.
 using Fixed = std::int64_t;
+constexpr Fixed kOneBlock = Fixed{1} << 32;
 
 Fixed toFixed(double blocks) {
   return static_cast<Fixed>(blocks * 0x1.0p32);
@@ -43,13 +45,21 @@ struct SideWalk {
     low += step;
     high += step;
   }
+  /// Whether the extent, which is the same in all slabs, reaches two blocks at most.
+  bool isNarrow() const { return high - low < kOneBlock; }
+
   Fixed step, low, high;  ///< low to high: the extent of the segment in the slab, with the margin
 };
 
-/// Calls visit(x, y, z) for every block that has a voxel centre within `reach` of a segment, and for some
-/// around those.
-template <typename Visit>
-void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, double reach, Visit&& visit) {
+/// The slabs of a segment, `first` to `last`, and its extent in the first of them.
+struct SlabWalk {
+  int main, side1, side2;  ///< axes
+  int first, last;
+  SideWalk walk1, walk2;
+};
+
+/// The blocks that have a voxel centre within `reach` of a segment, and some around those.
+SlabWalk slabsAlong(const GridGeometry& geometry, const Segment& segment, double reach) {
   // In units of blocks. Voxel centres are at least half a voxel from the block's faces.
   const double per_metre = 1.0 / geometry.blockSize();
   const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-6;
@@ -61,38 +71,94 @@ void forEachBlockAlong(const GridGeometry& geometry, const Segment& segment, dou
   const int first = floorToInt(std::min(a[main], a[main] + d[main]) - margin),
             last = floorToInt(std::max(a[main], a[main] + d[main]) + margin);
   const double slope1 = d[side1] * inverse, slope2 = d[side2] * inverse, to_first = first - a[main];
-  SideWalk walk1(a[side1] + to_first * slope1, slope1, margin),
-      walk2(a[side2] + to_first * slope2, slope2, margin);
+  return {main,
+          side1,
+          side2,
+          first,
+          last,
+          {a[side1] + to_first * slope1, slope1, margin},
+          {a[side2] + to_first * slope2, slope2, margin}};
+}
+
+/// Calls visit(x, y, z) for the blocks of a walk.
+template <typename Visit>
+void forEachBlockOf(SlabWalk walk, Visit&& visit) {
   int block[3];
-  for (block[main] = first; block[main] <= last; ++block[main], walk1.advance(), walk2.advance()) {
-    const int last1 = floorOf(walk1.high), last2 = floorOf(walk2.high);
-    for (block[side1] = floorOf(walk1.low); block[side1] <= last1; ++block[side1]) {
-      for (block[side2] = floorOf(walk2.low); block[side2] <= last2; ++block[side2]) {
-        visit(block[0], block[1], block[2]);
-      }
+  int &main = block[walk.main], &side1 = block[walk.side1], &side2 = block[walk.side2];
+  for (main = walk.first; main <= walk.last; ++main, walk.walk1.advance(), walk.walk2.advance()) {
+    const int last1 = floorOf(walk.walk1.high), last2 = floorOf(walk.walk2.high);
+    for (side1 = floorOf(walk.walk1.low); side1 <= last1; ++side1) {
+      for (side2 = floorOf(walk.walk2.low); side2 <= last2; ++side2) visit(block[0], block[1], block[2]);
     }
+  }
+}
+
+/// Marks are bytes that several threads set at once, to the same value.
+bool isMarked(const std::uint8_t& mark) {
+  return __atomic_load_n(&mark, __ATOMIC_RELAXED) != 0;
+}
+void set(std::uint8_t& mark) {
+  __atomic_store_n(&mark, std::uint8_t{1}, __ATOMIC_RELAXED);
+}
+
+/// Where the mark of a block is: origin + x stride[0] + y stride[1] + z stride[2].
+struct MarkLayout {
+  std::ptrdiff_t origin, stride[3];
+};
+
+/// Marks the blocks of a walk. Most beams reach two blocks at most along each side axis of a slab. Then a
+/// slab is four marks, some of them the same, without a loop whose end the processor would have to guess; and
+/// nearly always other beams have set all four.
+void markBlocks(SlabWalk walk, const MarkLayout& layout, std::uint8_t* marks) {
+  const std::ptrdiff_t(&stride)[3] = layout.stride;
+  if (!walk.walk1.isNarrow() || !walk.walk2.isNarrow()) {
+    forEachBlockOf(walk, [&](int x, int y, int z) {
+      // Reading first avoids taking the mark's cache line from other threads.
+      std::uint8_t& mark = marks[layout.origin + x * stride[0] + y * stride[1] + z * stride[2]];
+      if (!isMarked(mark)) set(mark);
+    });
+    return;
+  }
+  const std::ptrdiff_t stride1 = stride[walk.side1], stride2 = stride[walk.side2];
+  std::ptrdiff_t slab = layout.origin + walk.first * stride[walk.main];
+  for (int n = walk.first; n <= walk.last; ++n, slab += stride[walk.main]) {
+    const std::ptrdiff_t low = slab + floorOf(walk.walk1.low) * stride1,
+                         high = slab + floorOf(walk.walk1.high) * stride1,
+                         low2 = floorOf(walk.walk2.low) * stride2, high2 = floorOf(walk.walk2.high) * stride2;
+    std::uint8_t* const four[4] = {marks + (low + low2), marks + (low + high2), marks + (high + low2),
+                                   marks + (high + high2)};
+    if (!(isMarked(*four[0]) & isMarked(*four[1]) & isMarked(*four[2]) & isMarked(*four[3]))) {
+      for (std::uint8_t* const mark : four) set(*mark);
+    }
+    walk.walk1.advance();
+    walk.walk2.advance();
   }
 }
 
 }  // namespace
 
 void BlockWalk::clearMarks(std::size_t count) {
+  constexpr std::size_t kWord = sizeof(std::uint64_t);  // insertMarked() reads whole words
   if (capacity_ < count) {
     capacity_ = 0;
     marks_ = nullptr;  // frees the old marks before allocating the new ones
-    marks_ = std::make_unique<std::atomic<std::uint8_t>[]>(count);
+    marks_ = std::make_unique<std::uint8_t[]>(count + kWord);
     capacity_ = count;
   }
-  for (std::size_t m = 0; m < count; ++m) marks_[m].store(0, std::memory_order_relaxed);
+  std::fill_n(marks_.get(), count, std::uint8_t{0});
 }
 
 void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
-  std::size_t offset = 0;
+  constexpr int kWord = sizeof(std::uint64_t);
+  const std::uint8_t* row = marks_.get();
   for (int z = 0; z < box.size.z(); ++z) {
-    for (int y = 0; y < box.size.y(); ++y) {
-      for (int x = 0; x < box.size.x(); ++x) {
-        if (marks_[offset++].load(std::memory_order_relaxed)) {
-          blocks.insert({box.low.x() + x, box.low.y() + y, box.low.z() + z});
+    for (int y = 0; y < box.size.y(); ++y, row += box.size.x()) {
+      for (int begin = 0; begin < box.size.x(); begin += kWord) {
+        std::uint64_t word;
+        __builtin_memcpy(&word, row + begin, sizeof(word));
+        if (word == 0) continue;
+        for (int x = begin; x < std::min(begin + kWord, box.size.x()); ++x) {
+          if (row[x] != 0) blocks.insert({box.low.x() + x, box.low.y() + y, box.low.z() + z});
         }
       }
     }
@@ -119,7 +185,7 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
     const std::size_t before = blocks.size();
     for (std::size_t b = 0; b < beams.ends.size(); ++b) {
       const double fraction = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
-      forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
+      forEachBlockOf(slabsAlong(geometry, segmentOf(beams, b, piece), reach), [&](int x, int y, int z) {
         blocks.insert({x, y, z});
         limitBlocks(blocks.size() - before, most, fraction);
       });
@@ -127,22 +193,17 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
     return;
   }
   const Box box{first.cast<int>(), size.cast<int>()};
-  clearMarks(static_cast<std::size_t>(size.prod()));
+  const auto count = static_cast<std::size_t>(size.prod());
+  clearMarks(count);
+  const std::ptrdiff_t row = box.size.x(), layer = row * box.size.y();
+  const MarkLayout layout = {-(box.low.x() + box.low.y() * row + box.low.z() * layer), {1, row, layer}};
   const Chunks chunks(beams.ends.size());
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-      forEachBlockAlong(geometry, segmentOf(beams, b, piece), reach, [&](int x, int y, int z) {
-        // Several threads may mark a block; reading first avoids taking its cache line from the others.
-        std::atomic<std::uint8_t>& mark = marks_[box.offsetOf(x, y, z)];
-        if (!mark.load(std::memory_order_relaxed)) mark.store(1, std::memory_order_relaxed);
-      });
+      markBlocks(slabsAlong(geometry, segmentOf(beams, b, piece), reach), layout, marks_.get());
     }
   });
-  std::size_t marked = 0;
-  for (std::size_t m = 0; m < static_cast<std::size_t>(size.prod()); ++m) {
-    marked += marks_[m].load(std::memory_order_relaxed);
-  }
-  limitBlocks(marked, most);
+  limitBlocks(std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0}), most);
   insertMarked(box, blocks);
 }
 

@@ -1,7 +1,7 @@
 /// @file Lists the blocks along beams, or around the sensor.
 #pragma once
 
-#include <atomic>
+#include <cstdint>
 #include <memory>
 
 #include "beams/beams.h"
@@ -32,13 +32,6 @@ class BlockWalk {
   /// hash table.
   struct Box {
     Eigen::Array3i low, size;
-    /// Offset of a block's mark.
-    std::size_t offsetOf(int x, int y, int z) const {
-      return static_cast<std::size_t>(x - low.x()) +
-             static_cast<std::size_t>(size.x()) *
-                 (static_cast<std::size_t>(y - low.y()) +
-                  static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(z - low.z()));
-    }
   };
 
   /// Makes `count` cleared marks.
@@ -46,7 +39,7 @@ class BlockWalk {
   /// Inserts the marked blocks in the order of their offsets, whichever thread marked them.
   void insertMarked(const Box& box, IndexNumbering& blocks) const;
 
-  std::unique_ptr<std::atomic<std::uint8_t>[]> marks_;
+  std::unique_ptr<std::uint8_t[]> marks_;  ///< x fastest
   std::size_t capacity_ = 0;
 };
 

@@ -99,13 +99,17 @@ void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBl
     const BlockIndex& index = blocks[b].index;
     sink.add(b, [&](BlockSums& sums) {
       float* const values = sums.open(kFreeClass).values;
+      const float scale = field_->kernel().scale;
+      bool some;
       if (counting) {
         countCrossings(index, own.near, values);
+        some = scaleSums(scale, values);
       } else {
-        own.group.sumsOf({coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)},
-                         values);
+        some = own.group.sumsOf(
+            {coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)}, scale,
+            values);
       }
-      if (!scaleSums(field_->kernel().scale, values)) sums.drop();
+      if (!some) sums.drop();
     });
   }
 }

@@ -30,17 +30,16 @@ void MapUpdater::setTasks(const ScanEvidence& scan) {
 }
 
 std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
-  const std::uint32_t known = touched_.find(index);
-  if (known != kNoPosition) return known;
+  const std::uint32_t position = touched_.insert(index);
+  if (position < jobs_.size()) return position;
   const SemanticMap::Claim claimed = map.claim(index);
   try {
-    touched_.insert(index);
     jobs_.push_back({index, claimed.block, nullptr, 0, claimed.is_new, claimed.shared, 0, false, 0});
   } catch (...) {
     if (claimed.is_new) map.erase(index);
     throw;
   }
-  return static_cast<std::uint32_t>(jobs_.size() - 1);
+  return position;
 }
 
 void MapUpdater::collect(SemanticMap& map, const UpdateLimits& limits, ThreadPool& pool) {

@@ -32,6 +32,9 @@ struct SumKernels {
   /// @param[in,out] counts increased. @return whether any evidence in those layers is not 0.
   bool (*add)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
   bool (*withdraw)(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumCounts& counts);
+  /// Finds the layers that add() changes a plane in, or counts something in, and those between them.
+  /// @param sums, layers as for add().
+  Block::Layers (*find_layers)(const float* sums, Block::Layers layers);
   /// Adds units to some voxels of the layers of a plane, or subtracts them; saturates likewise.
   /// @param voxels, layers a word for each of so many layers, as LayerBits. @param units 64 of them, >= 0,
   /// the same for each layer. @param[in,out] counts increased; what was saturated or negative before does not

@@ -48,6 +48,20 @@ bool addSums(const float* sums, Block::Layers layers, EvidenceUnits* plane, SumC
   return AnyTrue(any != 0);
 }
 
+inline Block::Layers findLayers(const float* sums, Block::Layers layers) {
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  const auto isNothing = [&](int layer) {
+    Mask some = {};
+    for (int v = layer * kLayer; v < (layer + 1) * kLayer; v += kLanes) {
+      some |= ~(LoadU(sums + v) < 0.5f * kEvidenceUnit);  // what is no number is something, too
+    }
+    return !AnyTrue(some);
+  };
+  while (layers.begin < layers.end && isNothing(layers.begin)) ++layers.begin;
+  while (layers.begin < layers.end && isNothing(layers.end - 1)) --layers.end;
+  return layers;
+}
+
 template <bool kWithdraws>
 bool addUnits(const std::uint64_t* voxels, int layers, const EvidenceUnits* units, EvidenceUnits* plane,
               SumCounts& counts) {
@@ -77,7 +91,7 @@ bool addUnits(const std::uint64_t* voxels, int layers, const EvidenceUnits* unit
 }
 
 constexpr SumKernels kSumKernels = {
-    kInstructionSet, addSums<false>, addSums<true>, addUnits<false>, addUnits<true>,
+    kInstructionSet, addSums<false>, addSums<true>, findLayers, addUnits<false>, addUnits<true>,
 };
 
 }  // namespace

@@ -470,8 +470,10 @@ class Tools(unittest.TestCase):
             rows = list(csv.DictReader(file))
         self.assertEqual(list(rows[0]),
                          ['mode', 'resolution', 'threads', 'median_ms', 'p99_ms', 'ratio_to_y', 'map_bytes'])
-        self.assertEqual(len(rows), 16)
+        self.assertEqual(len(rows), 22)
         self.assertTrue(all(float(row['median_ms']) > 0 for row in rows))
+        self.assertEqual([(row['mode'], row['resolution']) for row in rows[-6::2]],
+                         [('robot', '0.3'), ('robot', '0.1'), ('paper_line', '0.1')])
 
     def test_curves_are_drawn(self):
         folder = self.path('curves')

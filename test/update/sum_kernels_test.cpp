@@ -90,6 +90,34 @@ TEST(SumKernels, EqualAPlainLoopOnEachInstructionSet) {
   }
 }
 
+/// Adding in the found layers alone is adding, and there are no more of them than needed.
+TEST(SumKernels, FindTheLayersThatChange) {
+  std::mt19937 random(4);
+  const float nothing[] = {0.0f, 1e-30f, 0.49999f * kEvidenceUnit},
+              something[] = {0.5f * kEvidenceUnit, 1.0f, kInfinity, std::numeric_limits<float>::quiet_NaN()};
+  for (const std::string& set : instructionSets()) {
+    for (int first = 0; first <= kBlockEdge; ++first) {
+      for (int last = first; last <= kBlockEdge; ++last) {
+        std::vector<float> sums(kBlockVoxels);
+        for (float& sum : sums) sum = nothing[random() % std::size(nothing)];
+        if (first < last) {
+          for (const int layer : {first, last - 1}) {
+            sums[static_cast<std::size_t>(layer) * kLayer + random() % kLayer] =
+                something[random() % std::size(something)];
+          }
+        }
+        const Block::Layers found = sumKernelsFor(set).find_layers(sums.data(), {});
+        EXPECT_EQ(found.end - found.begin, last - first) << set;
+        if (first < last) {
+          EXPECT_EQ(found.begin, first) << set;
+        }
+        const Block::Layers one = sumKernelsFor(set).find_layers(sums.data(), {3, 4});
+        EXPECT_EQ(one.end - one.begin, first < last && (first == 3 || last == 4) ? 1 : 0) << set;
+      }
+    }
+  }
+}
+
 TEST(SumKernels, TakeBackWhatTheyAdded) {
   std::mt19937 random(10);
   for (const std::string& set : instructionSets()) {

@@ -33,14 +33,6 @@ void forEachRow(int row_axis, Visit&& visit) {
   }
 }
 
-/// Adds four rows of four values to four other rows, transposed.
-inline void addTransposed(const float* from, int from_row, float* to, int to_row) {
-  Float4 rows[4];
-  for (int n = 0; n < 4; ++n) rows[n] = LoadFour(from + n * from_row);
-  Transpose4(rows);
-  for (int n = 0; n < 4; ++n) AddU(rows[n], to + n * to_row);
-}
-
 /// Adds rows along x to a block's sums.
 void addRows(const float* values, float* sums) {
   forEachRow(0, [&](int row, int offset) {
@@ -48,19 +40,32 @@ void addRows(const float* values, float* sums) {
   });
 }
 
-/// Adds rows along y or z.
-void addTransposedRows(int row_axis, const float* values, float* sums) {
+/// Calls visit(four, offset) for all of a block's sums, transposed from rows along y or z to rows along x:
+/// four of them, and where they are in the block.
+template <typename Visit>
+void forEachTransposed(int row_axis, const float* values, Visit&& visit) {
   constexpr int kOffset[3] = {1, kBlockEdge, kBlockEdge * kBlockEdge};
   const int other = 3 - row_axis, from_row = GroupSums::stride(row_axis, 0), to_row = kOffset[row_axis];
   for (int n = 0; n < kBlockEdge; ++n) {
     const float* const from = values + n * GroupSums::stride(row_axis, other);
-    float* const to = sums + n * kOffset[other];
     for (int x = 0; x < kBlockEdge; x += 4) {
       for (int k = 0; k < kBlockEdge; k += 4) {
-        addTransposed(from + x * from_row + k, from_row, to + x + k * to_row, to_row);
+        Float4 rows[4];
+        for (int m = 0; m < 4; ++m) rows[m] = LoadFour(from + (x + m) * from_row + k);
+        Transpose4(rows);
+        for (int m = 0; m < 4; ++m) visit(rows[m], n * kOffset[other] + x + (k + m) * to_row);
       }
     }
   }
+}
+
+/// Scales sums; rounding can make the tail of the kernel slightly negative, which becomes 0.
+/// @param[in,out] some other than 0 if any sum is above 0.
+inline Float4 scaled(Float4 sums, float scale, Mask& some) {
+  const Float4 product = sums * scale;
+  const Mask is_some = product > 0.0f;
+  some |= is_some;
+  return is_some ? product : Float4{};
 }
 
 }  // namespace
@@ -90,16 +95,30 @@ float* GroupSums::open(int row_axis) {
   return array.values + kFirst;
 }
 
-void GroupSums::sumsOf(const std::array<int, 3>& position, float* sums) const {
-  std::fill_n(sums, kBlockVoxels, 0.0f);
+bool GroupSums::sumsOf(const std::array<int, 3>& position, float scale, float* sums) const {
+  const auto isOpen = [&](int row_axis) { return arrays_[static_cast<std::size_t>(row_axis)].is_open; };
   const auto values = [&](int row_axis) {
     return arrays_[static_cast<std::size_t>(row_axis)].values + cornerOf(row_axis, position);
   };
-  if (arrays_[0].is_open) addRows(values(0), sums);
-  for (const int row_axis : {1, 2}) {
-    if (arrays_[static_cast<std::size_t>(row_axis)].is_open)
-      addTransposedRows(row_axis, values(row_axis), sums);
+  static_assert(kLanes == 4, "a FloatVec of vec_generic.h is a Float4");
+  Mask some = {};
+  if (!isOpen(0) && isOpen(1) != isOpen(2)) {  // as nearly always
+    const int row_axis = isOpen(1) ? 1 : 2;
+    forEachTransposed(row_axis, values(row_axis),
+                      [&](Float4 four, int offset) { StoreU(scaled(four, scale, some), sums + offset); });
+    return AnyTrue(some);
   }
+  std::fill_n(sums, kBlockVoxels, 0.0f);
+  if (isOpen(0)) addRows(values(0), sums);
+  for (const int row_axis : {1, 2}) {
+    if (!isOpen(row_axis)) continue;
+    forEachTransposed(row_axis, values(row_axis),
+                      [&](Float4 four, int offset) { AddU(four, sums + offset); });
+  }
+  for (int v = 0; v < kBlockVoxels; v += kLanes) {
+    StoreU(scaled(LoadFour(sums + v), scale, some), sums + v);
+  }
+  return AnyTrue(some);
 }
 
 void GroupSums::reserve(std::size_t beams) {

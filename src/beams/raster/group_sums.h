@@ -36,9 +36,9 @@ class GroupSums {
   /// Sets the array of a row axis to 0. To be called before the array is used. @return the group's first
   /// voxel there.
   float* open(int row_axis);
-  /// Sets `sums` to those of a block that matters. @param position coordinates of the block in the group
-  /// [blocks].
-  void sumsOf(const std::array<int, 3>& position, float* sums) const;
+  /// Sets `sums` to those of a block that matters, times the scale. @param position coordinates of the block
+  /// in the group [blocks]. @return whether any of them is above 0.
+  bool sumsOf(const std::array<int, 3>& position, float scale, float* sums) const;
   /// Allocates all memory that sums over up to this many beams need.
   void reserve(std::size_t beams);
 

@@ -1,0 +1,110 @@
+// The blocks along beams are those that have a voxel centre within reach of a beam, and few others; whatever
+// the number of threads, in the same order.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "beams/block_walk.h"
+
+namespace bki_mapping {
+namespace {
+
+/// Distance of a point from the beam from the origin to `end` [m].
+double distanceOf(const Eigen::Vector3d& point, const Eigen::Vector3d& origin, const Eigen::Vector3f& end) {
+  const Eigen::Vector3d p = point - origin, d = end.cast<double>();
+  const double along = d.squaredNorm() > 0.0 ? std::clamp(p.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
+  return (p - along * d).norm();
+}
+
+/// Whether a block has a voxel centre within reach of a beam.
+bool isReached(const GridGeometry& geometry, const BlockIndex& block, const Beams& beams, double reach) {
+  for (int v = 0; v < kBlockVoxels; ++v) {
+    const Eigen::Vector3d centre = geometry.voxelCentre(GridGeometry::voxelOf(block, v));
+    if (distanceOf(centre, beams.origin, beams.ends[0]) < reach) return true;
+  }
+  return false;
+}
+
+Beams randomBeams(std::mt19937& random, int count) {
+  std::uniform_real_distribution<float> metres(-9.0f, 9.0f);
+  Beams beams;
+  beams.origin = {0.37, -12.6, 1.7};
+  for (int n = 0; n < count; ++n) beams.ends.emplace_back(metres(random), metres(random), metres(random));
+  // Along axes and diagonals, where slopes are 0 and 1; without length.
+  for (const Eigen::Vector3f& end :
+       {Eigen::Vector3f(8, 0, 0), Eigen::Vector3f(0, -8, 0), Eigen::Vector3f(0, 0, 8),
+        Eigen::Vector3f(6, 6, 0), Eigen::Vector3f(-5, 5, -5), Eigen::Vector3f(0, 0, 0)}) {
+    beams.ends.push_back(end);
+  }
+  return beams;
+}
+
+/// Reaches with which beams extend over two blocks across a slab at most, and with which over more.
+TEST(BlockWalk, ListsTheBlocksAlongBeams) {
+  std::mt19937 random(5);
+  const GridGeometry geometry(0.3);
+  for (const double reach : {0.05, 0.3, 0.9, 3.0}) {
+    const Beams all = randomBeams(random, 20);
+    for (const Eigen::Vector3f& end : all.ends) {
+      const Beams beams = {all.origin, {end}};
+      ThreadPool pool(1);
+      IndexNumbering listed;
+      BlockWalk().insertBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, listed);
+      const BlockIndex centre = GridGeometry::blockOf(geometry.voxelAt(all.origin));
+      for (int n = 0; n < 15 * 15 * 15; ++n) {
+        const BlockIndex block{
+            {centre.x + n % 15 - 7, centre.y + n / 15 % 15 - 7, centre.z + n / (15 * 15) - 7}};
+        const bool is_listed = listed.find(block) != kNoPosition;
+        const double distance = distanceOf(geometry.blockCentre(block), beams.origin, end);
+        if (distance < reach + geometry.blockSize()) {  // others cannot be reached
+          EXPECT_TRUE(is_listed || !isReached(geometry, block, beams, reach))
+              << reach << ", " << end.transpose();
+        }
+        EXPECT_TRUE(!is_listed || distance < 3.0 * (reach + geometry.blockSize())) << distance;
+      }
+    }
+  }
+}
+
+TEST(BlockWalk, DoesNotDependOnThreads) {
+  std::mt19937 random(6);
+  const GridGeometry geometry(0.1);
+  const Beams beams = randomBeams(random, 5000);
+  for (const double reach : {0.1, 0.3}) {
+    std::vector<GridIndex> expected;
+    for (const int threads : {1, 2, 5}) {
+      ThreadPool pool(threads);
+      IndexNumbering listed;
+      BlockWalk walk;
+      for (int scan = 0; scan < 2; ++scan) {  // marks of the scan before are gone
+        listed.clear();
+        walk.insertBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, listed);
+      }
+      if (threads == 1) expected = listed.members();
+      EXPECT_EQ(listed.members(), expected) << threads;
+    }
+    EXPECT_GT(expected.size(), 1000u);
+  }
+}
+
+/// What beams list together is what they list one by one.
+TEST(BlockWalk, ListsEachBlockOfAnyBeamOnce) {
+  std::mt19937 random(7);
+  const GridGeometry geometry(0.3);
+  const Beams beams = randomBeams(random, 300);
+  ThreadPool pool(2);
+  BlockWalk walk;
+  IndexNumbering together, one_by_one;
+  walk.insertBlocksAlong(geometry, beams, BeamPiece(), 0.3, 1 << 20, pool, together);
+  for (const Eigen::Vector3f& end : beams.ends) {
+    walk.insertBlocksAlong(geometry, {beams.origin, {end}}, BeamPiece(), 0.3, 1 << 20, pool, one_by_one);
+  }
+  ASSERT_EQ(together.size(), one_by_one.size());
+  for (const GridIndex& block : together.members()) EXPECT_NE(one_by_one.find(block), kNoPosition);
+  EXPECT_THROW(walk.insertBlocksAlong(geometry, beams, BeamPiece(), 0.3, together.size() - 1, pool, together),
+               TooMuchWork);
+}
+
+}  // namespace
+}  // namespace bki_mapping
