@@ -101,7 +101,7 @@ class CellMarkers : public MapPublisher {
     StreamedMarkers message;
     appendRegions(regions.members(), snapshot, message);
     forgetEmpty(regions.members(), snapshot);
-    if (message.count() > 0) publisher_.publish(message);
+    if (message.markers.count() > 0) publisher_.publish(message);
   }
 
   /// A message that must not outlive the snapshot.
@@ -111,7 +111,7 @@ class CellMarkers : public MapPublisher {
     clear.frame.action = Marker::DELETEALL;
     clear.frame.pose.orientation.w = 1.0;
     StreamedMarkers message;
-    message.groups.push_back({{clear}, nullptr});
+    message.markers.groups.push_back({{clear}, nullptr});
     for (const auto& entry : snapshot.map.entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
     for (auto& [index, region] : regions_) {
@@ -162,6 +162,7 @@ class CellMarkers : public MapPublisher {
   /// Appends the markers of regions. Several threads count their voxels.
   void appendRegions(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot,
                      StreamedMarkers& message) {
+    MarkerGroups& appended = message.markers;
     std::vector<Region*> regions;
     for (const GridIndex& index : indices) {
       regions.push_back(&regionAt(index)->second);
@@ -169,15 +170,15 @@ class CellMarkers : public MapPublisher {
     }
     std::vector<Cells> cells(indices.size());
     constexpr std::size_t kBlocks = 64;  // of a street, in a region; there is room for 512
-    message.threads = snapshot.threadsFor(kBlocks * indices.size());
-    ThreadPool pool(message.threads);
+    appended.threads = snapshot.threadsFor(kBlocks * indices.size());
+    ThreadPool pool(appended.threads);
     pool.forEachInOrder(indices.size(), [&](std::size_t r, std::size_t) {
       cells[r].origin = floatOrigin(centreOf(indices[r], snapshot), snapshot.map.geometry().resolution());
       if (regions[r]->in_view) count(indices[r], snapshot, cells[r]);
     });
     for (std::size_t r = 0; r < indices.size(); ++r) {
       MarkerGroup markers = markersOf(std::move(cells[r]), snapshot, *regions[r]);
-      if (!markers.markers.empty()) message.groups.push_back(std::move(markers));
+      if (!markers.markers.empty()) appended.groups.push_back(std::move(markers));
     }
   }
 

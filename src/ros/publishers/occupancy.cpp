@@ -9,7 +9,9 @@ namespace {
 template <typename Message>
 void fillMap(const MapSnapshot& snapshot, Message& message) {
   for (const SemanticClass& c : snapshot.classes.classes()) message.classes.push_back(toMessage(c));
-  message.blocks = {&snapshot, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
+  message.blocks.map = &snapshot;
+  message.blocks.blocks = sortedBlocks(snapshot.map);
+  message.blocks.threads = snapshot.threadsFor(snapshot.map.size());
 }
 
 class Occupancy : public MapPublisher {
