@@ -137,10 +137,7 @@ int measure(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("benchmark_sequence", [&] {
-    const auto given = tools::parse(
-        argc, argv, "Times every mode on a sequence, in ratios to pcl::VoxelGrid at 0.1 m in the same run.",
-        options());
-    return given ? measure(*given) : 0;
-  });
+  return tools::run(argc, argv, "benchmark_sequence",
+                    "Times every mode on a sequence, in ratios to pcl::VoxelGrid at 0.1 m in the same run.",
+                    options(), measure);
 }

@@ -340,9 +340,6 @@ int evaluate(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("evaluate_map", [&] {
-    const auto given =
-        tools::parse(argc, argv, "Maps a sequence and measures the quality of the map.", options());
-    return given ? evaluate(*given) : 0;
-  });
+  return tools::run(argc, argv, "evaluate_map", "Maps a sequence and measures the quality of the map.",
+                    options(), evaluate);
 }

@@ -15,29 +15,25 @@ using namespace bki_mapping;
 namespace fs = std::filesystem;
 namespace po = tools::po;
 
-/// An option with a default. @param name of its value in the help text.
-template <typename T>
-auto value(const char* name, T standard) {
-  return po::value<T>()->value_name(name)->default_value(standard);
-}
-
 po::options_description options() {
   const simulation::CityConfig city;
   const simulation::LidarConfig& lidar = city.drive.lidar;
   po::options_description options("Options");
   options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
-      "drives", value("N", city.drives), "number of drives")("blocks", value("N", city.blocks),
-                                                             "blocks of houses along each side of the city")(
-      "block-edge", value("M", city.block_edge), "distance between the axes of parallel streets [m]")(
-      "scans", value("N", city.drive.scans), "number of scans of each drive")(
-      "speed", value("M/S", city.drive.speed), "speed of the drives [m/s]")(
-      "lidar", value<std::string>("NAME", "hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
+      "drives", tools::optionWith("N", city.drives), "number of drives")(
+      "blocks", tools::optionWith("N", city.blocks), "blocks of houses along each side of the city")(
+      "block-edge", tools::optionWith("M", city.block_edge),
+      "distance between the axes of parallel streets [m]")("scans", tools::optionWith("N", city.drive.scans),
+                                                           "number of scans of each drive")(
+      "speed", tools::optionWith("M/S", city.drive.speed), "speed of the drives [m/s]")(
+      "lidar", tools::textOption("NAME")->default_value("hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
-      "columns", value("N", lidar.columns), "azimuth steps per revolution")(
-      "rate", value("HZ", lidar.rate), "scans per second")("max-range", value("M", lidar.max_range),
-                                                           "range beyond which there is no return [m]")(
-      "range-noise", value("M", lidar.range_noise), "standard deviation of the ranges [m]")(
-      "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
+      "columns", tools::optionWith("N", lidar.columns), "azimuth steps per revolution")(
+      "rate", tools::optionWith("HZ", lidar.rate), "scans per second")(
+      "max-range", tools::optionWith("M", lidar.max_range), "range beyond which there is no return [m]")(
+      "range-noise", tools::optionWith("M", lidar.range_noise), "standard deviation of the ranges [m]")(
+      "label-noise", tools::optionWith("FRACTION", lidar.label_noise),
+      "fraction of points with a wrong label")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
       "seed of the city, the drives and the noise");
   return options;
@@ -89,9 +85,7 @@ int simulate(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("simulate_city", [&] {
-    const auto given = tools::parse(
-        argc, argv, "Writes simulated drives through one city, with raw labels of SemanticKITTI.", options());
-    return given ? simulate(*given) : 0;
-  });
+  return tools::run(argc, argv, "simulate_city",
+                    "Writes simulated drives through one city, with raw labels of SemanticKITTI.", options(),
+                    simulate);
 }

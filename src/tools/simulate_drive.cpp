@@ -12,32 +12,28 @@ namespace {
 using namespace bki_mapping;
 namespace po = tools::po;
 
-/// An option with a default. @param name of its value in the help text.
-template <typename T>
-auto value(const char* name, T standard) {
-  return po::value<T>()->value_name(name)->default_value(standard);
-}
-
 po::options_description options() {
   const simulation::LidarConfig lidar;
   po::options_description options("Options");
   options.add_options()("output", po::value<std::string>()->value_name("DIR")->required(), "output folder")(
-      "scene", value<std::string>("KIND", "street"),
+      "scene", tools::textOption("KIND")->default_value("street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
       "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop, trolleys "
       "that "
-      "are left")("scans", value<int>("N", 100), "number of scans")(
-      "lidar", value<std::string>("NAME", "hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
+      "are left")("scans", tools::optionWith("N", 100), "number of scans")(
+      "lidar", tools::textOption("NAME")->default_value("hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
-      "columns", value("N", lidar.columns), "azimuth steps per revolution")(
-      "rate", value("HZ", lidar.rate), "revolutions per second")("max-range", value("M", lidar.max_range),
-                                                                 "range beyond which there is no return [m]")(
-      "range-noise", value("M", lidar.range_noise), "standard deviation of the ranges [m]")(
-      "label-noise", value("FRACTION", lidar.label_noise), "fraction of points with a wrong label")(
+      "columns", tools::optionWith("N", lidar.columns), "azimuth steps per revolution")(
+      "rate", tools::optionWith("HZ", lidar.rate), "revolutions per second")(
+      "max-range", tools::optionWith("M", lidar.max_range), "range beyond which there is no return [m]")(
+      "range-noise", tools::optionWith("M", lidar.range_noise), "standard deviation of the ranges [m]")(
+      "label-noise", tools::optionWith("FRACTION", lidar.label_noise),
+      "fraction of points with a wrong label")(
       "speed", po::value<double>()->value_name("M/S"),
       "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1")(
-      "height", value("M", simulation::DriveConfig().height), "height of the sensor above the ground [m]")(
-      "layout", value<std::string>("NAME", "semantic_kitti"),
+      "height", tools::optionWith("M", simulation::DriveConfig().height),
+      "height of the sensor above the ground [m]")(
+      "layout", tools::textOption("NAME")->default_value("semantic_kitti"),
       "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
       "seed of the street and of the noise");
@@ -109,9 +105,6 @@ int simulate(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("simulate_drive", [&] {
-    const auto given =
-        tools::parse(argc, argv, "Writes a simulated drive with raw labels of SemanticKITTI.", options());
-    return given ? simulate(*given) : 0;
-  });
+  return tools::run(argc, argv, "simulate_drive",
+                    "Writes a simulated drive with raw labels of SemanticKITTI.", options(), simulate);
 }
