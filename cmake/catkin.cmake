@@ -14,7 +14,7 @@ generate_dynamic_reconfigure_options(cfg/Mapping.cfg)
 
 catkin_package(
   INCLUDE_DIRS include
-  LIBRARIES bki_mapping_mapping bki_mapping_io
+  LIBRARIES bki_mapping_mapping bki_mapping_city bki_mapping_export
   CATKIN_DEPENDS diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_runtime nav_msgs nodelet roscpp
     rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros topic_tools visualization_msgs
   DEPENDS EIGEN3

@@ -48,7 +48,7 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
     tf_jumps.cpp
-  LINK bki_mapping_io bki_mapping_query pcl_common ${catkin_LIBRARIES})
+  LINK bki_mapping_city bki_mapping_export pcl_common ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
@@ -82,9 +82,7 @@ bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 add_executable(print_parameters src/tools/print_parameters.cpp)
 bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
-add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
-bki_mapping_tool(benchmark_publishing bki_mapping_ros)
-foreach(name play_sequence sequence_to_bag print_parameters benchmark_publishing)
+foreach(name play_sequence sequence_to_bag print_parameters)
   bki_mapping_uses_ros(${name})
 endforeach()
 
@@ -94,12 +92,8 @@ install(TARGETS bki_mapping_nodelets
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-if(BKI_MAPPING_LONG_TESTS)
-  install(TARGETS benchmark_publishing RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-endif()
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
 catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py scripts/play_bag.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 

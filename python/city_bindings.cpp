@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "arrays.h"
-#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/city/tiled_map.h"
 #include "class_bindings.h"
 #include "map_bindings.h"
 

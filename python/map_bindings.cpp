@@ -11,11 +11,11 @@
 
 #include "arrays.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/export/map_export.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "class_bindings.h"
-#include "io/export_file.h"
+#include "export/export_file.h"
 #include "query_bindings.h"
 
 namespace bki_mapping::python {

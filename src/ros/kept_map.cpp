@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "store/drive_overlap.h"
 
 namespace bki_mapping::ros_interface {

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <new>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "ros/cloud_frame.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"

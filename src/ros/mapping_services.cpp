@@ -1,9 +1,9 @@
 // The services of the mapping server.
 #include <chrono>
 
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/city/tiled_map.h"
+#include "bki_mapping/export/map_export.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "ros/mapping_server.h"
 #include "ros/queued_call.h"

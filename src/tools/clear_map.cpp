@@ -2,8 +2,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "tools/options.h"
 

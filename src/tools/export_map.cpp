@@ -4,11 +4,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/tiled_map.h"
-#include "io/export_file.h"
-#include "io/trajectory_file.h"
+#include "bki_mapping/export/map_export.h"
+#include "export/export_file.h"
+#include "sequence/trajectory_file.h"
 #include "tools/options.h"
 
 namespace {

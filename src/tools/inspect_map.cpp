@@ -11,11 +11,11 @@
 #include <tuple>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "io/map_picture.h"
-#include "io/map_statistics.h"
+#include "export/map_picture.h"
+#include "export/map_statistics.h"
 #include "tools/options.h"
 
 namespace {

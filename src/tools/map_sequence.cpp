@@ -6,15 +6,15 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/sequence.h"
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/export/map_export.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/sequence/sequence.h"
+#include "bki_mapping/settings/yaml.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "io/cleaned_points.h"
-#include "io/label_watch.h"
+#include "export/cleaned_points.h"
+#include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 #include "tools/interruption.h"
 #include "tools/run_report.h"

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_merge.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "tools/interruption.h"
 #include "tools/options.h"

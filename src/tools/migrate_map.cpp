@@ -4,7 +4,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "store/schema.h"
 #include "tools/options.h"
 

@@ -8,9 +8,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/io/tiled_map.h"
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "tools/interruption.h"
 
 namespace bki_mapping::tools {

@@ -5,13 +5,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/tiled_map.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/stopwatch.h"
-#include "io/map_picture.h"
-#include "io/map_statistics.h"
+#include "export/map_picture.h"
+#include "export/map_statistics.h"
 #include "tools/options.h"
 #include "tools/point_file.h"
 #include "tools/point_query.h"

@@ -7,10 +7,10 @@
 #include <set>
 #include <tuple>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "free_space/registry.h"
 #include "other_value.h"
 #include "reference/scenes.h"

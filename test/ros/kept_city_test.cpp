@@ -7,8 +7,8 @@
 #include <set>
 #include <thread>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "ros/kept_map.h"
 #include "store/file_content.h"
 #include "store/kept_mapper.h"

@@ -10,7 +10,7 @@ import unittest
 import unittest.mock
 
 SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
-sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
+sys.path.insert(0, os.path.join(SOURCE, 'lab'))
 
 import matplotlib  # noqa: E402
 matplotlib.use('Agg')

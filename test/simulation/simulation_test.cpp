@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <set>
 
+#include "simulation/drive_file.h"
 #include "simulation/lidar.h"
+#include "temporary_folder.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -189,6 +192,14 @@ TEST(Drive, RefusesAStreetWithoutEnd) {
   DriveConfig config{100, 8.0, 1, smallLidar()};
   config.lidar.rate = 1e-9;
   EXPECT_THROW(Drive{config}, std::invalid_argument);
+}
+
+TEST(DriveFile, IsReadAsAllUntrustedYaml) {
+  const TemporaryFolder folder;
+  for (const char* text : {"a: &a {b: *a}\n", "scans: 1\nscans: 2\n"}) {
+    std::ofstream(folder / "simulation.yaml") << text;
+    EXPECT_THROW(readDriveFile(folder / ""), std::runtime_error) << text;
+  }
 }
 
 TEST(Drive, IsRepeatableAndStartsAtTheMapsOrigin) {

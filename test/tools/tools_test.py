@@ -482,7 +482,7 @@ class Tools(unittest.TestCase):
         for name, table in tables.items():
             with open(os.path.join(folder, name + '.csv'), 'w') as file:
                 file.write(table)
-        script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'scripts', 'plot_curves.py')
+        script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'lab', 'tools', 'plot_curves.py')
         subprocess.run(['/usr/bin/python3', script, folder], check=True, capture_output=True, timeout=120)
         for name in tables:
             with open(os.path.join(folder, name + '.png'), 'rb') as file:

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "io/voxel_pcl.h"
-#include "io/voxel_points.h"
+#include "export/voxel_pcl.h"
+#include "export/voxel_points.h"
 #include "ros/cloud_frame.h"
 #include "ros/map_snapshot.h"
 #include "streamed_message.h"
