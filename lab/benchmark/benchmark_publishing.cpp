@@ -23,7 +23,7 @@ namespace {
 
 using namespace bki_mapping;
 using namespace bki_mapping::ros_interface;
-using Snapshot = bki_mapping::ros_interface::MapSnapshot;  // there is another in the core
+using Snapshot = bki_mapping::ros_interface::ServerSnapshot;  // there is another in the core
 namespace po = tools::po;
 
 po::options_description options() {

@@ -69,8 +69,9 @@ class CellMarkers : public MapPublisher {
   CellMarkers(const PublisherContext& context, const std::string& topic, VoxelState state, float alpha)
       : state_(state), alpha_(alpha) {
     publisher_ = context.advertiseUpdates<StreamedMarkers>(
-        topic, *this,
-        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
+        topic, *this, [this](const auto& subscriber, const ServerSnapshot& snapshot) {
+          subscriber.publish(whole(snapshot));
+        });
   }
 
   void rest() override {
@@ -88,7 +89,7 @@ class CellMarkers : public MapPublisher {
   };
   using Regions = std::map<GridIndex, Region>;
 
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     if (changed.all()) {
       publisher_.publish(whole(snapshot));
       return;
@@ -105,7 +106,7 @@ class CellMarkers : public MapPublisher {
   }
 
   /// A message that must not outlive the snapshot.
-  StreamedMarkers whole(const MapSnapshot& snapshot) {
+  StreamedMarkers whole(const ServerSnapshot& snapshot) {
     StreamedMarker clear;
     clear.frame.header = snapshot.header;
     clear.frame.action = Marker::DELETEALL;
@@ -137,7 +138,7 @@ class CellMarkers : public MapPublisher {
 
   /// Forgets regions without a block and frees their ids. To be called after the message is complete: it
   /// still deletes the markers with these ids, so that only the next message may use them again.
-  void forgetEmpty(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot) {
+  void forgetEmpty(const std::vector<GridIndex>& indices, const ServerSnapshot& snapshot) {
     for (const GridIndex& index : indices) {
       bool any = false;
       for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge && !any; ++n) {
@@ -149,18 +150,18 @@ class CellMarkers : public MapPublisher {
     }
   }
 
-  static double edgeOf(const MapSnapshot& snapshot) {
+  static double edgeOf(const ServerSnapshot& snapshot) {
     return kRegionEdge * snapshot.map.geometry().blockSize();
   }
-  static Eigen::Vector3d centreOf(const GridIndex& region, const MapSnapshot& snapshot) {
+  static Eigen::Vector3d centreOf(const GridIndex& region, const ServerSnapshot& snapshot) {
     return Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edgeOf(snapshot);
   }
-  bool inView(const GridIndex& region, const MapSnapshot& snapshot) const {
+  bool inView(const GridIndex& region, const ServerSnapshot& snapshot) const {
     return snapshot.inView(centreOf(region, snapshot), edgeOf(snapshot));
   }
 
   /// Appends the markers of regions. Several threads count their voxels.
-  void appendRegions(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot,
+  void appendRegions(const std::vector<GridIndex>& indices, const ServerSnapshot& snapshot,
                      StreamedMarkers& message) {
     MarkerGroups& appended = message.markers;
     std::vector<Region*> regions;
@@ -184,7 +185,7 @@ class CellMarkers : public MapPublisher {
 
   /// Calls visit(offset, z) for the voxels of a block that are shown.
   template <typename Visit>
-  void forEachShown(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
+  void forEachShown(const BlockIndex& index, const BlockView& view, const ServerSnapshot& snapshot,
                     const Visit& visit) const {
     const double edge = snapshot.map.geometry().resolution();
     constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;
@@ -204,7 +205,7 @@ class CellMarkers : public MapPublisher {
     std::array<std::uint32_t, 256> of_label{};  ///< number of voxels
   };
 
-  void count(const GridIndex& region, const MapSnapshot& snapshot, Cells& cells) const {
+  void count(const GridIndex& region, const ServerSnapshot& snapshot, Cells& cells) const {
     BlockView view;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
@@ -221,7 +222,7 @@ class CellMarkers : public MapPublisher {
   }
 
   /// The markers of a region, and the deletion of those that have become empty.
-  MarkerGroup markersOf(Cells cells, const MapSnapshot& snapshot, Region& region) const {
+  MarkerGroup markersOf(Cells cells, const ServerSnapshot& snapshot, Region& region) const {
     MarkerGroup group;
     const auto append = [&](ClassId label, std::int32_t action) {
       group.markers.push_back({emptyMarker(snapshot, label, cells.origin), cells.of_label[label]});
@@ -252,7 +253,7 @@ class CellMarkers : public MapPublisher {
     return group;
   }
 
-  void writeCubes(const BlockIndex& index, const Block& block, const MapSnapshot& snapshot,
+  void writeCubes(const BlockIndex& index, const Block& block, const ServerSnapshot& snapshot,
                   const Eigen::Vector3d& origin, const std::array<CubeWriter*, 256>& of_label) const {
     const ColorMode mode = snapshot.config.color_mode;
     const double edge = snapshot.map.geometry().resolution();
@@ -269,7 +270,7 @@ class CellMarkers : public MapPublisher {
     });
   }
 
-  Marker emptyMarker(const MapSnapshot& snapshot, ClassId label, const Eigen::Vector3d& origin) const {
+  Marker emptyMarker(const ServerSnapshot& snapshot, ClassId label, const Eigen::Vector3d& origin) const {
     const SemanticClass* known = snapshot.classes.find(label);
     Marker marker;
     marker.header = snapshot.header;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "bki_mapping/rules/map_snapshot.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "streamed_message.h"
 
@@ -26,7 +27,7 @@ struct OccupancyBlocks {
     });
   }
 
-  const bki_mapping::MapSnapshot* map = nullptr;
+  const MapSnapshot* map = nullptr;
   std::vector<std::pair<BlockIndex, const Block*>> blocks;
   int threads = 1;  ///< that write
 

@@ -12,7 +12,7 @@
 #include "export/voxel_pcl.h"
 #include "export/voxel_points.h"
 #include "ros/cloud_frame.h"
-#include "ros/map_snapshot.h"
+#include "ros/server_snapshot.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
@@ -22,7 +22,7 @@ class CloudData {
  public:
   CloudData() = default;  ///< no points
   /// Counts the points. @param snapshot must outlive this. @param origin of the coordinates [m].
-  CloudData(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+  CloudData(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
             const Eigen::Vector3d& origin)
       : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))), origin_(origin) {}
 
@@ -35,7 +35,7 @@ class CloudData {
 
  private:
   struct Content {
-    Content(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+    Content(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
         : pool(snapshot.threadsFor(blocks.size())),
           points(snapshot.map, snapshot.rules, snapshot.classes, selection, std::move(blocks), pool) {}
 
@@ -53,7 +53,7 @@ struct CloudFields {
 
   CloudFields() = default;
   /// @param snapshot must outlive this. @param in the frame of the cloud.
-  CloudFields(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+  CloudFields(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
               const CloudFrame& in)
       : data(snapshot, selection, std::move(blocks), in.origin()) {
     pcl_conversions::fromPCL(pclHeader(data.points()), frame);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/core/class_table.h"
-#include "bki_mapping/rules/state_rules.h"
+#include "bki_mapping/rules/map_snapshot.h"
 #include "parallel/thread_pool.h"
 #include "ros/server_config.h"
 
@@ -21,7 +21,7 @@ struct SensorPose {
 };
 
 /// The state of the server between two scans, from which messages and files are made in other threads.
-struct MapSnapshot : bki_mapping::MapSnapshot {
+struct ServerSnapshot : MapSnapshot {
   std_msgs::Header header;             ///< map frame, stamp of the last scan
   const ClassTable& classes;           ///< the server's; never changes
   std::vector<SensorPose> trajectory;  ///< in the order of integration
