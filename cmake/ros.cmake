@@ -2,7 +2,9 @@
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
     beam_grid.cpp
-    city_loader.cpp cloud_conversion.cpp
+    city_loader.cpp
+    city_tiles.cpp
+    cloud_conversion.cpp
     cloud_frame.cpp
     clock_offset.cpp
     color_reader.cpp
@@ -14,11 +16,14 @@ bki_mapping_room(ros SOURCES
     live_settings.cpp
     reconfigure_server.cpp
     load_advice.cpp
+    map_file_settings.cpp
     publisher_set.cpp
     mapping_diagnostics.cpp
     mapping_server.cpp
     mapping_services.cpp
+    new_drive.cpp
     no_returns.cpp
+    periodic_save.cpp
     point_account.cpp
     point_field.cpp
     point_times.cpp

@@ -7,6 +7,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
 #include "ros/cloud_frame.h"
+#include "ros/map_file_settings.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"
 
@@ -117,7 +118,7 @@ void MappingServer::subscribe() {
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
-  KeptMap::checkSettings(server);
+  checkMapFileSettings(server);
   mapper_->reconfigure(mapper);
   config_ = server;
   const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
