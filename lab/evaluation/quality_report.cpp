@@ -7,13 +7,10 @@
 
 #include "bki_mapping/core/named_parameter.h"
 
-namespace bki_mapping::tools {
+namespace bki_mapping {
 namespace {
 
 using Json = nlohmann::json;
-using simulation::Proportion;
-using simulation::SpaceQuality;
-using simulation::TruthQuality;
 
 /// The figures of SpaceQuality by name.
 struct SpaceFigure {
@@ -319,4 +316,4 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
   return figures.dump(2) + "\n";
 }
 
-}  // namespace bki_mapping::tools
+}  // namespace bki_mapping

@@ -12,7 +12,7 @@
 #include "evaluation/semantic_evaluation.h"
 #include "evaluation/truth_evaluation.h"
 
-namespace bki_mapping::tools {
+namespace bki_mapping {
 
 /// The same map, with its states decided by other settings.
 struct JudgedMap {
@@ -27,7 +27,7 @@ struct MapQuality {
   SemanticQuality semantics;
   Reliability occupancy;                           ///< by the points, see OccupancyEvaluation
   std::optional<CloudQuality> cloud;               ///< compared with a ground-truth cloud
-  std::optional<simulation::TruthQuality> truth;   ///< only for simulated drives
+  std::optional<TruthQuality> truth;               ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< median time of a scan [ms]
   bool labels_are_ids = false;                     ///< so that it is unknown what moves
@@ -41,4 +41,4 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes);
 /// JSON; docs/files.md describes it. Fractions of nothing are null.
 std::string qualityJson(const MapQuality& quality, const ClassTable& classes);
 
-}  // namespace bki_mapping::tools
+}  // namespace bki_mapping

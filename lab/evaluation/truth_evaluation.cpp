@@ -7,7 +7,7 @@
 #include "bki_mapping/rules/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
-namespace bki_mapping::simulation {
+namespace bki_mapping {
 namespace {
 
 /// A voxel is mostly empty if less than this fraction of it is inside of something.
@@ -81,7 +81,7 @@ bool TruthEvaluation::isGhost(const VoxelIndex& index, double time) const {
   return true;
 }
 
-ClassId TruthEvaluation::classOf(const VoxelContent& content) const {
+ClassId TruthEvaluation::classOf(const simulation::VoxelContent& content) const {
   return content.label ? classes_.classOfRaw(*content.label).value_or(kFreeClass) : kFreeClass;
 }
 
@@ -124,7 +124,7 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& 
   forEachKnownVoxel(map, rules, [&](const VoxelIndex& index, const VoxelView& view) {
     if (view.state != VoxelState::kFree && view.state != VoxelState::kOccupied) return;
     const std::size_t bin = distanceBin(index);
-    const VoxelContent content = truth_.contentAt(index, time);
+    const simulation::VoxelContent content = truth_.contentAt(index, time);
     const ClassId truth = classOf(content);
     if (view.state == VoxelState::kFree) {
       add(&SpaceQuality::free_precision, bin, content.filled < kMostlyEmpty);
@@ -140,4 +140,4 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& 
   return quality;
 }
 
-}  // namespace bki_mapping::simulation
+}  // namespace bki_mapping

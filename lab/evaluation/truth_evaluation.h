@@ -11,7 +11,7 @@
 #include "evaluation/semantic_evaluation.h"
 #include "simulation/voxel_truth.h"
 
-namespace bki_mapping::simulation {
+namespace bki_mapping {
 
 /// A number of voxels, and how many of them are classified correctly.
 struct Proportion {
@@ -57,7 +57,7 @@ struct TruthQuality {
 class TruthEvaluation {
  public:
   /// @param classes must outlive this.
-  TruthEvaluation(VoxelTruth truth, const ClassTable& classes)
+  TruthEvaluation(simulation::VoxelTruth truth, const ClassTable& classes)
       : truth_(std::move(truth)), geometry_(truth_.geometry()), classes_(classes) {}
 
   /// Whether something that can move is in a voxel. @param time since the start of the drive [s].
@@ -82,9 +82,9 @@ class TruthEvaluation {
   bool isMovable(std::uint32_t raw_label) const;
   bool isGhost(const VoxelIndex& index, double time) const;
   /// The true class of a voxel; kFreeClass if it is empty.
-  ClassId classOf(const VoxelContent& content) const;
+  ClassId classOf(const simulation::VoxelContent& content) const;
 
-  VoxelTruth truth_;
+  simulation::VoxelTruth truth_;
   GridGeometry geometry_;
   const ClassTable& classes_;
   std::vector<Eigen::Vector3d> origins_;  ///< of all scans
@@ -93,4 +93,4 @@ class TruthEvaluation {
   std::size_t ghosts_ = 0, moments_ = 0;
 };
 
-}  // namespace bki_mapping::simulation
+}  // namespace bki_mapping

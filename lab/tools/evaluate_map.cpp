@@ -75,7 +75,7 @@ struct Evaluation {
   PresenceEvaluation presence;
   SemanticEvaluation semantics;
   OccupancyEvaluation occupancy;
-  std::optional<simulation::TruthEvaluation> truth;
+  std::optional<TruthEvaluation> truth;
   std::optional<CloudEvaluation> cloud;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
@@ -113,10 +113,10 @@ struct Evaluation {
     return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
   }
 
-  tools::MapQuality compare(const SemanticMapper& mapper) const {
+  MapQuality compare(const SemanticMapper& mapper) const {
     const SemanticMap& map = mapper.map();
     const StateRules& rules = mapper.rules();
-    tools::MapQuality quality;
+    MapQuality quality;
     quality.dynamics = dynamics.compare(map, rules, taken());
     quality.presence = presence.quality();
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
@@ -313,7 +313,7 @@ int evaluate(const po::variables_map& given) {
     std::cerr << "evaluate_map: the ground-truth cloud covers all scans, so the map of these is not compared "
                  "with it\n";
   }
-  tools::MapQuality quality = evaluation.compare(mapper);
+  MapQuality quality = evaluation.compare(mapper);
   quality.median_ms = quantile(times, 0.5);
   quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
   const std::string errors = given.count("errors") ? evaluation.errorRows(mapper) : "";
@@ -322,9 +322,9 @@ int evaluate(const po::variables_map& given) {
     quality.judged.push_back(
         {other.settings, evaluation.dynamics.compare(mapper.map(), mapper.rules(), evaluation.taken())});
   }
-  std::cout << tools::qualityTable(quality, mapper.classes());
+  std::cout << qualityTable(quality, mapper.classes());
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(), tools::qualityJson(quality, mapper.classes()));
+    writeTextFile(given["json"].as<std::string>(), qualityJson(quality, mapper.classes()));
   }
   if (given.count("errors")) {
     drawErrors(given["errors"].as<std::string>(), errors);
