@@ -2,13 +2,21 @@
 # library. It may use only what it links; the linker refuses the rest.
 
 # bki_mapping_room(NAME [FOLDER folder] SOURCES file... [LINK target...]): the library bki_mapping_NAME from files in
-# src/NAME, or in the folder. Includes begin with the name of the room.
+# src/NAME, or in the folder; a pattern with * stands for all files of a folder to which others are often added. Includes begin
+# with the name of the room.
 function(bki_mapping_room room)
   cmake_parse_arguments(arg "" "FOLDER" "SOURCES;LINK" ${ARGN})
   if(NOT arg_FOLDER)
     set(arg_FOLDER src/${room})
   endif()
   list(TRANSFORM arg_SOURCES PREPEND "${arg_FOLDER}/")
+  set(patterns ${arg_SOURCES})
+  list(FILTER patterns INCLUDE REGEX "[*]")
+  list(FILTER arg_SOURCES EXCLUDE REGEX "[*]")
+  foreach(pattern ${patterns})
+    file(GLOB files RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${pattern})
+    list(APPEND arg_SOURCES ${files})
+  endforeach()
   get_filename_component(top ${arg_FOLDER} DIRECTORY)
   set(target bki_mapping_${room})
   add_library(${target} SHARED ${arg_SOURCES})
@@ -60,8 +68,7 @@ bki_mapping_core_room(beams SOURCES
     raster/group_sums.cpp raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
-bki_mapping_core_room(free_space SOURCES
-    beam_lines.cpp even_samples.cpp no_free_space.cpp random_samples.cpp registry.cpp
+bki_mapping_core_room(free_space SOURCES *.cpp  # each mode is a file
   LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)

@@ -28,22 +28,8 @@ bki_mapping_room(ros SOURCES
     point_field.cpp
     point_times.cpp
     pose_source.cpp
-    publishers/cell_markers.cpp
-    publishers/distance_section.cpp
-    publishers/elevation_map.cpp
-    publishers/occupancy.cpp
-    publishers/projected_map.cpp
-    publishers/registry.cpp
-    publishers/trajectory.cpp
-    publishers/voxel_cloud.cpp
-    queries/distances.cpp
-    queries/frontiers.cpp
-    queries/obstacles.cpp
-    queries/points.cpp
-    queries/rays.cpp
-    queries/requests.cpp
-    queries/section.cpp
-    queries/space.cpp
+    publishers/*.cpp
+    queries/*.cpp
     query_services.cpp
     recent_map.cpp
     ring_axis.cpp

@@ -129,15 +129,4 @@ struct PublisherContext {
 /// The registry of publishers: one of each.
 std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context);
 
-std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeVoxelCloud(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeDistanceSection(const PublisherContext& context);
-
 }  // namespace bki_mapping::ros_interface
