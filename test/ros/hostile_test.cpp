@@ -27,6 +27,7 @@
 #include <map>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "hostile/kinds.h"
 #include "hostile/settings.h"
