@@ -5,16 +5,14 @@ set(BKI_MAPPING_CATKIN_COMPONENTS
 find_package(catkin REQUIRED COMPONENTS ${BKI_MAPPING_CATKIN_COMPONENTS})
 find_package(pcl_conversions REQUIRED)  # headers only: its libraries are all of VTK
 
-add_message_files(FILES BlockCoordinates.msg ClassInfo.msg ElevationMap.msg MappingStatus.msg OccupancyBlock.msg OccupancyMap.msg
-  OccupancyUpdate.msg VoxelCloudUpdate.msg)
-add_service_files(FILES BoundingBoxQuery.srv CastRays.srv CheckSpace.srv GetDistances.srv GetFrontiers.srv GetNearestObstacles.srv
-  GetSection.srv LoadMap.srv QueryPoints.srv SaveMap.srv)
+add_message_files(DIRECTORY msg)
+add_service_files(DIRECTORY srv)
 generate_messages(DEPENDENCIES geometry_msgs nav_msgs sensor_msgs std_msgs)
 generate_dynamic_reconfigure_options(cfg/Mapping.cfg)
 
 catkin_package(
   INCLUDE_DIRS include
-  LIBRARIES bki_mapping_mapping bki_mapping_io
+  LIBRARIES bki_mapping_mapping bki_mapping_city bki_mapping_export
   CATKIN_DEPENDS diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_runtime nav_msgs nodelet roscpp
     rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros topic_tools visualization_msgs
   DEPENDS EIGEN3

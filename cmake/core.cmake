@@ -1,16 +1,28 @@
-# The core: no ROS, no PCL. Everything a scan passes through until it is in the map. Each room is one
+# The core: no ROS, no PCL. Everything a scan passes through until it is in the map, and in its file. Each room is one
 # library. It may use only what it links; the linker refuses the rest.
 
-# bki_mapping_room(NAME SOURCES file... [LINK target...]): the library bki_mapping_NAME from files in src/NAME, or from
-# paths below src.
+# bki_mapping_room(NAME [FOLDER folder] SOURCES file... [LINK target...]): the library bki_mapping_NAME from files in
+# src/NAME, or in the folder; a pattern with * stands for all files of a folder to which others are often added. Includes begin
+# with the name of the room.
 function(bki_mapping_room room)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
-  list(TRANSFORM arg_SOURCES PREPEND "src/${room}/")
+  cmake_parse_arguments(arg "" "FOLDER" "SOURCES;LINK" ${ARGN})
+  if(NOT arg_FOLDER)
+    set(arg_FOLDER src/${room})
+  endif()
+  list(TRANSFORM arg_SOURCES PREPEND "${arg_FOLDER}/")
+  set(patterns ${arg_SOURCES})
+  list(FILTER patterns INCLUDE REGEX "[*]")
+  list(FILTER arg_SOURCES EXCLUDE REGEX "[*]")
+  foreach(pattern ${patterns})
+    file(GLOB files RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${pattern})
+    list(APPEND arg_SOURCES ${files})
+  endforeach()
+  get_filename_component(top ${arg_FOLDER} DIRECTORY)
   set(target bki_mapping_${room})
   add_library(${target} SHARED ${arg_SOURCES})
   target_compile_features(${target} PUBLIC cxx_std_17)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/${top}> $<INSTALL_INTERFACE:include>)
   target_link_libraries(${target} PUBLIC ${arg_LINK})
   if(NOT BKI_MAPPING_LIBFUZZER)  # whose functions are in the program only
     target_link_options(${target} PRIVATE LINKER:--no-undefined)
@@ -56,8 +68,7 @@ bki_mapping_core_room(beams SOURCES
     raster/group_sums.cpp raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
-bki_mapping_core_room(free_space SOURCES
-    beam_lines.cpp even_samples.cpp no_free_space.cpp random_samples.cpp registry.cpp
+bki_mapping_core_room(free_space SOURCES *.cpp  # each mode is a file
   LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
@@ -69,6 +80,15 @@ bki_mapping_kernels(query distance_kernels)
 bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
 bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
 
+# Class tables and parameters from YAML.
+find_package(yaml-cpp REQUIRED)
+bki_mapping_core_room(settings SOURCES
+    class_table_yaml.cpp config_yaml.cpp label_watch.cpp named_file.cpp share_path.cpp yaml_file.cpp
+  LINK bki_mapping_mapping)
+set_source_files_properties(src/settings/share_path.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+target_link_libraries(bki_mapping_settings PRIVATE yaml-cpp ${CMAKE_DL_LIBS})
+bki_mapping_join(bki_mapping_settings)
+
 # Map files: SQLite and zlib. They name the program that wrote them.
 file(STRINGS package.xml version_line REGEX "<version>")
 string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${version_line}")
@@ -76,9 +96,9 @@ find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
 bki_mapping_core_room(store SOURCES
     database.cpp drive_cover.cpp drive_overlap.cpp grid_transform.cpp map_clear.cpp map_file.cpp map_file_state.cpp map_info.cpp map_keeper.cpp
-    map_merge.cpp migration.cpp new_map_file.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp
+    map_merge.cpp mapper_file.cpp migration.cpp new_map_file.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp
     tile_store.cpp whole_map.cpp
-  LINK bki_mapping_mapping)
+  LINK bki_mapping_settings)
 target_compile_definitions(bki_mapping_store PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 target_link_libraries(bki_mapping_store PRIVATE SQLite::SQLite3 ZLIB::ZLIB)
 bki_mapping_join(bki_mapping_store)

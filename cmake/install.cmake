@@ -32,20 +32,16 @@ install(TARGETS ${bki_mapping_private_rooms}
   RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION})
 install(EXPORT bki_mapping-targets NAMESPACE bki_mapping:: DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
 
-set(bki_mapping_programs clear_map evaluate_map export_map inspect_map map_sequence merge_maps
-  migrate_map query_city simulate_city simulate_drive)
-if(BKI_MAPPING_LONG_TESTS)
-  list(APPEND bki_mapping_programs benchmark_sequence benchmark_store)
-  if(TARGET benchmark_parts)
-    list(APPEND bki_mapping_programs benchmark_parts)
-  endif()
-endif()
+get_property(bki_mapping_programs GLOBAL PROPERTY BKI_MAPPING_PROGRAMS)
 file(RELATIVE_PATH bki_mapping_from_bin /prefix/${BKI_MAPPING_BIN_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})
 set_target_properties(${bki_mapping_programs} PROPERTIES INSTALL_RPATH "$ORIGIN/${bki_mapping_from_bin}")
 install(TARGETS ${bki_mapping_programs} RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION})
 
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION include/${PROJECT_NAME})
 install(DIRECTORY config web DESTINATION ${BKI_MAPPING_SHARE_DESTINATION})
+if(BKI_MAPPING_LAB)
+  install(FILES lab/tools/plot_curves.py lab/tools/plot_errors.py DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/lab/tools)
+endif()
 
 if(BKI_MAPPING_ROS)  # catkin installs the rest of the CMake files
   export(EXPORT bki_mapping-targets NAMESPACE bki_mapping::

@@ -2,7 +2,9 @@
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
     beam_grid.cpp
-    city_loader.cpp cloud_conversion.cpp
+    city_loader.cpp
+    city_tiles.cpp
+    cloud_conversion.cpp
     cloud_frame.cpp
     clock_offset.cpp
     color_reader.cpp
@@ -14,31 +16,20 @@ bki_mapping_room(ros SOURCES
     live_settings.cpp
     reconfigure_server.cpp
     load_advice.cpp
+    map_file_settings.cpp
     publisher_set.cpp
     mapping_diagnostics.cpp
     mapping_server.cpp
     mapping_services.cpp
+    new_drive.cpp
     no_returns.cpp
+    periodic_save.cpp
     point_account.cpp
     point_field.cpp
     point_times.cpp
     pose_source.cpp
-    publishers/cell_markers.cpp
-    publishers/distance_section.cpp
-    publishers/elevation_map.cpp
-    publishers/occupancy.cpp
-    publishers/projected_map.cpp
-    publishers/registry.cpp
-    publishers/trajectory.cpp
-    publishers/voxel_cloud.cpp
-    queries/distances.cpp
-    queries/frontiers.cpp
-    queries/obstacles.cpp
-    queries/points.cpp
-    queries/rays.cpp
-    queries/requests.cpp
-    queries/section.cpp
-    queries/space.cpp
+    publishers/*.cpp
+    queries/*.cpp
     query_services.cpp
     recent_map.cpp
     ring_axis.cpp
@@ -48,7 +39,7 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
     tf_jumps.cpp
-  LINK bki_mapping_io bki_mapping_query pcl_common ${catkin_LIBRARIES})
+  LINK bki_mapping_city bki_mapping_export pcl_common ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
@@ -82,9 +73,7 @@ bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 add_executable(print_parameters src/tools/print_parameters.cpp)
 bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
-add_executable(benchmark_publishing benchmark/benchmark_publishing.cpp)
-bki_mapping_tool(benchmark_publishing bki_mapping_ros)
-foreach(name play_sequence sequence_to_bag print_parameters benchmark_publishing)
+foreach(name play_sequence sequence_to_bag print_parameters)
   bki_mapping_uses_ros(${name})
 endforeach()
 
@@ -94,12 +83,8 @@ install(TARGETS bki_mapping_nodelets
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-if(BKI_MAPPING_LONG_TESTS)
-  install(TARGETS benchmark_publishing RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-endif()
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(FILES scripts/plot_curves.py scripts/plot_errors.py DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/scripts)
 catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py scripts/play_bag.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 

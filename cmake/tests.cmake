@@ -155,7 +155,7 @@ bki_mapping_unit_tests(map clear_box LINK bki_mapping_store)
 bki_mapping_unit_tests(store damaged_file full_disk map_clear map_file migration
   LINK SQLite::SQLite3 ZLIB::ZLIB)
 bki_mapping_unit_tests(store map_keeper)  # scripts/test runs a part of it
-bki_mapping_unit_tests(store kept_looks LINK bki_mapping_io)
+bki_mapping_unit_tests(store kept_looks)
 foreach(name hostile_file map_merge tile_codec)  # each counts what is allocated, as damaged_file and allocation do
   bki_mapping_unit_tests(store ${name} LINK SQLite::SQLite3 ZLIB::ZLIB)
 endforeach()
@@ -218,7 +218,7 @@ bki_mapping_unit_tests(mapping brute_force scan_preprocessor snapshot)
 foreach(name allocation bounds laws)
   bki_mapping_unit_tests(mapping ${name})
 endforeach()
-bki_mapping_unit_tests(mapping latest parameters real_data LINK bki_mapping_io)
+bki_mapping_unit_tests(mapping latest parameters real_data LINK bki_mapping_sequence bki_mapping_settings)
 # The laws with the loops for processors without AVX, which instruction_sets_test compares with brute force.
 foreach(name instruction_sets laws)
   add_test(NAME ${name}_generic_test COMMAND ${name}_test)
@@ -226,29 +226,35 @@ foreach(name instruction_sets laws)
     ENVIRONMENT "BKI_MAPPING_INSTRUCTION_SET=generic")
 endforeach()
 set_property(TEST instruction_sets_generic_test APPEND PROPERTY ENVIRONMENT "GTEST_FILTER=*GenericIsAlwaysThere")
-bki_mapping_unit_tests(io class_table display_colors grid_export html_export label_watch map_picture sequence tiled_map truth_cloud yaml_file
-  LINK bki_mapping_simulation nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
-bki_mapping_unit_tests(io cleaned_points map_export pcd_file LINK pcl_io)
-bki_mapping_unit_tests(io octomap_export LINK ${OCTOMAP_LIBRARIES})
-bki_mapping_unit_tests(simulation city_scene coming_and_going simulation without_labels)
-bki_mapping_unit_tests(simulation days LINK bki_mapping_evaluation bki_mapping_store)
-bki_mapping_unit_tests(simulation navigation LINK bki_mapping_query)
-add_executable(plan_path_example examples/plan_path.cpp)
-set_target_properties(plan_path_example PROPERTIES OUTPUT_NAME plan_path)
-target_link_libraries(plan_path_example PRIVATE bki_mapping_io bki_mapping_query)
-bki_mapping_test_options(plan_path_example)
-target_include_directories(navigation_test PRIVATE ${PROJECT_SOURCE_DIR})
-target_compile_definitions(navigation_test PRIVATE BKI_MAPPING_PLAN_PATH="$<TARGET_FILE:plan_path_example>")
-add_dependencies(navigation_test plan_path_example)
-# The drive through traffic takes a minute, so it is a test of its own.
-set_tests_properties(navigation_test PROPERTIES ENVIRONMENT "GTEST_FILTER=-*Traffic*")
-add_test(NAME traffic_test COMMAND navigation_test)
-set_tests_properties(traffic_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*Traffic*" TIMEOUT ${BKI_MAPPING_TEST_SECONDS} PROCESSORS 2
-  COST 80)
-bki_mapping_long_tests(navigation_test traffic_test)
-bki_mapping_long_programs(navigation_test)
-bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy octomap_mapper presence semantics truth)
+bki_mapping_unit_tests(settings class_table label_watch yaml_file LINK yaml-cpp)
+bki_mapping_unit_tests(sequence sequence)
+bki_mapping_unit_tests(sequence pcd_file LINK pcl_io)
+bki_mapping_unit_tests(city tiled_map)
+bki_mapping_unit_tests(export display_colors grid_export html_export map_picture
+  LINK nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
+bki_mapping_unit_tests(export cleaned_points map_export LINK pcl_io)
+bki_mapping_unit_tests(export octomap_export LINK ${OCTOMAP_LIBRARIES})
 target_include_directories(octomap_export_test SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+if(BKI_MAPPING_LAB)
+  bki_mapping_unit_tests(simulation city_scene coming_and_going simulation truth_cloud without_labels)
+  bki_mapping_unit_tests(simulation days LINK bki_mapping_evaluation bki_mapping_store)
+  bki_mapping_unit_tests(simulation navigation LINK bki_mapping_query bki_mapping_store)
+  add_executable(plan_path_example examples/plan_path.cpp)
+  set_target_properties(plan_path_example PROPERTIES OUTPUT_NAME plan_path)
+  target_link_libraries(plan_path_example PRIVATE bki_mapping_query bki_mapping_store)
+  bki_mapping_test_options(plan_path_example)
+  target_include_directories(navigation_test PRIVATE ${PROJECT_SOURCE_DIR})
+  target_compile_definitions(navigation_test PRIVATE BKI_MAPPING_PLAN_PATH="$<TARGET_FILE:plan_path_example>")
+  add_dependencies(navigation_test plan_path_example)
+  # The drive through traffic takes a minute, so it is a test of its own.
+  set_tests_properties(navigation_test PROPERTIES ENVIRONMENT "GTEST_FILTER=-*Traffic*")
+  add_test(NAME traffic_test COMMAND navigation_test)
+  set_tests_properties(traffic_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*Traffic*" TIMEOUT ${BKI_MAPPING_TEST_SECONDS} PROCESSORS 2
+    COST 80)
+  bki_mapping_long_tests(navigation_test traffic_test)
+  bki_mapping_long_programs(navigation_test)
+  bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy octomap_mapper presence semantics truth)
+endif()
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
 function(bki_mapping_script_test room name)
@@ -256,13 +262,31 @@ function(bki_mapping_script_test room name)
   set_tests_properties(${name} PROPERTIES TIMEOUT 300 PROCESSORS 2
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
-bki_mapping_script_test(io browser_test)
+bki_mapping_script_test(house layering_test)
+bki_mapping_script_test(house links_test)
+if(NOT CMAKE_CROSSCOMPILING)  # for which this machine may lack packages
+  bki_mapping_script_test(house without_lab_test)
+endif()
+add_test(NAME vector_symbols_test
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
+    $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
+    $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_rules> $<TARGET_OBJECTS:bki_mapping_kernel>
+    $<TARGET_OBJECTS:bki_mapping_update> $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams> $<TARGET_OBJECTS:bki_mapping_query>
+    $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping> $<TARGET_OBJECTS:bki_mapping_store>)
+if(CATKIN_ENABLE_TESTING)
+  bki_mapping_unit_tests(costmap grid_copy)
+  bki_mapping_unit_tests(ros clock_offset cloud_conversion driver_layouts kept_city query_services recent_map)
+  bki_mapping_unit_tests(ros point_times)
+  bki_mapping_unit_tests(ros input_notes no_returns scan_account scan_reader sensor_trajectory server_config tf_jumps)
+endif()
+if(NOT BKI_MAPPING_LAB)
+  return()  # the tests of programs and nodes map simulated drives
+endif()
+bki_mapping_script_test(house skip_test)
+bki_mapping_script_test(export browser_test)
 set_tests_properties(browser_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
 bki_mapping_long_tests(browser_test)
 bki_mapping_script_test(scripts figures_test)
-bki_mapping_script_test(house layering_test)
-bki_mapping_script_test(house links_test)
-bki_mapping_script_test(house skip_test)
 bki_mapping_script_test(simd nehalem_test)
 set_tests_properties(nehalem_test PROPERTIES SKIP_RETURN_CODE 77)
 bki_mapping_script_test(store read_map_test)
@@ -279,10 +303,6 @@ bki_mapping_script_test(tools sequences_test)
 bki_mapping_script_test(tools signals_test)
 bki_mapping_script_test(tools tools_test)
 bki_mapping_long_tests(figures_test real_sequences_test sequences_test signals_test tools_test)
-bki_mapping_long_programs(benchmark_sequence benchmark_store)
-if(TARGET benchmark_parts)
-  bki_mapping_long_programs(benchmark_parts)
-endif()
 if(TARGET bki_mapping_python)
   get_filename_component(python_path ${BKI_MAPPING_PYTHON_BUILD} DIRECTORY)
   foreach(name city_map_test examples_test module_test queries_test ros_test stubs_test)
@@ -292,19 +312,13 @@ if(TARGET bki_mapping_python)
   bki_mapping_script_test(python path_test)
   set_property(TEST path_test APPEND PROPERTY ENVIRONMENT "PYTHONPATH=${python_path}")
   if(TARGET benchmark_parts)  # that the comparison runs, not how fast
-    add_test(NAME compare_python_test COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/benchmark/compare_python.py
+    add_test(NAME compare_python_test COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/lab/benchmark/compare_python.py
       --programs $<TARGET_FILE_DIR:benchmark_parts> --repeats 1 --only PointStates,FrontierSizes)
     bki_mapping_long_tests(compare_python_test)
     set_tests_properties(compare_python_test PROPERTIES TIMEOUT 300 PROCESSORS 2 ENVIRONMENT "PYTHONPATH=${python_path}"
       PASS_REGULAR_EXPRESSION "PointStates +[0-9.]+ +[0-9.]+ +[0-9.]+\nFrontierSizes +[0-9.]+ +[0-9.]+ +[0-9.]+\n$")
   endif()
 endif()
-add_test(NAME vector_symbols_test
-  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/simd/vector_symbols_test.py
-    $<TARGET_OBJECTS:bki_mapping_core> $<TARGET_OBJECTS:bki_mapping_parallel> $<TARGET_OBJECTS:bki_mapping_simd>
-    $<TARGET_OBJECTS:bki_mapping_map> $<TARGET_OBJECTS:bki_mapping_rules> $<TARGET_OBJECTS:bki_mapping_kernel>
-    $<TARGET_OBJECTS:bki_mapping_update> $<TARGET_OBJECTS:bki_mapping_points> $<TARGET_OBJECTS:bki_mapping_beams> $<TARGET_OBJECTS:bki_mapping_query>
-    $<TARGET_OBJECTS:bki_mapping_free_space> $<TARGET_OBJECTS:bki_mapping_mapping> $<TARGET_OBJECTS:bki_mapping_store>)
 
 if(CATKIN_ENABLE_TESTING)
   bki_mapping_script_test(tools commands_test)
@@ -320,7 +334,6 @@ if(CATKIN_ENABLE_TESTING)
     test/ros/query_latency_rostest.py test/ros/rates_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-  bki_mapping_unit_tests(costmap grid_copy)
   # The layer itself, with a stand-in for costmap_2d, which Debian does not have.
   #catkin_lint: ignore ambiguous_include_path
   add_library(semantic_layer_for_test MODULE src/costmap/semantic_layer.cpp)
@@ -334,9 +347,6 @@ if(CATKIN_ENABLE_TESTING)
   bki_mapping_test_options(semantic_layer_test)
   add_dependencies(semantic_layer_test semantic_layer_for_test)
   add_rostest(test/costmap/semantic_layer.test)
-  bki_mapping_unit_tests(ros clock_offset cloud_conversion driver_layouts kept_city query_services recent_map)
-  bki_mapping_unit_tests(ros point_times)
-  bki_mapping_unit_tests(ros input_notes no_returns scan_account scan_reader sensor_trajectory server_config tf_jumps)
   # nodelet 1.10.0, in Debian 11, may lose the callback by which nodelets of pcl_ros learn of a subscriber
   # (ros/nodelet_core, pull request 107, fixed in the next version).
   foreach(name body_box filters)
@@ -402,7 +412,7 @@ if(CATKIN_ENABLE_TESTING)
     bki_mapping_long_tests(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test)
   endforeach()
   bki_mapping_long_tests(commands_test)
-  bki_mapping_long_programs(benchmark_publishing hostile_test soak_test)
+  bki_mapping_long_programs(hostile_test soak_test)
   # They limit times, which another test at the same time would change.
   foreach(name query_latency rates)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)

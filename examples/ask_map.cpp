@@ -1,7 +1,7 @@
 // Asks a map file what is at a point. Usage: ask_map FILE.bkm X Y Z, in the map frame [m]
-#include <bki_mapping/io/mapper_file.h>
 #include <bki_mapping/rules/voxel_state.h>
 #include <bki_mapping/store/map_file.h>
+#include <bki_mapping/store/mapper_file.h>
 
 #include <iostream>
 #include <string>

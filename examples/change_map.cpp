@@ -1,7 +1,7 @@
 // Reads a map while it grows, merges another robot's map, and takes a scan back.
-#include <bki_mapping/io/yaml.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
 #include <bki_mapping/rules/voxel_state.h>
+#include <bki_mapping/settings/yaml.h>
 
 #include <future>
 #include <iostream>

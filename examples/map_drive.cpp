@@ -1,7 +1,7 @@
 // Maps scans that are in memory, and keeps the map in a file. Usage: map_drive FILE.bkm
-#include <bki_mapping/io/mapper_file.h>
-#include <bki_mapping/io/yaml.h>
 #include <bki_mapping/mapping/semantic_mapper.h>
+#include <bki_mapping/settings/yaml.h>
+#include <bki_mapping/store/mapper_file.h>
 
 #include <cmath>
 #include <iostream>

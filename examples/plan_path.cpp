@@ -1,8 +1,8 @@
 // Plans how a robot drives through a mapped street. Usage: plan_path FILE.bkm CLASSES X Y YAW X Y YAW, start
 // and goal in the map frame [m, rad]. Writes poses on the ground, 0.1 m apart, and the cost of the ground
 // there: x, y, z, yaw, cost.
-#include <bki_mapping/io/mapper_file.h>
-#include <bki_mapping/io/yaml.h>
+#include <bki_mapping/settings/yaml.h>
+#include <bki_mapping/store/mapper_file.h>
 
 #include <iostream>
 #include <stdexcept>

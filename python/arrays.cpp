@@ -314,6 +314,14 @@ py::array_t<std::int32_t> indexArray(const std::vector<GridIndex>& indices) {
   return array;
 }
 
+py::object cornersOf(const Eigen::AlignedBox3d& box) {
+  if (box.isEmpty()) return py::none();
+  py::array_t<double> corners({2, 3});
+  std::copy_n(box.min().data(), 3, corners.mutable_data(0, 0));
+  std::copy_n(box.max().data(), 3, corners.mutable_data(1, 0));
+  return py::object(std::move(corners));
+}
+
 py::dtype structType(const std::vector<Field>& fields, std::size_t bytes) {
   py::list names, formats, offsets;
   for (const Field& field : fields) {

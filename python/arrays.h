@@ -137,6 +137,9 @@ std::map<std::string, std::string> settingsOf(const py::dict& settings);
 /// Indices as an array of shape (N, 3), int32.
 py::array_t<std::int32_t> indexArray(const std::vector<GridIndex>& indices);
 
+/// The lower and the upper corner of a box [m], (2, 3), float64; None if it is empty.
+py::object cornersOf(const Eigen::AlignedBox3d& box);
+
 /// An array that owns a vector; nothing is copied.
 template <typename T>
 py::array ownedArray(std::vector<T> values, const py::dtype& type) {

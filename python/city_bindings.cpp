@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "arrays.h"
-#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/city/tiled_map.h"
 #include "class_bindings.h"
 #include "map_bindings.h"
 
@@ -113,11 +113,7 @@ py::array regionsOf(City& city) {
 py::object boundsOf(City& city) {
   Eigen::AlignedBox3d box;
   for (const CityRegion& region : city.map.regions()) box.extend(region.bounds);
-  if (box.isEmpty()) return py::none();
-  py::array_t<double> bounds({2, 3});
-  std::copy_n(box.min().data(), 3, bounds.mutable_data(0, 0));
-  std::copy_n(box.max().data(), 3, bounds.mutable_data(1, 0));
-  return py::object(std::move(bounds));
+  return cornersOf(box);
 }
 
 }  // namespace

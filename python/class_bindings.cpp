@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "arrays.h"
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/settings/yaml.h"
 
 namespace bki_mapping::python {
 namespace {

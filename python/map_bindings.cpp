@@ -11,11 +11,11 @@
 
 #include "arrays.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/export/map_export.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "class_bindings.h"
-#include "io/export_file.h"
+#include "export/export_file.h"
 #include "query_bindings.h"
 
 namespace bki_mapping::python {
@@ -177,11 +177,7 @@ py::object boundsOf(const FixedMap& map) {
       box.extend(grid.blockOrigin({{entry.index.x + 1, entry.index.y + 1, entry.index.z + 1}}));
     }
   }
-  if (box.isEmpty()) return py::none();
-  py::array_t<double> bounds({2, 3});
-  std::copy_n(box.min().data(), 3, bounds.mutable_data(0, 0));
-  std::copy_n(box.max().data(), 3, bounds.mutable_data(1, 0));
-  return py::object(std::move(bounds));
+  return cornersOf(box);
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <memory>
 #include <utility>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/query/state_map.h"
+#include "bki_mapping/store/mapper_file.h"
 
 namespace bki_mapping::python {
 

@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "arrays.h"
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/settings/yaml.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/frame_name.h"
-#include "io/label_watch.h"
 #include "map_bindings.h"
+#include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 
 namespace bki_mapping::python {

@@ -1,5 +1,5 @@
 #include "beams/line_evidence.h"
-#include "free_space/modes.h"
+#include "free_space/free_space_model.h"
 
 namespace bki_mapping {
 namespace {

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "free_space/beam_samples.h"
-#include "free_space/modes.h"
+#include "free_space/free_space_model.h"
 
 namespace bki_mapping {
 namespace {

@@ -1,4 +1,4 @@
-#include "free_space/modes.h"
+#include "free_space/free_space_model.h"
 
 namespace bki_mapping {
 namespace {

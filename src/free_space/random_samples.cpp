@@ -1,5 +1,5 @@
 #include "free_space/beam_samples.h"
-#include "free_space/modes.h"
+#include "free_space/free_space_model.h"
 #include "parallel/counter_random.h"
 
 namespace bki_mapping {

@@ -4,9 +4,16 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "free_space/modes.h"
 
 namespace bki_mapping {
+
+// Each mode is in a file of its own.
+std::unique_ptr<FreeSpaceModel> makeNoFreeSpace(const FreeSpaceSetup& setup);
+std::unique_ptr<FreeSpaceModel> makeEvenSamples(const FreeSpaceSetup& setup);
+std::unique_ptr<FreeSpaceModel> makeUniformSamples(const FreeSpaceSetup& setup);
+std::unique_ptr<FreeSpaceModel> makeLinearSamples(const FreeSpaceSetup& setup);
+std::unique_ptr<FreeSpaceModel> makeBeamLines(const FreeSpaceSetup& setup);
+
 namespace {
 
 using Maker = std::unique_ptr<FreeSpaceModel> (*)(const FreeSpaceSetup&);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/city/tiled_map.h"
 
 namespace bki_mapping::ros_interface {
 

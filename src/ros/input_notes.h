@@ -8,8 +8,8 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/scan_stats.h"
-#include "io/label_watch.h"
 #include "ros/scan_reader.h"
+#include "settings/label_watch.h"
 
 namespace bki_mapping::ros_interface {
 

@@ -1,19 +1,15 @@
-/// @file The map of the server over time: its window, its map file, and the drives in it.
+/// @file The map of the server over time: in memory, in a map file, or read only, and the drives in it.
 #pragma once
 
-#include <ros/time.h>
-
-#include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
-#include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "bki_mapping/store/map_keeper.h"
-#include "ros/city_loader.h"
+#include "ros/city_tiles.h"
+#include "ros/periodic_save.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
@@ -24,23 +20,18 @@ namespace bki_mapping::ros_interface {
 /// thread.
 class KeptMap {
  public:
-  using Clock = std::chrono::steady_clock;
-
   /// Opens the map file, and loads it if there is no window or the map is read-only. A city that cannot be
   /// used becomes a fault(), and mapping goes on without it.
   /// @param name of the drive that begins, for people.
-  /// @throws MapFileError; std::invalid_argument if settings contradict each other.
+  /// @throws MapFileError; std::invalid_argument as checkMapFileSettings().
   KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name);
-
-  /// @throws std::invalid_argument if settings contradict each other.
-  static void checkSettings(const ServerConfig& config);
 
   // These return the blocks that changed, for the publishers.
   /// Notes what a scan changed, and moves the window. @param stamp of the scan [ns].
   std::vector<GridIndex> addScan(std::uint64_t stamp, const Eigen::Vector3d& sensor,
                                  const ServerConfig& config);
   /// Does what is due between scans: adds evidence that has been read from the file, and saves the map.
-  std::vector<GridIndex> update(const ServerConfig& config, Clock::time_point now);
+  std::vector<GridIndex> update(const ServerConfig& config, PeriodicSave::Clock::time_point now);
 
   /// Makes room for a scan that was refused for lack of memory. @return whether memory was gained.
   bool makeRoom() { return keeper_ && keeper_->makeRoom(); }
@@ -65,7 +56,7 @@ class KeptMap {
   Saving saveTo(const std::string& path);
 
   /// Whether tiles of a city that are near the sensor are still missing; update() adds them.
-  bool isLoading() const { return city_ && has_pose_ && (arrived_ || !city_->complete()); }
+  bool isLoading() const { return has_pose_ && city_.isLoading(); }
   bool hasFile() const { return keeper_ != nullptr; }
   /// The file that the map is kept in; hasFile() must be true.
   const std::string& filePath() const { return keeper_->path(); }
@@ -75,7 +66,7 @@ class KeptMap {
   /// The same of the map file only, which a city cannot keep from being saved.
   std::string fileFault() const { return keeper_ ? keeper_->fault() : ""; }
   /// Wall time up to which the map file has everything that was added; 0: nothing was saved yet.
-  ros::WallTime saved() const { return saved_; }
+  ros::WallTime saved() const { return save_.saved(); }
   /// Saves and closes the map file. @return what was lost, and why; "" if nothing was.
   std::string close() { return keeper_ ? keeper_->close() : ""; }
 
@@ -83,31 +74,21 @@ class KeptMap {
   MapInfo info() const;
 
  private:
-  DriveRecord newDrive() const;
   void requireWritable() const;
-  void openCity(const std::string& path);
   /// Adds the tiles that have been read from the city. @return the blocks that changed; none with a keeper,
   /// which reports them itself.
   std::vector<GridIndex> addFromCity(const ServerConfig& config);
-  void add(StoredMap& tiles, std::vector<GridIndex>& changed);
 
   SemanticMapper& mapper_;
   std::string frame_, name_;
   bool read_only_;
   MapKeeper::Window window_;
-  DriveRecord drive_;                ///< without a keeper
-  std::vector<DriveRecord> drives_;  ///< of maps that were added, without a keeper
-  std::unique_ptr<MapKeeper> keeper_;
-  std::unique_ptr<CityLoader> city_;
-  std::string city_fault_;                    ///< why there is no city_, although map_file names one
-  std::optional<StoredMap> arrived_;          ///< tiles from the city that are not in the map yet
-  std::set<std::string> city_drives_;         ///< ids of the drives that have been added with such tiles
-  std::vector<Eigen::AlignedBox3d> cleared_;  ///< boxes that are cleared in tiles that come later, too
-  bool has_pose_ = false, said_loaded_ = false;
-  bool unsaved_ = false;  ///< something has been added since the last save
-  std::future<void> saving_;
-  ros::WallTime saving_since_, saved_;
-  Clock::time_point next_save_{};
+  bool has_pose_ = false;
+  DriveRecord drive_;                  ///< without a keeper
+  std::vector<DriveRecord> drives_;    ///< of maps that were added, without a keeper
+  std::unique_ptr<MapKeeper> keeper_;  ///< nullptr: the map is in memory only
+  PeriodicSave save_;
+  CityTiles city_;
 };
 
 }  // namespace bki_mapping::ros_interface

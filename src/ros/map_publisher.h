@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "parallel/index_numbering.h"
-#include "ros/map_snapshot.h"
+#include "ros/server_snapshot.h"
 
 namespace bki_mapping::ros_interface {
 
@@ -51,7 +51,7 @@ class MapPublisher {
   virtual bool wanted() const { return publisher_.getNumSubscribers() > 0; }
   std::string topic() const { return publisher_.getTopic(); }
   /// Publishes the changes since the last call, or the whole map, and clears `changed`.
-  void publish(const MapSnapshot& snapshot) {
+  void publish(const ServerSnapshot& snapshot) {
     publishNew(snapshot);
     changed.clear();
   }
@@ -77,7 +77,7 @@ class MapPublisher {
   std::chrono::steady_clock::time_point next;  ///< earliest next publication
 
  protected:
-  virtual void publishNew(const MapSnapshot& snapshot) = 0;
+  virtual void publishNew(const ServerSnapshot& snapshot) = 0;
 
   ros::Publisher publisher_;
 };
@@ -87,7 +87,7 @@ struct PublisherContext {
   ros::NodeHandle& node;  ///< its callback queue is served by the thread of the publishers
   const ServerConfig& config;
   /// Lists all changes in the publishers' `changed`, and returns the state that has them.
-  std::function<std::shared_ptr<const MapSnapshot>()> snapshot;
+  std::function<std::shared_ptr<const ServerSnapshot>()> snapshot;
 
   /// Advertises a topic with whole maps: a new subscriber makes `owner` publish again.
   template <typename Message>
@@ -102,7 +102,7 @@ struct PublisherContext {
   ros::Publisher advertiseUpdates(const std::string& topic, MapPublisher& owner, Send&& send) const {
     const auto connected = [&owner, send, make = snapshot](const ros::SingleSubscriberPublisher& subscriber) {
       owner.tryTo([&] {
-        const std::shared_ptr<const MapSnapshot> now = make();
+        const std::shared_ptr<const ServerSnapshot> now = make();
         if (!owner.changed.empty()) owner.publish(*now);
         send(subscriber, *now);
       });
@@ -128,16 +128,5 @@ struct PublisherContext {
 
 /// The registry of publishers: one of each.
 std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context);
-
-std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeVoxelCloud(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
-std::unique_ptr<MapPublisher> makeDistanceSection(const PublisherContext& context);
 
 }  // namespace bki_mapping::ros_interface

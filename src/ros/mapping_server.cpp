@@ -4,9 +4,10 @@
 #include <cstdio>
 #include <new>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "ros/cloud_frame.h"
+#include "ros/map_file_settings.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"
 
@@ -45,9 +46,9 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
 
   poses_ = std::make_unique<PoseSource>(node_);
   publishing_ = std::make_unique<PublisherSet>(node_, config_, [this] {
-    return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(queue_, [this] {
+    return QueuedCall<std::shared_ptr<const ServerSnapshot>>::ask(queue_, [this] {
       publishing_->closeChanges();
-      return std::make_shared<const MapSnapshot>(snapshot());
+      return std::make_shared<const ServerSnapshot>(snapshot());
     });
   });
   status_publisher_ = private_node_.advertise<MappingStatus>("status", 10, true);
@@ -117,7 +118,7 @@ void MappingServer::subscribe() {
 }
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
-  KeptMap::checkSettings(server);
+  checkMapFileSettings(server);
   mapper_->reconfigure(mapper);
   config_ = server;
   const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
@@ -368,14 +369,14 @@ std_msgs::Header MappingServer::mapHeader() const {
   return header;
 }
 
-MapSnapshot MappingServer::snapshot() {
+ServerSnapshot MappingServer::snapshot() {
   return {mapper_->snapshot(),      mapHeader(), mapper_->classes(), trajectory_.poses(), config_, sensor_,
           mapper_->config().threads};
 }
 
-std::shared_ptr<const MapSnapshot> MappingServer::askForSnapshot() {
-  return QueuedCall<std::shared_ptr<const MapSnapshot>>::ask(
-      queue_, [this] { return std::make_shared<const MapSnapshot>(snapshot()); });
+std::shared_ptr<const ServerSnapshot> MappingServer::askForSnapshot() {
+  return QueuedCall<std::shared_ptr<const ServerSnapshot>>::ask(
+      queue_, [this] { return std::make_shared<const ServerSnapshot>(snapshot()); });
 }
 
 }  // namespace bki_mapping::ros_interface

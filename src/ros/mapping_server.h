@@ -93,9 +93,9 @@ class MappingServer {
   /// The map frame, and the stamp of the last scan.
   std_msgs::Header mapHeader() const;
   /// The state of the server. For the mapping thread.
-  MapSnapshot snapshot();
+  ServerSnapshot snapshot();
   /// The same for all other threads: waits until the mapping thread has no scan in work.
-  std::shared_ptr<const MapSnapshot> askForSnapshot();
+  std::shared_ptr<const ServerSnapshot> askForSnapshot();
   /// Writes the whole map to a map file. @throws MapFileError.
   void saveMapFile(const std::string& path);
 

@@ -1,9 +1,9 @@
 // The services of the mapping server.
 #include <chrono>
 
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/tiled_map.h"
+#include "bki_mapping/city/tiled_map.h"
+#include "bki_mapping/export/map_export.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "ros/mapping_server.h"
 #include "ros/queued_call.h"
@@ -105,12 +105,12 @@ bool MappingServer::onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQu
 void MappingServer::saveMapFile(const std::string& path) {
   struct Parts {
     KeptMap::Saving saving;
-    std::shared_ptr<const MapSnapshot> snapshot;
+    std::shared_ptr<const ServerSnapshot> snapshot;
   };
   const auto parts = QueuedCall<std::shared_ptr<Parts>>::ask(queue_, [&] {
     auto made = std::make_shared<Parts>();
     made->saving = kept_->saveTo(path);
-    if (!made->saving.done.valid()) made->snapshot = std::make_shared<const MapSnapshot>(snapshot());
+    if (!made->saving.done.valid()) made->snapshot = std::make_shared<const ServerSnapshot>(snapshot());
     return made;
   });
   if (parts->snapshot) return saveMap(path, parts->saving.info, parts->saving.drives, parts->snapshot->map);
@@ -132,7 +132,7 @@ bool MappingServer::onSaveMap(SaveMap::Request& request, SaveMap::Response& resp
     checkMapName(request.path);
     const std::string include = request.include.empty() ? "occupied" : request.include;
     const VoxelStates states = parseStates(include);
-    const std::shared_ptr<const MapSnapshot> snapshot = askForSnapshot();
+    const std::shared_ptr<const ServerSnapshot> snapshot = askForSnapshot();
     exportMap(request.path, snapshot->map, snapshot->rules, snapshot->classes, states);
     return "wrote " + request.path + " (" + include + (kept_->hasFile() ? ", of what is in memory)" : ")");
   });

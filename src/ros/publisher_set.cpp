@@ -90,8 +90,8 @@ void PublisherSet::work() {
   }
 }
 
-std::shared_ptr<const MapSnapshot> PublisherSet::takeSnapshot() {
-  std::shared_ptr<const MapSnapshot> snapshot = take_snapshot_();
+std::shared_ptr<const ServerSnapshot> PublisherSet::takeSnapshot() {
+  std::shared_ptr<const ServerSnapshot> snapshot = take_snapshot_();
   ChangedBlocks closed;
   bool start_over = false;
   {
@@ -140,7 +140,7 @@ std::vector<MapPublisher*> PublisherSet::findDue() {
 void PublisherSet::publishDue() {
   const std::vector<MapPublisher*> due = findDue();
   if (due.empty()) return;
-  std::shared_ptr<const MapSnapshot> snapshot;
+  std::shared_ptr<const ServerSnapshot> snapshot;
   due.front()->tryTo([&] { snapshot = takeSnapshot(); });
   if (!snapshot) return;
   for (MapPublisher* publisher : due) {

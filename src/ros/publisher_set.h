@@ -25,7 +25,7 @@ std::chrono::duration<double> publishPeriod(double rate, std::chrono::duration<d
 /// second, and takes at most a tenth of the time, however large the map.
 class PublisherSet {
  public:
-  using TakeSnapshot = std::function<std::shared_ptr<const MapSnapshot>()>;
+  using TakeSnapshot = std::function<std::shared_ptr<const ServerSnapshot>()>;
 
   /// @param take_snapshot called in the thread of the publishers; asks the mapping thread to call
   /// closeChanges() and to make a snapshot.
@@ -49,7 +49,7 @@ class PublisherSet {
   void work();
   void wake();
   /// Takes a snapshot, and passes the changes that it contains on to the publishers.
-  std::shared_ptr<const MapSnapshot> takeSnapshot();
+  std::shared_ptr<const ServerSnapshot> takeSnapshot();
   /// The topics that are due. Drops the changes if nobody listens to any topic.
   std::vector<MapPublisher*> findDue();
   void publishDue();

@@ -21,13 +21,7 @@ RecentMap::Shared mapFor(RecentMap& map, const GetFrontiers::Request& asked) {
 QueryServices::QueryServices(const ros::NodeHandle& node, ros::CallbackQueue& mapping, RecentMap::Take take)
     : node_(node), map_(std::move(take), mapping, background_) {
   node_.setCallbackQueue(&queue_);
-  offer<QueryPoints>("query_points");
-  offer<CastRays>("cast_rays");
-  offer<CheckSpace>("check_space");
-  offer<GetNearestObstacles>("get_nearest_obstacles");
-  offer<GetSection>("get_section");
-  offer<GetFrontiers>("get_frontiers");
-  offer<GetDistances>("get_distances");
+  forEachQuery([this](const char* name, auto service) { offer<decltype(service)>(name); });
 }
 
 template <typename Service>

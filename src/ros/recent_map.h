@@ -17,13 +17,13 @@ namespace bki_mapping::ros_interface {
 
 /// A snapshot of the map, prepared for queries. All functions may be called from several threads at once.
 struct QueriedMap {
-  QueriedMap(std_msgs::Header of_map, bki_mapping::MapSnapshot snapshot, const ClassTable& table)
+  QueriedMap(std_msgs::Header of_map, MapSnapshot snapshot, const ClassTable& table)
       : header(std::move(of_map)),
         map(std::move(snapshot.map)),
         classes(table),
         states(map, snapshot.rules, kThreads) {}
   /// The same, but takes over what queries of an earlier snapshot have found out of what has not changed.
-  QueriedMap(std_msgs::Header of_map, bki_mapping::MapSnapshot snapshot, const ClassTable& table,
+  QueriedMap(std_msgs::Header of_map, MapSnapshot snapshot, const ClassTable& table,
              const QueriedMap& earlier)
       : header(std::move(of_map)),
         map(std::move(snapshot.map)),

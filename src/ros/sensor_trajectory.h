@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ros/map_snapshot.h"
+#include "ros/server_snapshot.h"
 
 namespace bki_mapping::ros_interface {
 

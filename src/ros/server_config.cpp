@@ -5,8 +5,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {

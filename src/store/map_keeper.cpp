@@ -13,28 +13,18 @@
 
 #include "bki_mapping/map/semantic_map.h"
 #include "store/drive_overlap.h"
+#include "store/eviction.h"
 #include "store/tile_store.h"
 
 namespace bki_mapping {
 namespace {
 
-constexpr double kEverything = std::numeric_limits<double>::infinity();
-
 /// Time for adding tiles from the file, in addition to the first one, for each call.
 constexpr std::chrono::milliseconds kArrivalTime(2);
-
-/// Fractions of memory_limit: above the first, the window shrinks until the map takes the second; below the
-/// third, it grows again.
-constexpr double kTooMuch = 0.85, kEnough = 0.7, kLittle = 0.5;
 
 /// While more than this waits to be written [bytes], tiles stay in the map: handing them over frees no
 /// memory.
 constexpr std::size_t kMostWaiting = 256 << 20;
-
-/// Fractions of a tile's edge: how far the sensor moves before the keeper looks for tiles to load and to hand
-/// over, and how far outside the window a tile may stay. A sensor that goes to and fro then does not keep the
-/// disk busy.
-constexpr double kStep = 0.25, kMargin = 0.5;
 
 enum class Here {
   kWhole,    ///< all evidence is in memory; a tile in the file is out of date
@@ -63,7 +53,8 @@ struct MapKeeper::State {
       : mapper(of),
         path(file.path()),
         drive(first_drive),
-        edge(Region::kEdge * of.map().geometry().blockSize()) {
+        edge(Region::kEdge * of.map().geometry().blockSize()),
+        eviction(edge) {
     drives = file.drives();
     const auto is_same = [&](const DriveRecord& known) { return known.id == drive.id; };
     if (std::any_of(drives.begin(), drives.end(), is_same)) {
@@ -80,7 +71,6 @@ struct MapKeeper::State {
     const Eigen::Array3d centre = window.centre.array();
     return (low - centre).max(centre - (low + edge)).maxCoeff();
   }
-  double reachNow() const { return std::min(0.5 * window.edge, reach); }
 
   /// The tiles in the file within a distance of the window's centre.
   std::vector<GridIndex> storedWithin(double limit) const {
@@ -184,21 +174,17 @@ struct MapKeeper::State {
   void sweep() {
     must_sweep = false;
     swept_at = window.centre;
-    const double limit = reachNow();
     for (auto entry = here.begin(); entry != here.end();) {
-      const bool leaves = distance(entry->first) > limit + kMargin * edge;
-      entry = leaves && mayLeave(entry->second) ? giveAway(entry) : std::next(entry);
+      entry = eviction.leaves(distance(entry->first)) && mayLeave(entry->second) ? giveAway(entry)
+                                                                                 : std::next(entry);
     }
-    for (const GridIndex& tile : storedWithin(limit + kStep * edge)) {
+    for (const GridIndex& tile : storedWithin(eviction.loadingReach())) {
       const auto known = here.find(tile);
       if (known == here.end() || known->second.here == Here::kPart) load(tile);
     }
   }
 
-  double memoryLimit() const {
-    const double limit = 1e6 * mapper.config().memory_limit;
-    return limit > 0.0 ? limit : kEverything;
-  }
+  double memoryLimit() const { return 1e6 * mapper.config().memory_limit; }  ///< [bytes]
 
   /// Hands over the farthest tiles until the map takes less memory than a limit [bytes], and shrinks the
   /// window to the tiles that are left. @return whether any tile was handed over.
@@ -212,7 +198,7 @@ struct MapKeeper::State {
     for (; !tiles.empty() && static_cast<double>(mapper.mapBytes()) > bytes; tiles.pop_back()) {
       const auto& [from_centre, index] = tiles.back();
       if (from_centre <= 0.0) break;  // the sensor is in this tile
-      reach = std::max(0.0, std::min(reach, from_centre - (kMargin + kStep) * edge));
+      eviction.shrinkBelow(from_centre);
       giveAway(here.find(index));
       any = true;
     }
@@ -220,20 +206,19 @@ struct MapKeeper::State {
   }
 
   void keepWithinMemory() {
-    const double limit = memoryLimit();
     const auto bytes = static_cast<double>(mapper.mapBytes());
-    if (bytes > kTooMuch * limit) {
-      shrinkTo(kEnough * limit);
-    } else if (reach < kEverything && bytes < kLittle * limit && must_sweep) {
-      reach += kMargin * edge;
-      if (reach >= 0.5 * window.edge) reach = kEverything;
+    if (const auto enough = Eviction::bytesWhenShort(bytes, memoryLimit())) {
+      shrinkTo(*enough);
+    } else if (must_sweep) {
+      eviction.grow(bytes, memoryLimit());
     }
   }
 
   SemanticMapper& mapper;
   std::string path;
   DriveRecord drive;
-  double edge;                      ///< of a tile [m]
+  double edge;  ///< of a tile [m]
+  Eviction eviction;
   std::vector<DriveRecord> drives;  ///< the other drives in the map
   std::unique_ptr<TileStore> store;
   std::deque<TileStore::Arrival> arrivals;
@@ -243,7 +228,6 @@ struct MapKeeper::State {
   Window window;                            ///< at the last moveTo()
   Eigen::Vector3d swept_at{0.0, 0.0, 0.0};  ///< centre of the window at the last sweep
   bool must_sweep = true;                   ///< sweep even if the window has not moved
-  double reach = kEverything;               ///< half the edge of the window that memory_limit allows [m]
   TileStore::Call reset_call = 0;           ///< the last reset; answers to earlier calls are ignored
   std::vector<GridIndex> moved;             ///< blocks that were added or removed, for the next moveTo()
   bool closed = false;
@@ -270,18 +254,18 @@ void MapKeeper::addScan(std::uint64_t stamp) {
 
 std::vector<GridIndex> MapKeeper::moveTo(const Window& window) {
   State& s = *state_;
-  s.must_sweep |= window.edge != s.window.edge;
+  s.must_sweep |= s.eviction.setWindow(window.edge);
   s.window = window;
   s.takeArrivals(false);
   const double moved = (window.centre - s.swept_at).cwiseAbs().maxCoeff();
-  s.must_sweep |= moved > kStep * s.edge;
+  s.must_sweep |= s.eviction.isDue(moved);
   s.keepWithinMemory();
   if (s.must_sweep) s.sweep();
   return std::exchange(s.moved, {});
 }
 
 bool MapKeeper::makeRoom() {
-  return state_->shrinkTo(kLittle * state_->memoryLimit());
+  return state_->shrinkTo(Eviction::bytesToMakeRoom(state_->memoryLimit()));
 }
 
 std::vector<GridIndex> MapKeeper::waitForTiles() {
@@ -326,7 +310,7 @@ void MapKeeper::reset(const DriveRecord& drive) {
   s.mapper.reset();
   s.drive = drive;
   s.drives.clear();
-  s.reach = kEverything;
+  s.eviction.reset();
 }
 
 void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives, bool allow_overlap) {

@@ -2,8 +2,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "tools/options.h"
 
@@ -14,10 +14,9 @@ namespace po = tools::po;
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("box", text("\"X0 Y0 Z0 X1 Y1 Z1\""),
+  options.add_options()("box", tools::textOption("\"X0 Y0 Z0 X1 Y1 Z1\""),
                         "two opposite corners of the box, in the map frame [m]; inf and -inf are allowed")(
-      "output", text("FILE.bkm"), "file for the result; default: the file itself is changed");
+      "output", tools::textOption("FILE.bkm"), "file for the result; default: the file itself is changed");
   return options;
 }
 
@@ -36,11 +35,8 @@ int clearFile(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("clear_map", [&] {
-    const auto given = tools::parse(argc, argv,
-                                    "clear_map FILE.bkm --box \"X0 Y0 Z0 X1 Y1 Z1\"\n"
-                                    "Clears a box of a map: its voxels become unknown.",
-                                    options(), "files");
-    return given ? clearFile(*given) : 0;
-  });
+  return tools::run(argc, argv, "clear_map",
+                    "clear_map FILE.bkm --box \"X0 Y0 Z0 X1 Y1 Z1\"\n"
+                    "Clears a box of a map: its voxels become unknown.",
+                    options(), clearFile, "files");
 }

@@ -4,11 +4,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/tiled_map.h"
-#include "io/export_file.h"
-#include "io/trajectory_file.h"
+#include "bki_mapping/export/map_export.h"
+#include "export/export_file.h"
+#include "sequence/trajectory_file.h"
 #include "tools/options.h"
 
 namespace {
@@ -18,27 +18,26 @@ namespace po = tools::po;
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   const ColumnRules rules;
   options.add_options()(
-      "output", text("FILE"),
+      "output", tools::textOption("FILE"),
       "file to write; its extension chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
       "the colours of classes; .bt, OctoMap of occupied and free; .yaml, with an image .pgm beside it, "
       "for map_server; .html, a page for browsers, which needs libjs-three")(
-      "html", text("FILE.html"), "the same as --output FILE.html")(
-      "include", text("STATES"),
+      "html", tools::textOption("FILE.html"), "the same as --output FILE.html")(
+      "include", tools::textOption("STATES"),
       "voxels in a .ply, .pcd or .html file: occupied,free,occluded; default: occupied, in a .html file all")(
-      "box", text("\"X0 Y0 Z0 X1 Y1 Z1\""),
+      "box", tools::textOption("\"X0 Y0 Z0 X1 Y1 Z1\""),
       "export only what lies in a box: two opposite corners, in the map frame [m]; inf and -inf are allowed")(
       "trajectory", po::value<std::vector<std::string>>()->value_name("PATH")->composing(),
       "draw where the sensor was in a .html file: the folder of a sequence, or a file with lines "
       "`stamp x y z qx qy qz qw`, in the map frame; repeatable")(
-      "three-js", text("FILE"), "three.js for a .html file, if it is not that of libjs-three")(
+      "three-js", tools::textOption("FILE"), "three.js for a .html file, if it is not that of libjs-three")(
       "min-z", po::value<double>()->value_name("M")->default_value(rules.min_z),
       "lowest height of obstacles in a .yaml map")(
       "max-z", po::value<double>()->value_name("M")->default_value(rules.max_z),
       "greatest height of obstacles in a .yaml map")(
-      "height", text("map|ground")->default_value("map"),
+      "height", tools::textOption("map|ground")->default_value("map"),
       "zero of these heights: the origin of the map frame, or the ground below");
   tools::addMemoryLimit(options);
   return options;
@@ -116,12 +115,9 @@ int exportMapFile(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("export_map", [&] {
-    const auto given = tools::parse(argc, argv,
-                                    "export_map MAP --output FILE\n"
-                                    "Converts a map, or a part of one, for other programs. MAP is a map file "
-                                    "(.bkm) or the folder of a city.",
-                                    options(), "files");
-    return given ? exportMapFile(*given) : 0;
-  });
+  return tools::run(argc, argv, "export_map",
+                    "export_map MAP --output FILE\n"
+                    "Converts a map, or a part of one, for other programs. MAP is a map file "
+                    "(.bkm) or the folder of a city.",
+                    options(), exportMapFile, "files");
 }

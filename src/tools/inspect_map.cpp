@@ -11,11 +11,11 @@
 #include <tuple>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "io/map_picture.h"
-#include "io/map_statistics.h"
+#include "export/map_picture.h"
+#include "export/map_statistics.h"
 #include "tools/options.h"
 
 namespace {
@@ -26,10 +26,9 @@ using Json = nlohmann::ordered_json;
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("json", text("FILE.json"), "also write the figures as JSON")(
-      "top", text("FILE.png"), "draw the map as seen from above")(
-      "profile", text("FILE.png"), "draw the map as seen from its longer side")(
+  options.add_options()("json", tools::textOption("FILE.json"), "also write the figures as JSON")(
+      "top", tools::textOption("FILE.png"), "draw the map as seen from above")(
+      "profile", tools::textOption("FILE.png"), "draw the map as seen from its longer side")(
       "max-z", po::value<double>()->value_name("M"),
       "draw only voxels up to this height [m], to look below ceilings and trees")(
       "parameters", po::bool_switch(), "print the parameters in the file as YAML, and exit");
@@ -210,11 +209,8 @@ int inspect(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("inspect_map", [&] {
-    const auto given = tools::parse(argc, argv,
-                                    "inspect_map FILE.bkm\n"
-                                    "Prints what is in a map file, checks every byte of it, and draws it.",
-                                    options(), "files");
-    return given ? inspect(*given) : 0;
-  });
+  return tools::run(argc, argv, "inspect_map",
+                    "inspect_map FILE.bkm\n"
+                    "Prints what is in a map file, checks every byte of it, and draws it.",
+                    options(), inspect, "files");
 }

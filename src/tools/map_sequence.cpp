@@ -6,15 +6,15 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/io/map_export.h"
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/sequence.h"
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/export/map_export.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/sequence/sequence.h"
+#include "bki_mapping/settings/yaml.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "io/cleaned_points.h"
-#include "io/label_watch.h"
+#include "export/cleaned_points.h"
+#include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 #include "tools/interruption.h"
 #include "tools/run_report.h"
@@ -30,23 +30,22 @@ constexpr char kFrame[] = "map";
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("output", text("FILE.bkm|FILE.ply|FILE.pcd"),
+  options.add_options()("output", tools::textOption("FILE.bkm|FILE.ply|FILE.pcd"),
                         "file for the map: .bkm holds all of it, .ply or .pcd its voxels as points")(
-      "resume", text("FILE.bkm"), "continue the map in this file")(
-      "drive", text("ID"),
+      "resume", tools::textOption("FILE.bkm"), "continue the map in this file")(
+      "drive", tools::textOption("ID"),
       "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
       "allow-overlap", po::bool_switch(),
       "map scans that by its ids the continued map already holds; they count twice then")(
-      "poses", text("FILE"),
+      "poses", tools::textOption("FILE"),
       "poses in the frame of the map, as matrices or with stamps; "
       "default: poses.txt, relative to its first pose")(
-      "include", text("STATES")->default_value("occupied"),
+      "include", tools::textOption("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded")(
-      "points", text("FILE.pcd"),
+      "points", tools::textOption("FILE.pcd"),
       "file for the points of the scans that lie in occupied voxels of the final map")(
-      "report", text("FILE.json"), "report of the run")("print-config", po::bool_switch(),
-                                                        "print the effective parameters as YAML, and exit")(
+      "report", tools::textOption("FILE.json"), "report of the run")(
+      "print-config", po::bool_switch(), "print the effective parameters as YAML, and exit")(
       "print-classes", po::bool_switch(), "print the file of the class table, and exit");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
@@ -226,8 +225,6 @@ int mapSequence(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("map_sequence", [&] {
-    const auto given = tools::parse(argc, argv, "Maps a sequence in SemanticKITTI's layout.", options());
-    return given ? mapSequence(*given) : 0;
-  });
+  return tools::run(argc, argv, "map_sequence", "Maps a sequence in SemanticKITTI's layout.", options(),
+                    mapSequence);
 }

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/store/map_merge.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
 #include "tools/interruption.h"
 #include "tools/options.h"
@@ -144,11 +144,8 @@ int mergeFiles(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("merge_maps", [&] {
-    const auto given = tools::parse(argc, argv,
-                                    "merge_maps FILE.bkm... --output FILE.bkm\n"
-                                    "Merges maps: the result holds each of their drives once.",
-                                    options(), "inputs");
-    return given ? mergeFiles(*given) : 0;
-  });
+  return tools::run(argc, argv, "merge_maps",
+                    "merge_maps FILE.bkm... --output FILE.bkm\n"
+                    "Merges maps: the result holds each of their drives once.",
+                    options(), mergeFiles, "inputs");
 }

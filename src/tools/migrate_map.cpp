@@ -4,7 +4,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "bki_mapping/io/mapper_file.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "store/schema.h"
 #include "tools/options.h"
 
@@ -29,12 +29,8 @@ int migrateFile(const tools::po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("migrate_map", [&] {
-    const auto given =
-        tools::parse(argc, argv,
-                     "migrate_map OLD.bkm NEW.bkm\n"
-                     "Converts a map file of any version to the current version, and checks it.",
-                     tools::po::options_description("Options"), "files");
-    return given ? migrateFile(*given) : 0;
-  });
+  return tools::run(argc, argv, "migrate_map",
+                    "migrate_map OLD.bkm NEW.bkm\n"
+                    "Converts a map file of any version to the current version, and checks it.",
+                    tools::po::options_description("Options"), migrateFile, "files");
 }

@@ -8,9 +8,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "bki_mapping/io/tiled_map.h"
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "tools/interruption.h"
 
 namespace bki_mapping::tools {
@@ -28,6 +28,10 @@ po::typed_value<Number>* limited(const std::string& option, Number least, Number
 }
 
 }  // namespace
+
+po::typed_value<std::string>* textOption(const char* value) {
+  return po::value<std::string>()->value_name(value);
+}
 
 po::typed_value<std::int64_t>* countOption(const std::string& option, std::int64_t least, std::int64_t most) {
   return limited(option, least, most);
@@ -187,6 +191,15 @@ int run(const std::string& program, const std::function<int()>& body) {
     std::cerr << program << ": " << error.what() << "\n";
     return 1;
   }
+}
+
+int run(int argc, char** argv, const std::string& program, const std::string& what,
+        const po::options_description& options, const std::function<int(const po::variables_map&)>& body,
+        const std::string& positional) {
+  return run(program, [&] {
+    const auto given = parse(argc, argv, what, options, positional);
+    return given ? body(*given) : 0;
+  });
 }
 
 void warn(const std::string& sentence) {

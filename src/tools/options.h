@@ -26,6 +26,13 @@ namespace po = boost::program_options;
 std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::string& what,
                                          po::options_description options, const std::string& positional = "");
 
+/// An option with a text. @param value its name in the help.
+po::typed_value<std::string>* textOption(const char* value);
+/// An option with a default. @param value its name in the help.
+template <typename T>
+po::typed_value<T>* optionWith(const char* value, const T& standard) {
+  return po::value<T>()->value_name(value)->default_value(standard);
+}
 /// An option with an integer from `least` to `most`, read with count(). parse() refuses any other value,
 /// naming the option.
 po::typed_value<std::int64_t>* countOption(const std::string& option, std::int64_t least,
@@ -60,6 +67,10 @@ std::shared_ptr<const ClassTable> classTable(const po::variables_map& given);
 
 /// Runs a program; an exception becomes one line on standard error and exit status 1, or that of Stopped.
 int run(const std::string& program, const std::function<int()>& body);
+/// The same for a body that is given what parse() makes of the command line.
+int run(int argc, char** argv, const std::string& program, const std::string& what,
+        const po::options_description& options, const std::function<int(const po::variables_map&)>& body,
+        const std::string& positional = "");
 
 /// Prints a sentence on standard error as a warning; nothing if it is empty.
 void warn(const std::string& sentence);

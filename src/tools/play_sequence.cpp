@@ -26,11 +26,10 @@ constexpr double kClockStep = 0.01;  ///< interval of /clock [s of wall time]
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   options.add_options()("rate", tools::realOption("--rate", 0.0)->value_name("FACTOR")->default_value(1.0),
                         "factor of real time; 0: wait until `mapping/status` acknowledges each scan")(
-      "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
-      "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
+      "frame", tools::textOption("FRAME")->default_value("velodyne"), "frame of the sensor")(
+      "map-frame", tools::textOption("FRAME")->default_value("map"), "frame of the map")(
       "check", "check the sequence, print its absolute path, and exit; for launch files");
   options.add(tools::sequenceOptions());
   return options;

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_geometry.h"
-#include "bki_mapping/io/tiled_map.h"
 #include "bki_mapping/query/queries.h"
 
 namespace bki_mapping::tools {

@@ -5,13 +5,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/io/tiled_map.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/stopwatch.h"
-#include "io/map_picture.h"
-#include "io/map_statistics.h"
+#include "export/map_picture.h"
+#include "export/map_statistics.h"
 #include "tools/options.h"
 #include "tools/point_file.h"
 #include "tools/point_query.h"
@@ -23,19 +23,21 @@ namespace po = tools::po;
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
   options.add_options()("point", po::value<std::vector<std::string>>()->value_name("\"X Y Z\"")->composing(),
                         "say what is at a point, map frame [m]; repeatable")(
-      "points", text("FILE.csv"), "the same for the points of a file with lines x,y,z; -: standard input")(
+      "points", tools::textOption("FILE.csv"),
+      "the same for the points of a file with lines x,y,z; -: standard input")(
       "nearest", tools::realOption("--nearest", 0.0)->value_name("M"),
       "also say which obstacle is nearest to each point, up to this distance [m]")(
-      "classes", text("NAMES"), "only obstacles of these classes, joined by commas; default: all")(
-      "output", text("FILE.csv"), "write the answers for points there; default: standard output")(
-      "box", text("\"X0 Y0 Z0 X1 Y1 Z1\""),
+      "classes", tools::textOption("NAMES"),
+      "only obstacles of these classes, joined by commas; default: all")(
+      "output", tools::textOption("FILE.csv"),
+      "write the answers for points there; default: standard output")(
+      "box", tools::textOption("\"X0 Y0 Z0 X1 Y1 Z1\""),
       "count the voxels in a box: two opposite corners, in the map frame [m]; inf and -inf are allowed")(
       "section", po::value<double>()->value_name("Z"),
       "of the box, only the layer of voxels at this height [m]")(
-      "top", text("FILE.png"), "draw the box as seen from above; with --section, the section")(
+      "top", tools::textOption("FILE.png"), "draw the box as seen from above; with --section, the section")(
       "cost", po::bool_switch(),
       "also say, on standard error, how many tiles and files were read, and how long all took");
   tools::addMemoryLimit(options);
@@ -183,13 +185,9 @@ int query(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return tools::run("query_city", [&] {
-    const auto given =
-        tools::parse(argc, argv,
-                     "query_city MAP [--point \"X Y Z\"]... [--box \"X0 Y0 Z0 X1 Y1 Z1\"]\n"
-                     "Asks a city (the folder that map_city wrote) or a map file (.bkm), and reads "
-                     "only the tiles that the answer needs. Without a question, it describes the map.",
-                     options(), "files");
-    return given ? query(*given) : 0;
-  });
+  return tools::run(argc, argv, "query_city",
+                    "query_city MAP [--point \"X Y Z\"]... [--box \"X0 Y0 Z0 X1 Y1 Z1\"]\n"
+                    "Asks a city (the folder that map_city wrote) or a map file (.bkm), and reads "
+                    "only the tiles that the answer needs. Without a question, it describes the map.",
+                    options(), query, "files");
 }

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "bki_mapping/io/sequence.h"
+#include "bki_mapping/sequence/sequence.h"
 
 namespace bki_mapping::tools {
 

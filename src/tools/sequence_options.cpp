@@ -6,7 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "io/pose_agreement.h"
+#include "sequence/pose_agreement.h"
 
 namespace bki_mapping::tools {
 namespace {

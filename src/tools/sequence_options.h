@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "bki_mapping/io/sequence.h"
+#include "bki_mapping/sequence/sequence.h"
 #include "tools/options.h"
 
 namespace bki_mapping::tools {

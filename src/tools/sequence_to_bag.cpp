@@ -16,12 +16,11 @@ namespace po = tools::po;
 
 po::options_description options() {
   po::options_description options("Options");
-  const auto text = [](const char* name) { return po::value<std::string>()->value_name(name); };
-  options.add_options()("output", text("FILE.bag")->required(), "output bag")(
-      "cloud-topic", text("TOPIC")->default_value("/velodyne_points"), "topic of the clouds")(
-      "frame", text("FRAME")->default_value("velodyne"), "frame of the sensor")(
-      "map-frame", text("FRAME")->default_value("map"), "frame of the map")(
-      "compression", text("KIND")->default_value("none"), "compression: none, lz4 or bz2");
+  options.add_options()("output", tools::textOption("FILE.bag")->required(), "output bag")(
+      "cloud-topic", tools::textOption("TOPIC")->default_value("/velodyne_points"), "topic of the clouds")(
+      "frame", tools::textOption("FRAME")->default_value("velodyne"), "frame of the sensor")(
+      "map-frame", tools::textOption("FRAME")->default_value("map"), "frame of the map")(
+      "compression", tools::textOption("KIND")->default_value("none"), "compression: none, lz4 or bz2");
   options.add(tools::sequenceOptions());
   return options;
 }
@@ -65,11 +64,9 @@ int writeBag(const po::variables_map& given) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int status = tools::run("sequence_to_bag", [&] {
-    const auto given = tools::parse(
-        argc, argv, "Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.", options());
-    return given ? writeBag(*given) : 0;
-  });
+  const int status = tools::run(argc, argv, "sequence_to_bag",
+                                "Writes a sequence in SemanticKITTI's layout as a bag of clouds and tf.",
+                                options(), writeBag);
   // At a usual exit class_loader 2.8 would complain of the plugin that a leaked bag still holds.
   if (status != 0) std::quick_exit(status);
   return status;

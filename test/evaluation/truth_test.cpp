@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/settings/yaml.h"
 #include "simulation/drive_file.h"
 #include "temporary_folder.h"
 

@@ -41,7 +41,7 @@ TEST(LinearSamples, CoverThePlaneEvenly) {  // Theorem 1: (r / d)^2 is uniform
   EXPECT_LT(distanceFromUniform(squaredFractions(linearDistance)), criticalDistance(20000));
 }
 
-TEST(UniformSamples, DoNot) {
+TEST(UniformSamples, CrowdNearTheSensor) {
   EXPECT_GT(distanceFromUniform(squaredFractions(uniformDistance)), 10 * criticalDistance(20000));
 }
 

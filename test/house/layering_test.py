@@ -5,7 +5,7 @@ import re
 import unittest
 
 ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
-CMAKE = ('core.cmake', 'io.cmake', 'ros.cmake', 'costmap.cmake', 'python_module.cmake')
+CMAKE = ('core.cmake', 'tools.cmake', 'ros.cmake', 'costmap.cmake', 'lab.cmake', 'python_module.cmake')
 
 
 def links():
@@ -17,8 +17,9 @@ def links():
     direct = {}
     for room, arguments in re.findall(r'bki_mapping_(?:core_)?room\((\w+)\s([^)]*)\)', text):
         direct[room] = set(re.findall(r'bki_mapping_(\w+)', arguments.partition('LINK')[2]))
-    # The programs of tools that speak ROS link its room, too.
-    direct['tools'].add('ros')
+    # Programs link rooms beside that of their options.
+    direct['tools'] |= {'export', 'ros'}
+    direct['lab/tools'] = direct['lab/benchmark'] = {'evaluation', 'tools'}
     # Nothing links the Python module, which is no room of the library.
     bound = re.search(r'target_link_libraries\(bki_mapping_python PRIVATE ([^)]*)\)', text)[1]
     direct['python'] = set(re.findall(r'bki_mapping_(\w+)', bound))
@@ -28,21 +29,23 @@ def links():
     return {room: reach(room) | {room} for room in direct}
 
 
-# Rooms that a program links beside those of tools.
-PROGRAMS = {'tools/evaluate_map.cpp': {'evaluation'}}
 # What else a room may include, beside the standard library and Eigen.
 LIBRARIES = {
     'simd': ('immintrin.h',),
     'beams/beam_rtree.cpp': ('boost/geometry', 'boost/iterator/'),
     'mapping/semantic_mapper.cpp': ('malloc.h',),
     'store': ('sqlite3.h', 'zlib.h'),
-    'io': ('nlohmann/', 'octomap/', 'pcl/', 'png.h', 'yaml-cpp/', 'zlib.h'),
+    'settings': ('yaml-cpp/',),
+    'sequence': ('pcl/',),
+    'city': ('nlohmann/',),
+    'export': ('nlohmann/', 'octomap/', 'pcl/', 'png.h', 'yaml-cpp/', 'zlib.h'),
     'evaluation': ('nlohmann/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
     'costmap/semantic_layer.cpp': ('costmap_2d/', 'dynamic_reconfigure/', 'pluginlib/', 'ros/', 'tf2/', 'tf2_ros/'),
-    'tools': ('boost/program_options', 'nlohmann/', 'pcl/', 'ros/', 'rosbag/', 'bki_mapping/', 'yaml-cpp/'),
+    'tools': ('boost/program_options', 'nlohmann/', 'ros/', 'rosbag/', 'bki_mapping/'),
+    'lab/benchmark': ('benchmark/', 'pcl/', 'ros/', 'bki_mapping/', 'topic_tools/'),
 }
 MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')
 POSIX = ('dlfcn.h', 'fcntl.h', 'sys/', 'unistd.h')
@@ -54,6 +57,12 @@ def sources():
             for name in files:
                 path = os.path.join(folder, name)
                 yield os.path.relpath(path, os.path.join(ROOT, top)), path
+    for folder, _, files in os.walk(os.path.join(ROOT, 'lab')):
+        for name in files:
+            path = os.path.join(folder, name)
+            relative = os.path.relpath(path, ROOT)
+            if name.endswith(('.h', '.cpp')):  # `tools` is a room of src, too
+                yield relative if relative.startswith(('lab/benchmark', 'lab/tools')) else os.path.relpath(path, f'{ROOT}/lab'), path
     for name in os.listdir(os.path.join(ROOT, 'python')):
         if name.endswith(('.h', '.cpp')):
             yield os.path.join('python', name), os.path.join(ROOT, 'python', name)
@@ -63,18 +72,18 @@ class Layering(unittest.TestCase):
     def test_includes(self):
         count, may_use = 0, links()
         for relative, path in sources():
-            room = relative.split(os.sep)[0]
+            room = os.path.dirname(relative) if relative.startswith('lab/') else relative.split(os.sep)[0]
             self.assertIn(room, may_use, f'{path} is in no room')
             with open(path) as file:
                 text = file.read()
             for own in re.findall(r'#include "(?:bki_mapping/)?(\w+)/', text):
                 count += 1
-                self.assertIn(own, may_use[room] | PROGRAMS.get(relative, set()), f'{path} includes {own}, which its library does not link')
+                self.assertIn(own, may_use[room], f'{path} includes {own}, which its library does not link')
             allowed = LIBRARIES.get(room, ()) + LIBRARIES.get(relative, ())
             for other in re.findall(r'#include <([^>]+)>', text):
                 if '/' not in other and not other.endswith('.h') or other.startswith('Eigen/'):
                     continue
-                if room in ('costmap', 'ros', 'tools') and MESSAGES.match(other):
+                if room in ('costmap', 'lab/benchmark', 'ros', 'tools') and MESSAGES.match(other):
                     continue
                 self.assertTrue(other.startswith(allowed + POSIX), f'{path} includes <{other}>')
         self.assertGreater(count, 50)
@@ -84,7 +93,7 @@ class Layering(unittest.TestCase):
             with open(path) as file:
                 starts = re.search(r'std::thread\b(?!::)|std::async\b|#pragma omp', file.read())
             if starts:
-                self.assertIn(relative, ('parallel/thread_pool.h', 'parallel/thread_pool.cpp', 'ros/city_loader.cpp', 'ros/mapping_server.h', 'ros/mapping_server.cpp',
+                self.assertIn(relative, ('lab/benchmark/benchmark_publishing.cpp', 'parallel/thread_pool.h', 'parallel/thread_pool.cpp', 'ros/city_loader.cpp', 'ros/mapping_server.h', 'ros/mapping_server.cpp',
                                      'ros/publisher_set.h', 'ros/publisher_set.cpp', 'store/tile_store.h',
                                      'store/tile_store.cpp'))
 

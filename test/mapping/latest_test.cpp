@@ -7,9 +7,9 @@
 #include <memory>
 #include <random>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "reference/content.h"
 
 namespace bki_mapping {

@@ -374,13 +374,18 @@ TEST(Laws, AnEmptyScanAndAResetLeaveNothing) {
   EXPECT_EQ(mapper.map().size(), 0u);
 }
 
-TEST(Laws, AKernelOfTooManyVoxelsIsRefused) {
-  MapperConfig config;
-  config.resolution = 0.1;
-  config.kernel.length = 7.1;
-  EXPECT_NO_THROW(SemanticMapper(config, reference::smallTable()));
-  config.kernel.length = 7.3;
+TEST(Laws, ARefusedReconfigurationChangesNothing) {
+  MapperConfig config = configOf("line");
+  SemanticMapper mapper(config, reference::smallTable()), untouched(config, reference::smallTable());
+  mapper.integrate(someScans()[0]);
+  untouched.integrate(someScans()[0]);
+  config.kernel.length = 73 * config.resolution;
   EXPECT_THROW(SemanticMapper(config, reference::smallTable()), std::invalid_argument);
+  EXPECT_THROW(mapper.reconfigure(config), std::invalid_argument);
+  EXPECT_EQ(mapper.config().kernel.length, configOf("line").kernel.length);
+  mapper.integrate(someScans()[1]);
+  untouched.integrate(someScans()[1]);
+  expectSame(untouched.map(), mapper.map(), "after a refusal");
 }
 
 TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {

@@ -7,10 +7,10 @@
 #include <set>
 #include <tuple>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "free_space/registry.h"
 #include "other_value.h"
 #include "reference/scenes.h"
@@ -178,12 +178,18 @@ TEST(Parameters, AFaultChangesNothing) {
 TEST(FreeSpaceModes, AnUnknownOneIsNamedWithTheKnown) {
   FreeSpaceSetup setup = {{}, GridGeometry(0.3), {}, 0.1};
   setup.config.mode = "liner";
+  std::string sentence = "known modes: ";
+  for (const std::string& mode : freeSpaceModes()) {
+    sentence += (mode == freeSpaceModes().front() ? "" : ", ") + mode;
+  }
   try {
     makeFreeSpaceModel(setup);
     FAIL();
   } catch (const std::invalid_argument& fault) {
-    EXPECT_NE(std::string(fault.what()).find("known modes: even, line, linear, none, uniform"),
-              std::string::npos);
+    EXPECT_NE(std::string(fault.what()).find(sentence), std::string::npos) << fault.what();
+    for (const char* mode : {"even", "line", "linear", "none", "uniform"}) {
+      EXPECT_NE(sentence.find(mode), std::string::npos) << mode;
+    }
   }
 }
 

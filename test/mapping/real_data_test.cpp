@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <random>
 
-#include "bki_mapping/io/sequence.h"
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/sequence/sequence.h"
+#include "bki_mapping/settings/yaml.h"
 #include "free_space/registry.h"
 #include "reference/reference.h"
 

@@ -645,47 +645,59 @@ class WrongInput(WithMap):
             self.refused(ValueError, words, call)
         self.refused(TypeError, 'order must be a class', lambda: boxes(a, b, 1.5))
 
-    def test_the_rest(self):
-        map_ = self.map
-        nearest, horizontal, vertical, field = map_.nearest_obstacles, map_.horizontal_section, map_.vertical_section, map_.distance_field
+    def refuses(self, cases):
+        for error, words, call in cases:
+            self.refused(error, words, call)
+
+    def test_nearest_obstacles(self):
+        nearest = self.map.nearest_obstacles
+        self.refuses((
+            (ValueError, 'point 1 is not finite or lies beyond the map', lambda: nearest([[0, 0, 0], [0, math.nan, 0]])),
+            (ValueError, 'the greatest distance is negative or not a number; give metres, 0 or more', lambda: nearest([[0, 0, 0]], None, -1)),
+            (TypeError, 'max_distance must be a number, not str', lambda: nearest([[0, 0, 0]], None, 'far'))))
+
+    def test_sections(self):
+        horizontal, vertical = self.map.horizontal_section, self.map.vertical_section
+        self.refuses((
+            (ValueError, 'the section has a coordinate that is not finite', lambda: horizontal(math.nan, (0, 0), (1, 1))),
+            (ValueError, "the section's area is inside out; give a min below its max", lambda: horizontal(0, (0, 2), (1, 1))),
+            (ValueError, 'the section has .* cells; make it smaller, 100 million are the most', lambda: horizontal(0, (0, 0), (1e4, 1e4))),
+            (ValueError, 'the section reaches beyond the map', lambda: horizontal(0, (0, 0), (1e10, 1))),
+            (ValueError, 'upper must be two numbers', lambda: horizontal(0, (0, 0), (1, 1, 1))),
+            (ValueError, 'the section stands on two points that are the same', lambda: vertical((1, 1), (1, 1), 0, 1)),
+            (ValueError, "the section's heights are inside out; give min_z below max_z", lambda: vertical((1, 1), (2, 1), 1, 0)),
+            (TypeError, 'z must be a number, not NoneType', lambda: horizontal(None, (0, 0), (1, 1)))))
+
+    def test_frontiers(self):
+        frontiers = self.map.frontiers
+        self.refuses((
+            (ValueError, 'min_size must be an integer, 0 or more', lambda: frontiers(-1)),
+            (ValueError, 'min_size must be an integer, 0 or more', lambda: frontiers(1.5)),
+            (ValueError, 'the box is inside out; give a min below its max', lambda: frontiers(lower=(0, 2, 0), upper=(1, 1, 1))),
+            (ValueError, 'the box has a coordinate that is not finite', lambda: frontiers(lower=(0, 0, 0), upper=(1, 1, math.inf))),
+            (ValueError, "the box reaches beyond the map's grid", lambda: frontiers(lower=(0, 0, 0), upper=(1, 1, 1e10))),
+            (ValueError, 'the box has only one corner; give lower and upper', lambda: frontiers(lower=(0, 0, 0))),
+            (TypeError, 'return_voxels must be True or False, not int', lambda: frontiers(1, 1))))
+
+    def test_distance_fields(self):
+        map_, field = self.map, self.map.distance_field
         coarse = bki.SemanticMapper(resolution=0.5).map
         good = field((0, 0, 0), (1, 1, 1))
-        for words, call in (
-                ('point 1 is not finite or lies beyond the map', lambda: nearest([[0, 0, 0], [0, math.nan, 0]])),
-                ('the greatest distance is negative or not a number; give metres, 0 or more', lambda: nearest([[0, 0, 0]], None, -1)),
-                ('the section has a coordinate that is not finite', lambda: horizontal(math.nan, (0, 0), (1, 1))),
-                ("the section's area is inside out; give a min below its max", lambda: horizontal(0, (0, 2), (1, 1))),
-                ('the section has .* cells; make it smaller, 100 million are the most', lambda: horizontal(0, (0, 0), (1e4, 1e4))),
-                ('the section reaches beyond the map', lambda: horizontal(0, (0, 0), (1e10, 1))),
-                ('upper must be two numbers', lambda: horizontal(0, (0, 0), (1, 1, 1))),
-                ('the section stands on two points that are the same', lambda: vertical((1, 1), (1, 1), 0, 1)),
-                ("the section's heights are inside out; give min_z below max_z", lambda: vertical((1, 1), (2, 1), 1, 0)),
-                ('min_size must be an integer, 0 or more', lambda: map_.frontiers(-1)),
-                ('min_size must be an integer, 0 or more', lambda: map_.frontiers(1.5)),
-                ('the box is inside out; give a min below its max', lambda: map_.frontiers(lower=(0, 2, 0), upper=(1, 1, 1))),
-                ('the box has a coordinate that is not finite', lambda: map_.frontiers(lower=(0, 0, 0), upper=(1, 1, math.inf))),
-                ("the box reaches beyond the map's grid", lambda: map_.frontiers(lower=(0, 0, 0), upper=(1, 1, 1e10))),
-                ('the box has only one corner; give lower and upper', lambda: map_.frontiers(lower=(0, 0, 0))),
-                ('the region has a coordinate that is not finite; give finite ones', lambda: field((0, 0, math.nan), (1, 1, 1))),
-                ('the region is inside out; give a min below its max', lambda: field((0, 2, 0), (1, 1, 1))),
-                ('the region has 3334 x 3334 x 334 voxels; make it smaller', lambda: field((0, 0, 0), (1e3, 1e3, 1e2))),
-                ('the region reaches beyond the map', lambda: field((0, 0, 0), (1e10, 1, 1))),
-                ('lower must be three numbers', lambda: field((0, 0), (1, 1, 1))),
-                ('the region is inside out', lambda: good.compute(map_, (0, 2, 0), (1, 1, 1))),
-                ('the map has voxels of another size than the distance field', lambda: good.compute(coarse, (0, 0, 0), (1, 1, 1))),
-                ('the map has voxels of another size than the distance field', lambda: good.update(coarse, map_.blocks)),
-                ('blocks must be integers of 32 bits', lambda: good.update(map_, [[2**40, 0, 0]])),
-                (r'blocks must be an array of integers of shape \(N, 3\)', lambda: good.update(map_, [0, 0, 0])),
-                (r'points must be an array of numbers of shape \(N, 3\)', lambda: good.at([0, 0, 0]))):
-            self.refused(ValueError, words, call)
-        for words, call in (
-                ('max_distance must be a number, not str', lambda: nearest([[0, 0, 0]], None, 'far')),
-                ('z must be a number, not NoneType', lambda: horizontal(None, (0, 0), (1, 1))),
-                ('return_voxels must be True or False, not int', lambda: map_.frontiers(1, 1)),
-                ('unknown must be True or False, not NoneType', lambda: field((0, 0, 0), (1, 1, 1), None, None)),
-                ('map must be a bki_mapping.Map, not SemanticMapper', lambda: good.update(bki.SemanticMapper(), map_.blocks)),
-                (r'blocks must be an array of integers of shape \(N, 3\), not of dtype float64', lambda: good.update(map_, map_.blocks * 1.0))):
-            self.refused(TypeError, words, call)
+        self.refuses((
+            (ValueError, 'the region has a coordinate that is not finite; give finite ones', lambda: field((0, 0, math.nan), (1, 1, 1))),
+            (ValueError, 'the region is inside out; give a min below its max', lambda: field((0, 2, 0), (1, 1, 1))),
+            (ValueError, 'the region has 3334 x 3334 x 334 voxels; make it smaller', lambda: field((0, 0, 0), (1e3, 1e3, 1e2))),
+            (ValueError, 'the region reaches beyond the map', lambda: field((0, 0, 0), (1e10, 1, 1))),
+            (ValueError, 'lower must be three numbers', lambda: field((0, 0), (1, 1, 1))),
+            (ValueError, 'the region is inside out', lambda: good.compute(map_, (0, 2, 0), (1, 1, 1))),
+            (ValueError, 'the map has voxels of another size than the distance field', lambda: good.compute(coarse, (0, 0, 0), (1, 1, 1))),
+            (ValueError, 'the map has voxels of another size than the distance field', lambda: good.update(coarse, map_.blocks)),
+            (ValueError, 'blocks must be integers of 32 bits', lambda: good.update(map_, [[2**40, 0, 0]])),
+            (ValueError, r'blocks must be an array of integers of shape \(N, 3\)', lambda: good.update(map_, [0, 0, 0])),
+            (ValueError, r'points must be an array of numbers of shape \(N, 3\)', lambda: good.at([0, 0, 0])),
+            (TypeError, 'unknown must be True or False, not NoneType', lambda: field((0, 0, 0), (1, 1, 1), None, None)),
+            (TypeError, 'map must be a bki_mapping.Map, not SemanticMapper', lambda: good.update(bki.SemanticMapper(), map_.blocks)),
+            (TypeError, r'blocks must be an array of integers of shape \(N, 3\), not of dtype float64', lambda: good.update(map_, map_.blocks * 1.0))))
         self.assertEqual(good.values.shape, (4, 4, 4))
 
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <functional>
 
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/settings/yaml.h"
 #include "cloud_maker.h"
 #include "ros/cloud_conversion.h"
 #include "ros/pose_conversion.h"

@@ -16,7 +16,7 @@
 #include <map>
 #include <optional>
 
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/settings/yaml.h"
 #include "ros/point_field.h"
 #include "ros/pose_conversion.h"
 #include "ros/scan_reader.h"

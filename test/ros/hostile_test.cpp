@@ -27,6 +27,7 @@
 #include <map>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "hostile/kinds.h"
 #include "hostile/settings.h"
@@ -608,11 +609,32 @@ TEST(Hostile, NewFramesCostWhatTf2KeepsOfThem) {
   EXPECT_LT(each, kSanitized ? 20000.0 : 2000.0);
 }
 
+bool isRow(const std::string& line) {
+  return line.compare(0, 3, "| `") == 0 && line.find('/') < line.find("` |");
+}
+
+/// Puts all rows in the place of those of a document.
+void writeRows(const std::string& document) {
+  std::ifstream in(document);
+  std::string text;
+  bool written = false;
+  for (std::string line; std::getline(in, line);) {
+    if (!isRow(line)) {
+      text += line + "\n";
+    } else if (!std::exchange(written, true)) {
+      for (const auto& [kind, row] : allRows()) text += row + "\n";
+    }
+  }
+  std::ofstream(document) << text;
+}
+
 TEST(Hostile, KindsAreThoseOfTheDocumentation) {
-  std::ifstream in(std::string(BKI_MAPPING_SOURCE_DIR) + "/docs/robustness.md");
+  const std::string document = std::string(BKI_MAPPING_SOURCE_DIR) + "/docs/robustness.md";
+  if (!environment("BKI_MAPPING_WRITE_KINDS", "").empty()) writeRows(document);
+  std::ifstream in(document);
   std::set<std::string> rows;
   for (std::string line; std::getline(in, line);) {
-    if (line.compare(0, 3, "| `") == 0 && line.find('/') < line.find("` |")) rows.insert(line);
+    if (isRow(line)) rows.insert(line);
   }
   for (const auto& [kind, row] : allRows()) {
     EXPECT_EQ(rows.erase(row), 1u) << "docs/robustness.md lacks:\n" << row;

@@ -7,9 +7,10 @@
 #include <set>
 #include <thread>
 
-#include "bki_mapping/io/mapper_file.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "ros/kept_map.h"
+#include "ros/map_file_settings.h"
 #include "store/file_content.h"
 #include "store/kept_mapper.h"
 
@@ -91,11 +92,11 @@ class KeptCity : public testing::Test {
     }
     /// Lets everything arrive that is wanted.
     void settle() {
-      const auto end = KeptMap::Clock::now() + std::chrono::seconds(60);
+      const auto end = PeriodicSave::Clock::now() + std::chrono::seconds(60);
       do {
-        kept.update(config, KeptMap::Clock::now());
+        kept.update(config, PeriodicSave::Clock::now());
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        ASSERT_LT(KeptMap::Clock::now(), end);
+        ASSERT_LT(PeriodicSave::Clock::now(), end);
       } while (kept.isLoading());
     }
     ServerConfig config;
@@ -275,11 +276,11 @@ TEST_F(KeptCity, MemoryLimitEndsLoadingWithASentence) {
   const Scan scan = scanAt(0.0, 0.0, 1);
   mapper.integrate(scan);
   kept.addScan(scan.stamp, scan.origin, config_);
-  const auto end = KeptMap::Clock::now() + std::chrono::seconds(60);
+  const auto end = PeriodicSave::Clock::now() + std::chrono::seconds(60);
   do {
-    kept.update(config_, KeptMap::Clock::now());
+    kept.update(config_, PeriodicSave::Clock::now());
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  } while (kept.isLoading() && KeptMap::Clock::now() < end);
+  } while (kept.isLoading() && PeriodicSave::Clock::now() < end);
   EXPECT_LT(static_cast<double>(mapper.mapBytes()), 10e6);
   EXPECT_GT(tilesOf(mapper.map()).size(), 2u);
   EXPECT_NE(kept.fault().find("because memory_limit is reached; set own_map_file and window"),
@@ -290,7 +291,7 @@ TEST_F(KeptCity, MemoryLimitEndsLoadingWithASentence) {
 TEST_F(KeptCity, SettingsThatContradictEachOtherAreRefused) {
   const auto refusal = [](const ServerConfig& config) -> std::string {
     try {
-      KeptMap::checkSettings(config);
+      checkMapFileSettings(config);
     } catch (const std::invalid_argument& fault) {
       return fault.what();
     }

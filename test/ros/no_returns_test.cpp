@@ -12,9 +12,9 @@
 #include <string>
 #include <utility>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "ros/cloud_conversion.h"
 #include "spinning_lidar.h"
 

@@ -8,9 +8,9 @@
 #include <limits>
 #include <tuple>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "cloud_maker.h"
 #include "ros/pose_conversion.h"
 #include "ros/scan_reader.h"

@@ -229,44 +229,22 @@ std::set<std::string> namesInCode() {
   return names;
 }
 
-TEST(Documents, NameEveryTopicAndService) {
-  const std::string document = textOf(kRoot / "docs/ros.md");
-  std::set<std::string> names = namesInCode();
-  EXPECT_EQ(names, (std::set<std::string>{"cast_rays",
-                                          "check_space",
-                                          "clear_bbx",
-                                          "distance_section",
-                                          "elevation_map",
-                                          "free_cells_vis_array",
-                                          "get_distances",
-                                          "get_frontiers",
-                                          "get_nearest_obstacles",
-                                          "get_section",
-                                          "load_map",
-                                          "occupancy",
-                                          "occupancy_updates",
-                                          "occupied_cells_vis_array",
-                                          "pause",
-                                          "projected_map",
-                                          "projected_map_updates",
-                                          "publish_map",
-                                          "query_points",
-                                          "reconfigure/parameter_descriptions",
-                                          "reconfigure/parameter_updates",
-                                          "reconfigure/set_parameters",
-                                          "reset",
-                                          "resume",
-                                          "save_map",
-                                          "status",
-                                          "trajectory",
-                                          "voxel_cloud",
-                                          "voxel_cloud_updates"}));
-  names.insert(InputConfig().topic);
-  for (const std::string& name : names) {
-    const bool known = document.find("| `" + name + "` |") != std::string::npos ||
-                       document.find("| `~" + name + "` |") != std::string::npos;
-    EXPECT_TRUE(known) << "docs/ros.md lacks " << name;
+/// The names of topics and services in a document: in the first column of tables with their types in the
+/// second.
+std::set<std::string> namesInTables(const std::string& document) {
+  std::set<std::string> names;
+  const std::regex row(R"re(\n\| `~?(\w[\w/]*)` \| `\w+/\w+`)re");
+  for (std::sregex_iterator i(document.begin(), document.end(), row), end; i != end; ++i) {
+    names.insert((*i)[1]);
   }
+  return names;
+}
+
+TEST(Documents, NameEveryTopicAndService) {
+  std::set<std::string> names = namesInCode();
+  names.insert(InputConfig().topic);
+  EXPECT_GE(names.size(), 30u);
+  EXPECT_EQ(names, namesInTables(textOf(kRoot / "docs/ros.md")));
 }
 
 TEST(Documents, HaveARowForEachReasonOfTheStatus) {

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <random>
 
+#include "bki_mapping/rules/map_snapshot.h"
 #include "rules/view_kernels.h"
 #include "simd/instruction_sets.h"
 #include "simd/vec_generic.h"

@@ -6,11 +6,11 @@
 #include <memory>
 #include <set>
 
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/map_merge.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "evaluation/passing_beams.h"
 #include "simulation/lidar.h"
 #include "simulation/street_parts.h"

@@ -15,9 +15,9 @@
 #include <sstream>
 #include <vector>
 
-#include "bki_mapping/io/mapper_file.h"
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
+#include "bki_mapping/store/mapper_file.h"
 #include "examples/planner.h"
 #include "simulation/lidar.h"
 #include "simulation/street_parts.h"

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <set>
 
+#include "simulation/drive_file.h"
 #include "simulation/lidar.h"
+#include "temporary_folder.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -110,12 +113,31 @@ TEST(Scene, VisitorsArriveAndStayAndLeave) {
   EXPECT_GT(waysOf(scene, 10, {1.0}).size(), 5u) << "cars that stand all the time";
 }
 
-TEST(Lidar, IsKnownByName) {
-  EXPECT_EQ(lidarNamed("hdl64").beams, 64);
-  EXPECT_EQ(lidarNamed("hdl32").beams, 32);
-  const LidarConfig lidar = lidarNamed("vlp16");
-  EXPECT_EQ(lidar.beams, 16);
-  EXPECT_NEAR(lidar.highest - lidar.lowest, M_PI / 6, 1e-12);
+TEST(Lidar, HasTheRowsOfItsDataSheet) {
+  struct DataSheet {
+    const char* name;
+    int rows;
+    double lowest, highest;  // [degrees]
+  };
+  for (const DataSheet& sheet :
+       {DataSheet{"vlp16", 16, -15.0, 15.0}, {"hdl32", 32, -30.67, 10.67}, {"hdl64", 64, -24.6, 2.3}}) {
+    LidarConfig lidar = lidarNamed(sheet.name);
+    lidar.columns = 180;
+    lidar.range_noise = 0.0;
+    std::set<int> rows;
+    for (const Eigen::Vector3f& point : Drive({1, 8.0, 1, lidar}).frame(0).points) {
+      const double elevation = std::asin(point.normalized().z()) * 180.0 / M_PI;
+      const double row = (elevation - sheet.lowest) / (sheet.highest - sheet.lowest) * (sheet.rows - 1);
+      ASSERT_NEAR(row, std::round(row), 0.15) << sheet.name;
+      rows.insert(static_cast<int>(std::round(row)));
+    }
+    EXPECT_GE(*rows.begin(), 0) << sheet.name;
+    EXPECT_LT(*rows.rbegin(), sheet.rows) << sheet.name;
+    EXPECT_GT(static_cast<int>(rows.size()), sheet.rows / 2) << sheet.name;
+  }
+}
+
+TEST(Lidar, UnknownNamesAreRefused) {
   EXPECT_THROW(lidarNamed("vlp17"), std::invalid_argument);
   EXPECT_THROW(sceneKindNamed("desert"), std::invalid_argument);
 }
@@ -170,6 +192,14 @@ TEST(Drive, RefusesAStreetWithoutEnd) {
   DriveConfig config{100, 8.0, 1, smallLidar()};
   config.lidar.rate = 1e-9;
   EXPECT_THROW(Drive{config}, std::invalid_argument);
+}
+
+TEST(DriveFile, IsReadAsAllUntrustedYaml) {
+  const TemporaryFolder folder;
+  for (const char* text : {"a: &a {b: *a}\n", "scans: 1\nscans: 2\n"}) {
+    std::ofstream(folder / "simulation.yaml") << text;
+    EXPECT_THROW(readDriveFile(folder / ""), std::runtime_error) << text;
+  }
 }
 
 TEST(Drive, IsRepeatableAndStartsAtTheMapsOrigin) {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "bki_mapping/io/yaml.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/settings/yaml.h"
 #include "simulation/lidar.h"
 
 namespace bki_mapping::simulation {

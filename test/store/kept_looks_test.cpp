@@ -1,7 +1,7 @@
 // That a window, a file that is continued and a merge keep the latest looks, too.
 #include <gtest/gtest.h>
 
-#include "bki_mapping/io/yaml.h"
+#include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/map_keeper.h"
 #include "bki_mapping/store/map_merge.h"
 #include "store/kept_mapper.h"

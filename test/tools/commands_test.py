@@ -77,7 +77,7 @@ LEFT_OUT = {
                      'scripts/map_city drives/city.yaml --output city --scheduler tcp://FIRST_HOST:8786'),
                     'needs a cluster; city_test starts a scheduler and workers'),
     'roslaunch bki_mapping mapping.launch map_file:=~/city/ classes:=semantic_kitti': 'city_rostest starts such a node',
-    'PYTHONPATH=scripts python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04 --void 0.6 2.4':
+    'PYTHONPATH=lab python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04 --void 0.6 2.4':
         'takes long; figures_test measures a small case',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }
@@ -91,7 +91,7 @@ SHORTER = {
 SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # environment of Google Benchmark
 # First words of commands in a line of text; a single word is only the name of a program.
 PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'ctest', 'dynparam', 'evaluate_map',
-            'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'query_city',
+            'export_map', 'inspect_map', 'lab/', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'query_city',
             'ros', 'rviz', 'scripts/', 'sequence_to_bag', 'simulate_city', 'simulate_drive', 'source')
 # Not commands: fragments in a line of text, whose other arguments are up to the reader.
 PARTS = {

@@ -484,7 +484,7 @@ class Tools(unittest.TestCase):
         for name, table in tables.items():
             with open(os.path.join(folder, name + '.csv'), 'w') as file:
                 file.write(table)
-        script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'scripts', 'plot_curves.py')
+        script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'lab', 'tools', 'plot_curves.py')
         subprocess.run(['/usr/bin/python3', script, folder], check=True, capture_output=True, timeout=120)
         for name in tables:
             with open(os.path.join(folder, name + '.png'), 'rb') as file:
@@ -697,34 +697,50 @@ class Tools(unittest.TestCase):
         with open(json_file) as file:
             self.assertIsNone(json.load(file)['bounds'])
 
-    def test_exporting(self):
+    def mapped(self, name, *settings):
+        """The map file of the drive."""
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', self.path(name), *settings)
+        return self.path(name)
+
+    def content(self, name):
+        with open(self.path(name), 'rb') as file:
+            return file.read()
+
+    def test_a_map_exports_as_its_drive_does(self):
         gain = ('--set', 'free_gain/static=0.2')
-        a, direct, exported = self.path('exported.bkm'), self.path('direct.ply'), self.path('exported.ply')
-        self.succeeds('map_sequence', '--sequence', self.drive, '--output', a, *gain)
+        a, exported = self.mapped('exported.bkm', *gain), self.path('exported.ply')
         for states in ('occupied', 'occupied,free'):
-            self.succeeds('map_sequence', '--sequence', self.drive, '--output', direct, '--include', states, *gain)
+            self.mapped('direct.ply', '--include', states, *gain)
             self.succeeds('export_map', a, '--output', exported, '--include', states)
-            with open(direct, 'rb') as one, open(exported, 'rb') as other:
-                self.assertEqual(one.read(), other.read(), states)
+            self.assertEqual(self.content('direct.ply'), self.content('exported.ply'), states)
+
+    def test_the_ending_chooses_the_format(self):
+        a = self.mapped('formats.bkm')
         for name, begin in (('map.ot', b'# Octomap OcTree file\n'), ('map.bt', b'# Octomap OcTree binary file\n'),
                             ('map.pcd', b'# .PCD v0.7'), ('map.yaml', b'image: "map.pgm"\n'), ('map.pgm', b'P5\n')):
             if name != 'map.pgm':
                 result = self.succeeds('export_map', a, '--output', self.path(name))
                 self.assertEqual((result.stderr, result.stdout), ('', f'{self.path(name)}: written, in frame map\n'))
-            with open(self.path(name), 'rb') as file:
-                self.assertEqual(file.read(len(begin)), begin)
-        with open(self.path('map.pgm'), 'rb') as file:
-            all_heights = file.read()
+            self.assertEqual(self.content(name)[:len(begin)], begin)
+
+    def test_heights_above_the_ground_hide_what_is_low(self):
+        a = self.mapped('heights.bkm')
+        self.succeeds('export_map', a, '--output', self.path('map.yaml'))
+        all_heights = self.content('map.pgm')
         self.succeeds('export_map', a, '--output', self.path('map.yaml'), '--height', 'ground', '--min-z', '0.5')
-        with open(self.path('map.pgm'), 'rb') as file:
-            above_ground = file.read()
+        above_ground = self.content('map.pgm')
         self.assertEqual(len(all_heights), len(above_ground))
         self.assertGreater(all_heights.count(b'\0'), above_ground.count(b'\0'))
-        far = self.path('far.bkm')
+
+    def test_far_maps_are_exported_relative_to_an_origin(self):
+        a, far = self.mapped('near.bkm'), self.path('far.bkm')
         self.succeeds('merge_maps', a, '--transform', f'{a}=499800,3999900,0,0', '--output', far)
         self.assertIn('written, in frame map, relative to its VIEWPOINT at 500000, 4000000, 0 m',
                       self.succeeds('export_map', far, '--output', self.path('map.pcd')).stdout)
         self.fails('move the map to a local frame with merge_maps --transform', 'export_map', far, '--output', self.path('map.ot'))
+
+    def test_exports_that_are_refused(self):
+        a, exported = self.mapped('refused.bkm'), self.path('refused.ply')
         self.fails('name one map file', 'export_map', '--output', exported)
         self.fails('--output FILE is missing', 'export_map', a)
         self.fails('must end in .ply, .pcd, .ot, .bt, .yaml or .html', 'export_map', a, '--output', self.path('map.bkm'))

@@ -47,8 +47,9 @@ class SemanticMap {
   std::size_t size() const { return size_; }
 
   /// A copy of the map as it is now; later changes of this map do not affect it. Its time and memory grow
-  /// with the number of regions, not of blocks; this map copies a block when it next writes to it. Other
-  /// threads may read and destroy snapshots while this map is written to.
+  /// with the number of regions, not of blocks; this map copies a block when it next writes to it (copy on
+  /// write; src/update/map_updater.cpp does so for scans). Other threads may read and destroy snapshots while
+  /// this map is written to.
   SemanticMap snapshot();
 
   /// @return nullptr if the map has no such block.

@@ -9,7 +9,7 @@
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/scan_stats.h"
-#include "bki_mapping/rules/state_rules.h"
+#include "bki_mapping/rules/map_snapshot.h"
 
 namespace bki_mapping {
 

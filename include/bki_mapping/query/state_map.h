@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "bki_mapping/rules/map_snapshot.h"
 #include "bki_mapping/rules/voxel_state.h"
 
 namespace bki_mapping {

@@ -72,10 +72,4 @@ class StateRules {
   bool neighbourhood_is_below_ = true, latest_decides_ = false;
 };
 
-/// A map as it was at some time, and the rules of that time.
-struct MapSnapshot {
-  SemanticMap map;
-  StateRules rules;
-};
-
 }  // namespace bki_mapping

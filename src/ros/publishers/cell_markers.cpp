@@ -8,7 +8,7 @@
 
 #include "bki_mapping/rules/voxel_state.h"
 #include "core/float_origin.h"
-#include "io/voxel_color.h"
+#include "export/voxel_color.h"
 #include "ros/map_publisher.h"
 #include "streamed_markers.h"
 
@@ -69,8 +69,9 @@ class CellMarkers : public MapPublisher {
   CellMarkers(const PublisherContext& context, const std::string& topic, VoxelState state, float alpha)
       : state_(state), alpha_(alpha) {
     publisher_ = context.advertiseUpdates<StreamedMarkers>(
-        topic, *this,
-        [this](const auto& subscriber, const MapSnapshot& snapshot) { subscriber.publish(whole(snapshot)); });
+        topic, *this, [this](const auto& subscriber, const ServerSnapshot& snapshot) {
+          subscriber.publish(whole(snapshot));
+        });
   }
 
   void rest() override {
@@ -88,7 +89,7 @@ class CellMarkers : public MapPublisher {
   };
   using Regions = std::map<GridIndex, Region>;
 
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     if (changed.all()) {
       publisher_.publish(whole(snapshot));
       return;
@@ -101,17 +102,17 @@ class CellMarkers : public MapPublisher {
     StreamedMarkers message;
     appendRegions(regions.members(), snapshot, message);
     forgetEmpty(regions.members(), snapshot);
-    if (message.count() > 0) publisher_.publish(message);
+    if (message.markers.count() > 0) publisher_.publish(message);
   }
 
   /// A message that must not outlive the snapshot.
-  StreamedMarkers whole(const MapSnapshot& snapshot) {
+  StreamedMarkers whole(const ServerSnapshot& snapshot) {
     StreamedMarker clear;
     clear.frame.header = snapshot.header;
     clear.frame.action = Marker::DELETEALL;
     clear.frame.pose.orientation.w = 1.0;
     StreamedMarkers message;
-    message.groups.push_back({{clear}, nullptr});
+    message.markers.groups.push_back({{clear}, nullptr});
     for (const auto& entry : snapshot.map.entries()) regionAt(SemanticMap::regionOf(entry.index));
     std::vector<GridIndex> indices;
     for (auto& [index, region] : regions_) {
@@ -137,7 +138,7 @@ class CellMarkers : public MapPublisher {
 
   /// Forgets regions without a block and frees their ids. To be called after the message is complete: it
   /// still deletes the markers with these ids, so that only the next message may use them again.
-  void forgetEmpty(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot) {
+  void forgetEmpty(const std::vector<GridIndex>& indices, const ServerSnapshot& snapshot) {
     for (const GridIndex& index : indices) {
       bool any = false;
       for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge && !any; ++n) {
@@ -149,19 +150,20 @@ class CellMarkers : public MapPublisher {
     }
   }
 
-  static double edgeOf(const MapSnapshot& snapshot) {
+  static double edgeOf(const ServerSnapshot& snapshot) {
     return kRegionEdge * snapshot.map.geometry().blockSize();
   }
-  static Eigen::Vector3d centreOf(const GridIndex& region, const MapSnapshot& snapshot) {
+  static Eigen::Vector3d centreOf(const GridIndex& region, const ServerSnapshot& snapshot) {
     return Eigen::Vector3d(region.x + 0.5, region.y + 0.5, region.z + 0.5) * edgeOf(snapshot);
   }
-  bool inView(const GridIndex& region, const MapSnapshot& snapshot) const {
+  bool inView(const GridIndex& region, const ServerSnapshot& snapshot) const {
     return snapshot.inView(centreOf(region, snapshot), edgeOf(snapshot));
   }
 
   /// Appends the markers of regions. Several threads count their voxels.
-  void appendRegions(const std::vector<GridIndex>& indices, const MapSnapshot& snapshot,
+  void appendRegions(const std::vector<GridIndex>& indices, const ServerSnapshot& snapshot,
                      StreamedMarkers& message) {
+    MarkerGroups& appended = message.markers;
     std::vector<Region*> regions;
     for (const GridIndex& index : indices) {
       regions.push_back(&regionAt(index)->second);
@@ -169,21 +171,21 @@ class CellMarkers : public MapPublisher {
     }
     std::vector<Cells> cells(indices.size());
     constexpr std::size_t kBlocks = 64;  // of a street, in a region; there is room for 512
-    message.threads = snapshot.threadsFor(kBlocks * indices.size());
-    ThreadPool pool(message.threads);
+    appended.threads = snapshot.threadsFor(kBlocks * indices.size());
+    ThreadPool pool(appended.threads);
     pool.forEachInOrder(indices.size(), [&](std::size_t r, std::size_t) {
       cells[r].origin = floatOrigin(centreOf(indices[r], snapshot), snapshot.map.geometry().resolution());
       if (regions[r]->in_view) count(indices[r], snapshot, cells[r]);
     });
     for (std::size_t r = 0; r < indices.size(); ++r) {
       MarkerGroup markers = markersOf(std::move(cells[r]), snapshot, *regions[r]);
-      if (!markers.markers.empty()) message.groups.push_back(std::move(markers));
+      if (!markers.markers.empty()) appended.groups.push_back(std::move(markers));
     }
   }
 
   /// Calls visit(offset, z) for the voxels of a block that are shown.
   template <typename Visit>
-  void forEachShown(const BlockIndex& index, const BlockView& view, const MapSnapshot& snapshot,
+  void forEachShown(const BlockIndex& index, const BlockView& view, const ServerSnapshot& snapshot,
                     const Visit& visit) const {
     const double edge = snapshot.map.geometry().resolution();
     constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;
@@ -203,7 +205,7 @@ class CellMarkers : public MapPublisher {
     std::array<std::uint32_t, 256> of_label{};  ///< number of voxels
   };
 
-  void count(const GridIndex& region, const MapSnapshot& snapshot, Cells& cells) const {
+  void count(const GridIndex& region, const ServerSnapshot& snapshot, Cells& cells) const {
     BlockView view;
     for (int n = 0; n < kRegionEdge * kRegionEdge * kRegionEdge; ++n) {
       const BlockIndex index{GridGeometry::voxelOf({region}, n)};
@@ -220,7 +222,7 @@ class CellMarkers : public MapPublisher {
   }
 
   /// The markers of a region, and the deletion of those that have become empty.
-  MarkerGroup markersOf(Cells cells, const MapSnapshot& snapshot, Region& region) const {
+  MarkerGroup markersOf(Cells cells, const ServerSnapshot& snapshot, Region& region) const {
     MarkerGroup group;
     const auto append = [&](ClassId label, std::int32_t action) {
       group.markers.push_back({emptyMarker(snapshot, label, cells.origin), cells.of_label[label]});
@@ -251,7 +253,7 @@ class CellMarkers : public MapPublisher {
     return group;
   }
 
-  void writeCubes(const BlockIndex& index, const Block& block, const MapSnapshot& snapshot,
+  void writeCubes(const BlockIndex& index, const Block& block, const ServerSnapshot& snapshot,
                   const Eigen::Vector3d& origin, const std::array<CubeWriter*, 256>& of_label) const {
     const ColorMode mode = snapshot.config.color_mode;
     const double edge = snapshot.map.geometry().resolution();
@@ -268,7 +270,7 @@ class CellMarkers : public MapPublisher {
     });
   }
 
-  Marker emptyMarker(const MapSnapshot& snapshot, ClassId label, const Eigen::Vector3d& origin) const {
+  Marker emptyMarker(const ServerSnapshot& snapshot, ClassId label, const Eigen::Vector3d& origin) const {
     const SemanticClass* known = snapshot.classes.find(label);
     Marker marker;
     marker.header = snapshot.header;

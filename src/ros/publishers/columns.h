@@ -55,7 +55,7 @@ class ColumnPublisher : public MapPublisher {
 
   /// Updates the columns. @return the updated stacks. @param all set to whether these are all of
   /// them.
-  std::set<ColumnMap::StackIndex> look(const MapSnapshot& snapshot, bool& all) {
+  std::set<ColumnMap::StackIndex> look(const ServerSnapshot& snapshot, bool& all) {
     const SemanticMap& map = snapshot.map;
     all = changed.all() || !known_ || columns_.rules() != rulesOf(snapshot.config);
     if (!all) return columns_.update(map, snapshot.rules, snapshot.classes, changed.blocks());

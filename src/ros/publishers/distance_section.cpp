@@ -32,7 +32,7 @@ class DistanceSection : public MapPublisher {
   }
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     const DistanceSectionConfig& config = snapshot.config.distance_section;
     const GridGeometry& geometry = snapshot.map.geometry();
     const std::optional<SectionRegion> region = regionOf(config, geometry, snapshot.sensor);
@@ -98,7 +98,7 @@ class DistanceSection : public MapPublisher {
     return static_cast<double>(inside) > kMany * blocks;
   }
 
-  nav_msgs::OccupancyGrid message(const MapSnapshot& snapshot, const StateMap& states,
+  nav_msgs::OccupancyGrid message(const ServerSnapshot& snapshot, const StateMap& states,
                                   const SectionRegion& region) const {
     const GridGeometry& geometry = snapshot.map.geometry();
     nav_msgs::OccupancyGrid grid;

@@ -12,7 +12,7 @@ class Elevation : public ColumnPublisher {
  public:
   explicit Elevation(const PublisherContext& context) {
     publisher_ = context.advertiseUpdates<ElevationMap>(
-        "elevation_map", *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+        "elevation_map", *this, [this](const auto& subscriber, const ServerSnapshot& snapshot) {
           bool all = false;
           look(snapshot, all);
           const CellRectangle rectangle = everything();
@@ -24,7 +24,7 @@ class Elevation : public ColumnPublisher {
  private:
   static constexpr std::size_t kBytesACell = 3 * sizeof(float) + 1;
 
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     bool all = false;
     const std::set<ColumnMap::StackIndex> stacks = look(snapshot, all);
     // Columns that were erased and new ones elsewhere may span a rectangle that does not fit.
@@ -36,7 +36,7 @@ class Elevation : public ColumnPublisher {
     publisher_.publish(message(snapshot, rectangle, all));
   }
 
-  ElevationMap message(const MapSnapshot& snapshot, const CellRectangle& rectangle, bool whole) const {
+  ElevationMap message(const ServerSnapshot& snapshot, const CellRectangle& rectangle, bool whole) const {
     const std::size_t cells = std::size_t{rectangle.width} * rectangle.height;
     ElevationMap message;
     message.header = snapshot.header;

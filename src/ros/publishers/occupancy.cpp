@@ -7,9 +7,11 @@ namespace {
 
 /// Fills in a whole map: a StreamedMap or a StreamedUpdate.
 template <typename Message>
-void fillMap(const MapSnapshot& snapshot, Message& message) {
+void fillMap(const ServerSnapshot& snapshot, Message& message) {
   for (const SemanticClass& c : snapshot.classes.classes()) message.classes.push_back(toMessage(c));
-  message.blocks = {&snapshot, sortedBlocks(snapshot.map), snapshot.threadsFor(snapshot.map.size())};
+  message.blocks.map = &snapshot;
+  message.blocks.blocks = sortedBlocks(snapshot.map);
+  message.blocks.threads = snapshot.threadsFor(snapshot.map.size());
 }
 
 class Occupancy : public MapPublisher {
@@ -19,7 +21,7 @@ class Occupancy : public MapPublisher {
   }
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     StreamedMap message;
     message.header = snapshot.header;
     message.resolution = static_cast<float>(snapshot.map.geometry().resolution());
@@ -34,10 +36,10 @@ class OccupancyUpdates : public UpdatePublisher<StreamedUpdate> {
       : UpdatePublisher(context, "occupancy_updates") {}
 
  private:
-  void fillWhole(const MapSnapshot& snapshot, StreamedUpdate& message) const override {
+  void fillWhole(const ServerSnapshot& snapshot, StreamedUpdate& message) const override {
     fillMap(snapshot, message);
   }
-  void fillChanges(const MapSnapshot& snapshot, StreamedUpdate& message) const override {
+  void fillChanges(const ServerSnapshot& snapshot, StreamedUpdate& message) const override {
     const SemanticMap& map = snapshot.map;
     message.blocks.map = &snapshot;
     message.blocks.threads = snapshot.threadsFor(changed.blocks().size());

@@ -14,7 +14,7 @@ class ProjectedMap : public ColumnPublisher {
  public:
   explicit ProjectedMap(const PublisherContext& context) {
     publisher_ = context.advertiseUpdates<nav_msgs::OccupancyGrid>(
-        "projected_map", *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+        "projected_map", *this, [this](const auto& subscriber, const ServerSnapshot& snapshot) {
           bool all = false;
           look(snapshot, all);
           if (all) layOut(snapshot);
@@ -27,7 +27,7 @@ class ProjectedMap : public ColumnPublisher {
   bool wanted() const override { return MapPublisher::wanted() || updates_.getNumSubscribers() > 0; }
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     bool all = false;
     const std::set<ColumnMap::StackIndex> stacks = look(snapshot, all);
     const bool inside =
@@ -43,7 +43,7 @@ class ProjectedMap : public ColumnPublisher {
   }
 
   /// Makes the grid large enough for all known cells.
-  void layOut(const MapSnapshot& snapshot) {
+  void layOut(const ServerSnapshot& snapshot) {
     grid_ = everything();
     const bool grows = !snapshot.config.full_projected_map && grid_.width > 0;
     if (!grows) return;
@@ -60,7 +60,7 @@ class ProjectedMap : public ColumnPublisher {
     return data;
   }
 
-  nav_msgs::OccupancyGrid whole(const MapSnapshot& snapshot) const {
+  nav_msgs::OccupancyGrid whole(const ServerSnapshot& snapshot) const {
     const double resolution = snapshot.map.geometry().resolution();
     nav_msgs::OccupancyGrid grid;
     grid.header = snapshot.header;
@@ -75,7 +75,7 @@ class ProjectedMap : public ColumnPublisher {
     return grid;
   }
 
-  map_msgs::OccupancyGridUpdate update(const MapSnapshot& snapshot, const CellRectangle& rectangle) const {
+  map_msgs::OccupancyGridUpdate update(const ServerSnapshot& snapshot, const CellRectangle& rectangle) const {
     map_msgs::OccupancyGridUpdate message;
     message.header = snapshot.header;
     message.x = rectangle.x - grid_.x;

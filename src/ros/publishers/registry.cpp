@@ -2,6 +2,18 @@
 
 namespace bki_mapping::ros_interface {
 
+// Each file beside this one makes one publisher, or two of a kind.
+std::unique_ptr<MapPublisher> makeOccupiedCells(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeFreeCells(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeVoxelCloud(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeVoxelCloudUpdates(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeProjectedMap(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeOccupancy(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeOccupancyUpdates(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeElevationMap(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeTrajectory(const PublisherContext& context);
+std::unique_ptr<MapPublisher> makeDistanceSection(const PublisherContext& context);
+
 std::vector<std::unique_ptr<MapPublisher>> makePublishers(const PublisherContext& context) {
   std::vector<std::unique_ptr<MapPublisher>> publishers;
   publishers.push_back(makeOccupiedCells(context));  // occupied_cells_vis_array

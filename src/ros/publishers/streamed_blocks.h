@@ -8,13 +8,14 @@
 #include <utility>
 #include <vector>
 
+#include "bki_mapping/rules/map_snapshot.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
 
 /// The field `blocks` of OccupancyMap and OccupancyUpdate. The map must outlive it, and not change.
-struct StreamedBlocks {
+struct OccupancyBlocks {
   std::uint32_t bytes() const { return messageBytes(blocks.size(), kBytes); }
   std::uint32_t count() const { return static_cast<std::uint32_t>(blocks.size()); }
   void write(std::uint8_t* to) const {
@@ -26,7 +27,7 @@ struct StreamedBlocks {
     });
   }
 
-  const bki_mapping::MapSnapshot* map = nullptr;
+  const MapSnapshot* map = nullptr;
   std::vector<std::pair<BlockIndex, const Block*>> blocks;
   int threads = 1;  ///< that write
 
@@ -56,8 +57,11 @@ struct StreamedBlocks {
   }
 };
 
-/// A bki_mapping/OccupancyMap.
-struct StreamedMap : StandsFor<OccupancyMap> {
+using StreamedBlocks = StreamedArray<OccupancyBlocks>;
+
+struct OccupancyMapFields {
+  using Message = OccupancyMap;
+
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -73,9 +77,11 @@ struct StreamedMap : StandsFor<OccupancyMap> {
   std::vector<ClassInfo> classes;
   StreamedBlocks blocks;
 };
+using StreamedMap = StreamedMessage<OccupancyMapFields>;
 
-/// A bki_mapping/OccupancyUpdate.
-struct StreamedUpdate : StandsFor<OccupancyUpdate> {
+struct OccupancyUpdateFields {
+  using Message = OccupancyUpdate;
+
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -97,21 +103,6 @@ struct StreamedUpdate : StandsFor<OccupancyUpdate> {
   StreamedBlocks blocks;
   std::vector<BlockCoordinates> removed;
 };
+using StreamedUpdate = StreamedMessage<OccupancyUpdateFields>;
 
 }  // namespace bki_mapping::ros_interface
-
-namespace ros {
-namespace serialization {
-
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedBlocks>
-    : bki_mapping::ros_interface::ArraySerializer<bki_mapping::ros_interface::StreamedBlocks> {};
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedMap>
-    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedMap> {};
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedUpdate>
-    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedUpdate> {};
-
-}  // namespace serialization
-}  // namespace ros

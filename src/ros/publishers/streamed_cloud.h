@@ -9,21 +9,21 @@
 #include <utility>
 #include <vector>
 
-#include "io/voxel_pcl.h"
-#include "io/voxel_points.h"
+#include "export/voxel_pcl.h"
+#include "export/voxel_points.h"
 #include "ros/cloud_frame.h"
-#include "ros/map_snapshot.h"
+#include "ros/server_snapshot.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {
 
 /// The field `data` of a PointCloud2 of voxels.
-class StreamedPoints {
+class CloudData {
  public:
-  StreamedPoints() = default;  ///< no points
+  CloudData() = default;  ///< no points
   /// Counts the points. @param snapshot must outlive this. @param origin of the coordinates [m].
-  StreamedPoints(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
-                 const Eigen::Vector3d& origin)
+  CloudData(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+            const Eigen::Vector3d& origin)
       : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))), origin_(origin) {}
 
   std::size_t points() const { return content_ ? content_->points.count() : 0; }
@@ -35,7 +35,7 @@ class StreamedPoints {
 
  private:
   struct Content {
-    Content(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+    Content(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
         : pool(snapshot.threadsFor(blocks.size())),
           points(snapshot.map, snapshot.rules, snapshot.classes, selection, std::move(blocks), pool) {}
 
@@ -47,12 +47,14 @@ class StreamedPoints {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
-/// A sensor_msgs/PointCloud2 of voxels.
-struct StreamedCloud : StandsFor<sensor_msgs::PointCloud2> {
-  StreamedCloud() = default;
+/// A cloud of voxels.
+struct CloudFields {
+  using Message = sensor_msgs::PointCloud2;
+
+  CloudFields() = default;
   /// @param snapshot must outlive this. @param in the frame of the cloud.
-  StreamedCloud(const MapSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
-                const CloudFrame& in)
+  CloudFields(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+              const CloudFrame& in)
       : data(snapshot, selection, std::move(blocks), in.origin()) {
     pcl_conversions::fromPCL(pclHeader(data.points()), frame);
     frame.header = snapshot.header;
@@ -73,11 +75,13 @@ struct StreamedCloud : StandsFor<sensor_msgs::PointCloud2> {
   }
 
   sensor_msgs::PointCloud2 frame;  ///< all but the data
-  StreamedPoints data;
+  StreamedArray<CloudData> data;
 };
+using StreamedCloud = StreamedMessage<CloudFields>;
 
-/// A bki_mapping/VoxelCloudUpdate.
-struct StreamedCloudUpdate : StandsFor<VoxelCloudUpdate> {
+struct CloudUpdateFields {
+  using Message = VoxelCloudUpdate;
+
   template <typename Visit>
   void forEachMember(const Visit& visit) const {
     visit(header);
@@ -95,21 +99,6 @@ struct StreamedCloudUpdate : StandsFor<VoxelCloudUpdate> {
   std::vector<BlockCoordinates> blocks;
   StreamedCloud cloud;
 };
+using StreamedCloudUpdate = StreamedMessage<CloudUpdateFields>;
 
 }  // namespace bki_mapping::ros_interface
-
-namespace ros {
-namespace serialization {
-
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedPoints>
-    : bki_mapping::ros_interface::ArraySerializer<bki_mapping::ros_interface::StreamedPoints> {};
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedCloud>
-    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedCloud> {};
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedCloudUpdate>
-    : bki_mapping::ros_interface::MemberSerializer<bki_mapping::ros_interface::StreamedCloudUpdate> {};
-
-}  // namespace serialization
-}  // namespace ros

@@ -69,8 +69,8 @@ struct MarkerGroup {
   std::function<void(std::vector<CubeWriter>&)> write;
 };
 
-/// A visualization_msgs/MarkerArray.
-struct StreamedMarkers : StandsFor<visualization_msgs::MarkerArray> {
+/// The field `markers` of a MarkerArray.
+struct MarkerGroups {
   std::uint32_t count() const {
     std::size_t markers = 0;
     for (const MarkerGroup& group : groups) markers += group.markers.size();
@@ -105,14 +105,16 @@ struct StreamedMarkers : StandsFor<visualization_msgs::MarkerArray> {
   }
 };
 
+struct MarkerArrayFields {
+  using Message = visualization_msgs::MarkerArray;
+
+  template <typename Visit>
+  void forEachMember(const Visit& visit) const {
+    visit(markers);
+  }
+
+  StreamedArray<MarkerGroups> markers;
+};
+using StreamedMarkers = StreamedMessage<MarkerArrayFields>;
+
 }  // namespace bki_mapping::ros_interface
-
-namespace ros {
-namespace serialization {
-
-template <>
-struct Serializer<bki_mapping::ros_interface::StreamedMarkers>
-    : bki_mapping::ros_interface::ArraySerializer<bki_mapping::ros_interface::StreamedMarkers> {};
-
-}  // namespace serialization
-}  // namespace ros

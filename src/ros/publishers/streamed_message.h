@@ -1,5 +1,5 @@
-/// @file Messages whose large part is written straight into the buffer that is sent, by several threads. A
-/// streamed message has a type of its own, but is, to subscribers, the message that it stands for.
+/// @file Messages whose large part is written straight into the buffer that is sent, by several threads. To
+/// subscribers, a streamed message is the message that it stands for.
 #pragma once
 
 #include <ros/message_traits.h>
@@ -35,10 +35,14 @@ inline void useLargePages(std::uint8_t* data, std::size_t bytes) {
   if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
 
-/// Base of a streamed message, by which ROS takes it for the message that it stands for. ROS asks by these
-/// names.
-template <typename Message>
-struct StandsFor {
+/// A streamed message. @tparam Fields has the members of Fields::Message, which it stands for, and
+/// forEachMember, which visits them in the order of the .msg file.
+template <typename Fields>
+struct StreamedMessage : Fields {
+  using Fields::Fields;
+  using Message = typename Fields::Message;
+
+  // ROS asks by these names for what a message is.
   static const std::string& __s_getMD5Sum() { return kept<ros::message_traits::MD5Sum<Message>>(); }
   static const std::string& __s_getDataType() { return kept<ros::message_traits::DataType<Message>>(); }
   static const std::string& __s_getMessageDefinition() {
@@ -56,32 +60,45 @@ struct StandsFor {
   }
 };
 
-/// Serialises a streamed message, whose forEachMember visits its members in the order of the .msg file.
-template <typename Streamed>
-struct MemberSerializer {
-  static void write(ros::serialization::OStream& stream, const Streamed& message) {
+/// An array of a streamed message. @tparam Content has count(), the bytes() of all elements, and write(to).
+template <typename Content>
+struct StreamedArray : Content {
+  using Content::Content;
+};
+
+}  // namespace bki_mapping::ros_interface
+
+namespace ros {
+namespace serialization {
+
+template <typename Fields>
+struct Serializer<bki_mapping::ros_interface::StreamedMessage<Fields>> {
+  using Message = bki_mapping::ros_interface::StreamedMessage<Fields>;
+
+  static void write(OStream& stream, const Message& message) {
     message.forEachMember([&stream](const auto& member) { stream.next(member); });
   }
-  static std::uint32_t serializedLength(const Streamed& message) {
+  static std::uint32_t serializedLength(const Message& message) {
     std::uint32_t length = 0;
-    message.forEachMember(
-        [&length](const auto& member) { length += ros::serialization::serializationLength(member); });
+    message.forEachMember([&length](const auto& member) { length += serializationLength(member); });
     return length;
   }
 };
 
-/// Serialises a streamed array, which has count(), the bytes() of all elements, and write(to).
-template <typename Streamed>
-struct ArraySerializer {
-  static void write(ros::serialization::OStream& stream, const Streamed& array) {
+template <typename Content>
+struct Serializer<bki_mapping::ros_interface::StreamedArray<Content>> {
+  using Array = bki_mapping::ros_interface::StreamedArray<Content>;
+
+  static void write(OStream& stream, const Array& array) {
     stream.next(array.count());
     std::uint8_t* const to = stream.advance(array.bytes());
-    useLargePages(to, array.bytes());
+    bki_mapping::ros_interface::useLargePages(to, array.bytes());
     array.write(to);
   }
-  static std::uint32_t serializedLength(const Streamed& array) {
+  static std::uint32_t serializedLength(const Array& array) {
     return static_cast<std::uint32_t>(sizeof(std::uint32_t)) + array.bytes();
   }
 };
 
-}  // namespace bki_mapping::ros_interface
+}  // namespace serialization
+}  // namespace ros

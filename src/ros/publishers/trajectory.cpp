@@ -13,7 +13,7 @@ class Trajectory : public MapPublisher {
   }
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     nav_msgs::Path path;
     path.header = snapshot.header;
     path.poses.resize(snapshot.trajectory.size());

@@ -26,22 +26,22 @@ class UpdatePublisher : public MapPublisher {
  protected:
   UpdatePublisher(const PublisherContext& context, const std::string& topic) {
     publisher_ = context.advertiseUpdates<Message>(
-        topic, *this, [this](const auto& subscriber, const MapSnapshot& snapshot) {
+        topic, *this, [this](const auto& subscriber, const ServerSnapshot& snapshot) {
           subscriber.publish(message(snapshot, true));
         });
   }
 
  private:
-  virtual void fillWhole(const MapSnapshot& snapshot, Message& message) const = 0;
+  virtual void fillWhole(const ServerSnapshot& snapshot, Message& message) const = 0;
   /// Fills in the blocks in `changed`.
-  virtual void fillChanges(const MapSnapshot& snapshot, Message& message) const = 0;
+  virtual void fillChanges(const ServerSnapshot& snapshot, Message& message) const = 0;
 
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     ++sequence_;
     publisher_.publish(message(snapshot, changed.all()));
   }
 
-  Message message(const MapSnapshot& snapshot, bool whole) const {
+  Message message(const ServerSnapshot& snapshot, bool whole) const {
     Message message;
     message.header = snapshot.header;
     message.sequence = sequence_;

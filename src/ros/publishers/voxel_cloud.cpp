@@ -10,7 +10,7 @@ VoxelSelection known() {
 }
 
 /// Makes a cloud of blocks, in a frame that follows them.
-StreamedCloud cloudOf(const MapSnapshot& snapshot, const VoxelSelection& selection,
+StreamedCloud cloudOf(const ServerSnapshot& snapshot, const VoxelSelection& selection,
                       VoxelPoints::Blocks blocks, CloudFrame& frame) {
   const GridGeometry& geometry = snapshot.map.geometry();
   if (!blocks.empty())
@@ -25,7 +25,7 @@ class VoxelCloud : public MapPublisher {
   }
 
  private:
-  void publishNew(const MapSnapshot& snapshot) override {
+  void publishNew(const ServerSnapshot& snapshot) override {
     VoxelSelection in_view = known();
     in_view.min_z = snapshot.config.view_min_z;
     in_view.max_z = snapshot.config.view_max_z;
@@ -44,10 +44,10 @@ class VoxelCloudUpdates : public UpdatePublisher<StreamedCloudUpdate> {
       : UpdatePublisher(context, "voxel_cloud_updates") {}
 
  private:
-  void fillWhole(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
+  void fillWhole(const ServerSnapshot& snapshot, StreamedCloudUpdate& message) const override {
     message.cloud = cloudOf(snapshot, known(), sortedBlocks(snapshot.map), frame_);
   }
-  void fillChanges(const MapSnapshot& snapshot, StreamedCloudUpdate& message) const override {
+  void fillChanges(const ServerSnapshot& snapshot, StreamedCloudUpdate& message) const override {
     VoxelPoints::Blocks blocks;
     blocks.reserve(changed.blocks().size());
     message.blocks.reserve(changed.blocks().size());

@@ -27,6 +27,18 @@ void query(const QueriedMap& map, const GetSection::Request& asked, GetSection::
 void query(const QueriedMap& map, const GetFrontiers::Request& asked, GetFrontiers::Response& answer);
 void query(const QueriedMap& map, const GetDistances::Request& asked, GetDistances::Response& answer);
 
+/// The registry: calls offer(name, service) for each of them.
+template <typename Offer>
+void forEachQuery(const Offer& offer) {
+  offer("query_points", QueryPoints());
+  offer("cast_rays", CastRays());
+  offer("check_space", CheckSpace());
+  offer("get_nearest_obstacles", GetNearestObstacles());
+  offer("get_section", GetSection());
+  offer("get_frontiers", GetFrontiers());
+  offer("get_distances", GetDistances());
+}
+
 /// The box to which a request limits the frontiers; without: it asks for those of the whole map.
 std::optional<Eigen::AlignedBox3d> boxOf(const GetFrontiers::Request& asked);
 

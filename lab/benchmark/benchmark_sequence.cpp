@@ -1,0 +1,155 @@
+// Times the integration of a sequence in every mode, against pcl::VoxelGrid on the same scans in the same
+// run.
+#include <pcl/filters/voxel_grid.h>
+#include <pcl/point_types.h>
+
+#include <cstdio>
+
+#include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/settings/yaml.h"
+#include "cases.h"
+#include "core/atomic_file.h"
+#include "core/quantile.h"
+#include "core/stopwatch.h"
+#include "curves.h"
+#include "tools/run_report.h"
+#include "tools/sequence_options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+using benchmark::Case;
+
+/// Times of the scans in all repeats [ms].
+struct Timing {
+  std::vector<double> yardstick, integration;
+  std::size_t map_bytes = 0;
+
+  double median() const { return quantile(integration, 0.5); }
+  double ratio() const { return median() / quantile(yardstick, 0.5); }
+};
+
+/// A preset with other settings on top of its own. @param name of the preset, by which the tables call it.
+Case presetCase(const std::string& name, const std::map<std::string, std::string>& changes) {
+  Case preset = {name, loadParameterFile(name)};
+  for (const auto& [parameter, value] : changes) preset.settings[parameter] = value;
+  return preset;
+}
+
+/// The modes with default settings, and what robots run.
+std::vector<Case> cases() {
+  std::vector<Case> all = benchmark::modeCases();
+  all.push_back({"line, bilinear, mapped", {{"free_space/extent", "mapped"}, {"resolution", "0.1"}}});
+  all.push_back(presetCase("robot", {}));
+  all.push_back(presetCase("robot", {{"resolution", "0.1"}}));
+  // The paper's kernel reaches three of these voxels to each side: it takes the loops of wide kernels.
+  all.push_back(presetCase("paper_line", {{"resolution", "0.1"}, {"kernel/length", "0.3"}}));
+  return all;
+}
+
+po::options_description options() {
+  po::options_description options("Options");
+  options.add(tools::sequenceOptions());
+  options.add_options()("csv", po::value<std::string>()->value_name("FILE"), "output table")(
+      "warm-up", tools::countOption("--warm-up", 0)->value_name("N")->default_value(3),
+      "number of first scans that are not timed")(
+      "repeats", tools::countOption("--repeats", 1)->value_name("N")->default_value(5),
+      "number of times that each mode maps the sequence")(
+      "curves", po::value<std::string>()->value_name("DIR"),
+      "also measure simulated drives, and write curves as CSV and PNG to this folder")(
+      "curve-scans", tools::countOption("--curve-scans", 2, 1000000)->value_name("N")->default_value(2000),
+      "scans of the drive during which the map grows");
+  return options;
+}
+
+/// Times pcl::VoxelGrid with leaves of 0.1 m on raw scans, on one thread.
+void timeYardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up, Timing& timing) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
+    for (std::size_t p = 0; p < frames[i].points.size(); ++p) {
+      pcl::PointXYZL point;
+      point.getVector3fMap() = frames[i].points[p];
+      point.label = frames[i].labels[p];
+      cloud->push_back(point);
+    }
+    pcl::VoxelGrid<pcl::PointXYZL> grid;
+    pcl::PointCloud<pcl::PointXYZL> output;
+    Stopwatch watch;
+    grid.setInputCloud(cloud);
+    grid.setLeafSize(0.1f, 0.1f, 0.1f);
+    grid.filter(output);
+    if (i >= warm_up) timing.yardstick.push_back(watch.lap());
+  }
+}
+
+void timeCase(const Case& c, int threads, const std::vector<SequenceFrame>& frames, std::size_t warm_up,
+              const std::shared_ptr<const ClassTable>& classes, Timing& timing) {
+  MapperConfig config;
+  setParameters(config, c.settings);
+  config.threads = threads;
+  SemanticMapper mapper(config, classes);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Scan scan = frames[i].scan();
+    Stopwatch watch;
+    mapper.integrate(scan);
+    if (i >= warm_up) timing.integration.push_back(watch.lap());
+  }
+  timing.map_bytes = mapper.map().bytes();
+}
+
+int measure(const po::variables_map& given) {
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
+  const std::size_t warm_up = tools::count(given, "warm-up");
+  const std::size_t repeats = tools::count(given, "repeats");
+  if (last - first <= warm_up)
+    throw std::invalid_argument("no scans are left after --warm-up; lower it, or raise --scans");
+  if (given.count("csv")) checkWritable(given["csv"].as<std::string>());
+  std::vector<SequenceFrame> frames;
+  for (std::size_t i = first; i < last; ++i) frames.push_back(sequence.read(i));
+  const auto classes = std::make_shared<const ClassTable>(loadClassTable("semantic_kitti"));
+
+  std::string csv = "mode,resolution,threads,median_ms,p99_ms,ratio_to_y,map_bytes\n";
+  std::printf("%-26s %10s %7s %9s %9s %8s %8s %8s\n", "mode", "resolution", "threads", "median ms", "p99 ms",
+              "ratio", "map MB", "speed-up");
+  for (const Case& c : cases()) {
+    const auto set = c.settings.find("resolution");
+    const std::string edge = set == c.settings.end() ? numberText(MapperConfig().resolution) : set->second;
+    Timing timings[2];  // with one thread, and with two
+    for (std::size_t repeat = 0; repeat < repeats; ++repeat) {
+      for (int threads = 1; threads <= 2; ++threads) {
+        // Measured in every repeat, so that both terms of a ratio see the same load of the machine.
+        timeYardstick(frames, warm_up, timings[threads - 1]);
+        timeCase(c, threads, frames, warm_up, classes, timings[threads - 1]);
+      }
+    }
+    for (int threads = 1; threads <= 2; ++threads) {
+      const Timing& t = timings[threads - 1];
+      const double p99_ms = quantile(t.integration, 0.99);
+      std::printf("%-26s %10s %7d %9.1f %9.1f %8.2f %8.1f %8.2f\n", c.name.c_str(), edge.c_str(), threads,
+                  t.median(), p99_ms, t.ratio(), static_cast<double>(t.map_bytes) / 1e6,
+                  timings[0].median() / t.median());
+      csv += '"' + c.name + "\"," + edge + "," + std::to_string(threads) + "," + std::to_string(t.median()) +
+             "," + std::to_string(p99_ms) + "," + std::to_string(t.ratio()) + "," +
+             std::to_string(t.map_bytes) + "\n";
+    }
+    std::fflush(stdout);
+  }
+  std::printf("peak memory of the whole run: %.0f MB\n",
+              static_cast<double>(tools::peakResidentBytes()) / 1e6);
+  if (given.count("csv")) writeTextFile(given["csv"].as<std::string>(), csv);
+  if (given.count("curves")) {
+    benchmark::measureCurves(given["curves"].as<std::string>(), tools::count(given, "curve-scans"));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run(argc, argv, "benchmark_sequence",
+                    "Times every mode on a sequence, in ratios to pcl::VoxelGrid at 0.1 m in the same run.",
+                    options(), measure);
+}

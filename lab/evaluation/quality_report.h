@@ -1,0 +1,53 @@
+/// @file The figures of evaluate_map as a table and as JSON.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluation/cloud_evaluation.h"
+#include "evaluation/dynamics_evaluation.h"
+#include "evaluation/occupancy_evaluation.h"
+#include "evaluation/presence_evaluation.h"
+#include "evaluation/semantic_evaluation.h"
+#include "evaluation/truth_evaluation.h"
+
+namespace bki_mapping {
+
+/// The same map, with its states decided by other settings.
+struct JudgedMap {
+  std::string settings;  ///< as given
+  DynamicsQuality dynamics;
+};
+
+/// The same scans in an OctoMap.
+struct OctomapQuality {
+  DynamicsQuality dynamics;
+  PresenceQuality presence;
+  double median_ms = 0.0;  ///< median time of a scan [ms]
+  std::size_t bytes = 0;   ///< of memory
+};
+
+struct MapQuality {
+  DynamicsQuality dynamics;
+  std::vector<JudgedMap> judged;
+  PresenceQuality presence;
+  SemanticQuality semantics;
+  Reliability occupancy;              ///< by the points, see OccupancyEvaluation
+  std::optional<CloudQuality> cloud;  ///< compared with a ground-truth cloud
+  std::optional<OctomapQuality> octomap;
+  std::optional<TruthQuality> truth;               ///< only for simulated drives
+  std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
+  double median_ms = 0.0;                          ///< median time of a scan [ms]
+  bool labels_are_ids = false;                     ///< so that it is unknown what moves
+  std::size_t labels = 0, unknown_labels = 0;      ///< labels of all points; those not in the class table
+  std::uint32_t unknown_label = 0;                 ///< an example of the latter
+};
+
+/// A table with one figure per line and its meaning; "-" for fractions of nothing.
+std::string qualityTable(const MapQuality& quality, const ClassTable& classes);
+
+/// JSON; docs/files.md describes it. Fractions of nothing are null.
+std::string qualityJson(const MapQuality& quality, const ClassTable& classes);
+
+}  // namespace bki_mapping

@@ -1,0 +1,66 @@
+#include "simulation/drive_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "core/atomic_file.h"
+#include "settings/yaml_file.h"
+
+namespace bki_mapping::simulation {
+namespace {
+
+std::string pathIn(const std::string& folder) {
+  return (std::filesystem::path(folder) / "simulation.yaml").string();
+}
+
+/// Calls visit(name, value) for each setting, in the order of the file.
+template <typename Config, typename Visit>
+void forEachSetting(Config& config, Visit&& visit) {
+  visit("scans", config.scans);
+  visit("speed", config.speed);
+  visit("height", config.height);
+  visit("seed", config.seed);
+  visit("beams", config.lidar.beams);
+  visit("columns", config.lidar.columns);
+  visit("lowest", config.lidar.lowest);
+  visit("highest", config.lidar.highest);
+  visit("max_range", config.lidar.max_range);
+  visit("range_noise", config.lidar.range_noise);
+  visit("label_noise", config.lidar.label_noise);
+  visit("rate", config.lidar.rate);
+  visit("noise_seed", config.lidar.seed);
+}
+
+}  // namespace
+
+void writeDriveFile(const std::string& folder, const DriveConfig& config) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(17);
+  out << YAML::BeginMap << YAML::Key << "scene" << YAML::Value << nameOf(config.scene);
+  forEachSetting(
+      config, [&](const char* name, const auto& value) { out << YAML::Key << name << YAML::Value << value; });
+  out << YAML::EndMap;
+  writeTextFile(pathIn(folder), std::string(out.c_str()) + "\n");
+}
+
+std::optional<DriveConfig> readDriveFile(const std::string& folder) {
+  const std::string path = pathIn(folder);
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    const YAML::Node file = loadYamlFile(path);
+    DriveConfig config;
+    config.scene = sceneKindNamed(file["scene"].as<std::string>());
+    forEachSetting(config, [&](const char* name, auto& value) {
+      if (name == std::string("height") && !file[name]) return;  // a file of an earlier version
+      value = file[name].template as<std::decay_t<decltype(value)>>();
+    });
+    return config;
+  } catch (const std::exception& fault) {
+    throw std::runtime_error(path + " cannot be read (" + fault.what() +
+                             "); write the drive again with simulate_drive");
+  }
+}
+
+}  // namespace bki_mapping::simulation

@@ -1,0 +1,382 @@
+// Maps a labelled sequence and measures the quality of the map: static and moving objects, classes,
+// calibration.
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "bki_mapping/rules/voxel_state.h"
+#include "bki_mapping/sequence/sequence.h"
+#include "core/atomic_file.h"
+#include "core/counted.h"
+#include "core/quantile.h"
+#include "evaluation/cloud_evaluation.h"
+#include "evaluation/label_noise.h"
+#include "evaluation/octomap_mapper.h"
+#include "evaluation/pose_noise.h"
+#include "evaluation/presence_evaluation.h"
+#include "evaluation/quality_report.h"
+#include "settings/label_watch.h"
+#include "simulation/drive_file.h"
+#include "simulation/truth_cloud.h"
+#include "tools/draw.h"
+#include "tools/interruption.h"
+#include "tools/sequence_options.h"
+
+namespace {
+
+using namespace bki_mapping;
+namespace po = tools::po;
+
+/// On simulated drives, ghosts are counted after every kGhostsEvery scans.
+constexpr std::size_t kGhostsEvery = 10;
+
+po::options_description options() {
+  po::options_description options("Options");
+  options.add_options()("json", po::value<std::string>()->value_name("FILE.json"),
+                        "JSON file for the figures")(
+      "errors", po::value<std::string>()->value_name("FILE.png"),
+      "picture of the errors seen from above; FILE.csv lists them")(
+      "late", tools::countOption("--late", 0)->value_name("N")->default_value(3),
+      "voxels hit in the last N scans do not count for DA")(
+      "label-noise", tools::realOption("--label-noise", 0.0, 1.0)->value_name("FRACTION")->default_value(0.0),
+      "probability that a label is replaced by a wrong one")(
+      "label-errors", po::value<std::string>()->value_name("KIND")->default_value("even"),
+      "which labels --label-noise replaces: even, similar, objects, borders, far or network")(
+      "label-error-seconds",
+      tools::realOption("--label-error-seconds", 0.001, 3600.0)->value_name("S")->default_value(1.0),
+      "how long whole objects keep their wrong label, with --label-errors objects or network [s]")(
+      "predictions", po::value<std::string>()->value_name("FOLDER"),
+      "name of a folder with predicted labels to map; those of --labels are the truth")(
+      "write-predictions", po::value<std::string>()->value_name("FOLDER"),
+      "name of a folder for the labels that are mapped, to be read by --predictions")(
+      "pose-noise", po::value<std::string>()->value_name("M,DEG"),
+      "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
+      "pose-drift", po::value<std::string>()->value_name("M,DEG"),
+      "the same for errors of each step from pose to pose, which add up")(
+      "cloud", po::bool_switch(),
+      "also compare the points in occupied voxels with a ground-truth cloud, as the DynamicMap benchmark "
+      "does: "
+      "gt_cloud.pcd beside pcd/, otherwise the labelled points of the scans")(
+      "cloud-distance",
+      tools::realOption("--cloud-distance", 0.0, 10.0)->value_name("M")->default_value(0.05),
+      "distance within which points of the two clouds match [m]")(
+      "octomap", po::bool_switch(),
+      "also map the same points with OctoMap, with its defaults, and measure that map")(
+      "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
+      "also give SA and DA of the same map with other free_gain settings; repeatable")(
+      "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
+      "seed of the errors");
+  options.add(tools::sequenceOptions()).add(tools::mapperOptions());
+  return options;
+}
+
+/// An OctoMap of the same scans, and what only it has.
+struct OctomapRun {
+  OctomapRun(const GridGeometry& geometry, const KittiLabels& moving)
+      : mapper(geometry.resolution()), presence(geometry, moving) {}
+  OctomapMapper mapper;
+  PresenceEvaluation presence;
+  std::vector<double> times;  ///< of the scans [ms]
+};
+
+/// The measures of one run.
+struct Evaluation {
+  DynamicsEvaluation dynamics;
+  PresenceEvaluation presence;
+  SemanticEvaluation semantics;
+  OccupancyEvaluation occupancy;
+  std::optional<TruthEvaluation> truth;
+  std::optional<CloudEvaluation> cloud;
+  std::optional<OctomapRun> octomap;
+  double end = 0.0;  ///< time of the last scan since the start of the drive [s]
+
+  std::size_t labels = 0, unknown_labels = 0;
+  std::uint32_t unknown_label = 0;
+
+  /// @param predicted the labels given to the mapper.
+  void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes) {
+    dynamics.add(scan, classes);
+    semantics.add(scan, predicted, classes);
+    occupancy.add(scan);
+    addPoints(scan);
+    labels += scan.labels.size();
+    for (const std::uint32_t label : scan.labels) {
+      if (classes.classOf(label, labelValues(scan))) continue;
+      ++unknown_labels;
+      unknown_label = label;
+    }
+  }
+
+  /// The same for a scan without labels: the ground-truth cloud, if there is one, says what moves.
+  void addUnlabelled(const Scan& scan, const ClassTable& classes) {
+    dynamics.add(cloud ? cloud->labelled(scan) : Scan(), classes, scan);
+    addPoints(scan);
+  }
+
+  void addPoints(const Scan& scan) {
+    if (truth) truth->add(scan);
+    if (cloud) cloud->add(scan);
+  }
+
+  /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known.
+  DynamicsEvaluation::Taken taken() const {
+    if (!truth) return {};
+    return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
+  }
+
+  /// Whether that is so for the last seconds of the drive, by samples of half a second.
+  PresenceEvaluation::TakenFor takenFor() const {
+    if (!truth) return {};
+    return [this](const VoxelIndex& voxel, double seconds) {
+      for (double before = 0.0; before < seconds; before += 0.5) {
+        if (!truth->isTaken(voxel, end - before)) return false;
+      }
+      return truth->isTaken(voxel, end - seconds);
+    };
+  }
+
+  MapQuality compare(const SemanticMapper& mapper) {
+    const SemanticMap& map = mapper.map();
+    const StateRules& rules = mapper.rules();
+    MapQuality quality;
+    quality.dynamics = dynamics.compare(map, rules, taken());
+    MapOccupants occupants(map, rules);
+    quality.presence = presence.quality(occupants, takenFor());
+    if (octomap) {
+      quality.octomap = {dynamics.compare(octomap->mapper, taken()),
+                         octomap->presence.quality(octomap->mapper, takenFor()),
+                         quantile(octomap->times, 0.5), octomap->mapper.bytes()};
+    }
+    const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
+    const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
+    quality.semantics = semantics.compare(map, rules, still_there);
+    quality.occupancy = occupancy.compare(map, rules, left);
+    if (truth) quality.truth = truth->compare(map, rules, end);
+    if (cloud) quality.cloud = cloud->compare(map, rules);
+    quality.labels = labels;
+    quality.unknown_labels = unknown_labels;
+    quality.unknown_label = unknown_label;
+    forEachKnownVoxel(map, rules, [&](const VoxelIndex&, const VoxelView& view) {
+      if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
+    });
+    return quality;
+  }
+
+  /// One row per voxel: its centre and its outcome. Errors come last, so that they are drawn on top.
+  std::string errorRows(const SemanticMapper& mapper) const {
+    const SemanticMap& map = mapper.map();
+    const StateRules& rules = mapper.rules();
+    std::string csv = "x,y,z,what\n";
+    const auto add = [&](const VoxelIndex& voxel, const char* what) {
+      const Eigen::Vector3d p = map.geometry().voxelCentre(voxel);
+      csv += numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
+    };
+    constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
+    for (const auto& [voxel, fate] : dynamics.fates(map, rules, taken()))
+      add(voxel, kNames[static_cast<int>(fate)]);
+    for (const VoxelIndex& voxel : semantics.wrongVoxels(map, rules)) add(voxel, "wrong class");
+    if (!truth) return csv;
+    for (const VoxelIndex& voxel : truth->ghosts(map, rules, end)) add(voxel, "ghost");
+    return csv;
+  }
+};
+
+std::optional<PoseNoise> poseNoise(const po::variables_map& given) {
+  if (given.count("pose-noise") && given.count("pose-drift")) {
+    throw std::invalid_argument("--pose-noise and --pose-drift are both given; keep one");
+  }
+  const bool drifts = given.count("pose-drift");
+  const std::string name = drifts ? "pose-drift" : "pose-noise";
+  if (!given.count(name)) return std::nullopt;
+  const std::string text = given[name].as<std::string>();
+  std::istringstream in(text);
+  double metres = -1.0, degrees = -1.0;
+  char comma = 0;
+  in >> metres >> comma >> degrees;
+  if (!in || !(in >> std::ws).eof() || comma != ',' || !(metres >= 0.0) || !(degrees >= 0.0)) {
+    throw std::invalid_argument("--" + name + " is " + text +
+                                ", but must be two numbers M,DEG of at least 0, such as 0.05,0.3");
+  }
+  return PoseNoise(drifts ? PoseNoise::Kind::kDrift : PoseNoise::Kind::kWhite, metres,
+                   degrees * 3.14159265358979323846 / 180.0, tools::count(given, "noise-seed"));
+}
+
+/// @throws std::invalid_argument if the sequence, or what is mapped of it, has no such measure.
+std::optional<CloudEvaluation> cloudEvaluation(const po::variables_map& given, const Sequence& sequence,
+                                               const MapperConfig& config) {
+  if (!given["cloud"].as<bool>()) return std::nullopt;
+  const double distance = given["cloud-distance"].as<double>();
+  if (sequence.layout() != SequenceLayout::kDynamicMap) {
+    if (config.label_values == LabelValues::kId) {
+      throw std::invalid_argument(
+          "--cloud needs raw labels, because class ids do not say what moves; leave out "
+          "label_values=id");
+    }
+    if (!sequence.labelled()) {
+      throw std::invalid_argument("--cloud needs labels, which say what moves; " + sequence.folder() +
+                                  " is read without labels; give --labels FOLDER, or leave out --cloud");
+    }
+    return CloudEvaluation(std::nullopt, distance);
+  }
+  if (given["first"].as<std::int64_t>() > 0 || given.count("scans") || given.count("pose-drift")) {
+    throw std::invalid_argument(
+        "--cloud compares with the cloud of all scans at their poses; leave out --first, --scans and "
+        "--pose-drift");
+  }
+  const std::filesystem::path file = std::filesystem::path(sequence.folder()) / "gt_cloud.pcd";
+  if (!std::filesystem::exists(file)) {
+    throw std::invalid_argument(
+        "--cloud needs " + file.string() +
+        ", a cloud of all scans whose points of moving objects have intensity 1; it is missing");
+  }
+  return CloudEvaluation(readTruthCloud(file.string()), distance);
+}
+
+void drawErrors(const std::string& picture, const std::string& rows) {
+  const std::filesystem::path path(picture);
+  const std::string table = std::filesystem::path(path).replace_extension(".csv").string();
+  writeTextFile(table, rows);
+  tools::draw("plot_errors.py", {table, picture});
+}
+
+/// Other settings by which to decide the states of the same map.
+struct Judgement {
+  std::string settings;
+  MapperConfig config;
+};
+
+/// @throws std::invalid_argument if settings change more than decisions.
+std::vector<Judgement> judgements(const po::variables_map& given, const MapperConfig& config) {
+  std::vector<Judgement> all;
+  if (!given.count("judge")) return all;
+  for (const std::string& settings : given["judge"].as<std::vector<std::string>>()) {
+    std::istringstream names(settings);
+    for (std::string name; std::getline(names, name, ',');) {
+      if (name.rfind("free_gain/", 0) == 0) continue;
+      throw std::invalid_argument("--judge " + settings +
+                                  " changes more than decisions; give it settings of free_gain only");
+    }
+    all.push_back({settings, tools::withSettings(config, "--judge", settings)});
+  }
+  return all;
+}
+
+int evaluate(const po::variables_map& given) {
+  const tools::Interruption interruption;
+  SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
+  const std::vector<Judgement> others = judgements(given, mapper.config());
+  const Sequence sequence = tools::openSequence(given);
+  const auto [first, last] = tools::frameRange(given, sequence);
+  tools::warnOfPoses(given, first, last);
+  const LabelNoise label_noise{given["label-noise"].as<double>(),
+                               labelErrorsNamed(given["label-errors"].as<std::string>()),
+                               tools::count(given, "noise-seed"), given["label-error-seconds"].as<double>()};
+  std::optional<PoseNoise> pose_noise = poseNoise(given);
+  std::optional<Sequence> predictions;
+  if (given.count("predictions")) {
+    SequenceOptions options = tools::sequenceOptionsOf(given);
+    options.labels = given["predictions"].as<std::string>();
+    predictions.emplace(sequence.folder(), options);
+  }
+  std::optional<LabelWriter> label_writer;
+  if (given.count("write-predictions"))
+    label_writer.emplace(sequence.folder(), given["write-predictions"].as<std::string>());
+  if (given.count("errors") &&
+      std::filesystem::path(given["errors"].as<std::string>()).extension() != ".png") {
+    throw std::invalid_argument("--errors must end in .png");
+  }
+  for (const char* file : {"json", "errors"}) {
+    if (given.count(file)) checkWritable(given[file].as<std::string>());
+  }
+  const GridGeometry& geometry = mapper.map().geometry();
+  const auto moving = KittiLabels::moving();
+  Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
+                        PresenceEvaluation(geometry, moving),
+                        SemanticEvaluation(geometry, moving),
+                        OccupancyEvaluation(geometry, moving),
+                        std::nullopt,
+                        cloudEvaluation(given, sequence, mapper.config()),
+                        std::nullopt};
+  if (given["octomap"].as<bool>()) evaluation.octomap.emplace(geometry, moving);
+  std::optional<simulation::Drive> drive;
+  const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
+  // A map that drifts is in no frame of the true scene.
+  if (config && !given.count("pose-drift")) {
+    drive.emplace(*config);
+    evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
+  }
+  std::vector<double> times;
+  LabelWatch watch;
+  bool ends = interruption.requested();
+  if (ends) throw tools::Stopped("stopped before the first scan; nothing was written");
+  for (std::size_t i = first; !ends; ++i) {
+    SequenceFrame frame = sequence.read(i);
+    Scan scan = frame.scan();
+    if (pose_noise) frame.T_map_sensor = pose_noise->next(frame.T_map_sensor);
+    Scan input = frame.scan();
+    if (given.count("pose-drift")) scan = input;
+    scan.labels_are_ids = input.labels_are_ids = mapper.config().label_values == LabelValues::kId;
+    if (predictions) input.labels = predictions->read(i).labels;
+    input.labels = withLabelNoise(input, mapper.classes(), label_noise);
+    if (label_writer) label_writer->write(sequence.name(i), input.labels);
+    const ScanStats stats = mapper.integrate(input);
+    times.push_back(stats.totalMs());
+    if (OctomapRun* const octomap = evaluation.octomap ? &*evaluation.octomap : nullptr) {
+      octomap->times.push_back(octomap->mapper.integrate(input));
+      if (sequence.labelled()) octomap->presence.add(scan, mapper.classes(), octomap->mapper);
+    }
+    tools::warn(watch.report(mapper, input, stats.counts));
+    if (sequence.labelled()) {
+      evaluation.add(scan, input.labels, mapper.classes());
+      MapOccupants occupants(mapper.map(), mapper.rules());
+      evaluation.presence.add(scan, mapper.classes(), occupants);
+    } else {
+      evaluation.addUnlabelled(scan, mapper.classes());
+    }
+    ends = i + 1 == last || interruption.requested();
+    if (drive) {
+      evaluation.end = drive->timeOf(sequence.number(i));
+      const bool count = times.size() % kGhostsEvery == 0 || ends;
+      if (count) evaluation.truth->countGhosts(mapper.map(), mapper.rules(), evaluation.end);
+    }
+    tools::showProgress(times.size(), last - first, "");
+  }
+  const bool stopped = times.size() < last - first;
+  if (stopped) evaluation.dynamics.end();
+  if (stopped && sequence.layout() == SequenceLayout::kDynamicMap && evaluation.cloud) {
+    evaluation.cloud.reset();
+    std::cerr << "evaluate_map: the ground-truth cloud covers all scans, so the map of these is not compared "
+                 "with it\n";
+  }
+  MapQuality quality = evaluation.compare(mapper);
+  quality.median_ms = quantile(times, 0.5);
+  quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
+  const std::string errors = given.count("errors") ? evaluation.errorRows(mapper) : "";
+  for (const Judgement& other : others) {
+    mapper.reconfigure(other.config);
+    quality.judged.push_back(
+        {other.settings, evaluation.dynamics.compare(mapper.map(), mapper.rules(), evaluation.taken())});
+  }
+  std::cout << qualityTable(quality, mapper.classes());
+  if (given.count("json")) {
+    writeTextFile(given["json"].as<std::string>(), qualityJson(quality, mapper.classes()));
+  }
+  if (given.count("errors")) {
+    drawErrors(given["errors"].as<std::string>(), errors);
+  }
+  if (stopped) {
+    throw tools::Stopped("stopped after scan " + sequence.name(first + times.size() - 1) +
+                         "; all figures are of the first " + std::to_string(times.size()) + " of " +
+                         counted(last - first, "scan"));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tools::run(argc, argv, "evaluate_map", "Maps a sequence and measures the quality of the map.",
+                    options(), evaluate);
+}

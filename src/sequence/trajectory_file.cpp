@@ -1,0 +1,42 @@
+#include "sequence/trajectory_file.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "bki_mapping/sequence/sequence.h"
+#include "sequence/pose_file.h"
+
+namespace bki_mapping {
+namespace {
+
+std::vector<Eigen::Vector3d> readPositions(const std::string& path) {
+  constexpr char kRemedy[] = "give a file of poses, or the folder of a sequence";
+  std::vector<Eigen::Vector3d> points;
+  for (const PoseLine& line : readPoseFile(path, kRemedy).lines) {
+    if (line.blank) continue;
+    if (!line.fault.empty()) throw std::runtime_error(line.fault);
+    points.push_back(line.pose.translation());
+  }
+  if (points.empty()) throw std::runtime_error("the trajectory " + path + " has no pose");
+  return points;
+}
+
+}  // namespace
+
+Trajectory readTrajectory(const std::string& path) {
+  Trajectory trajectory;
+  trajectory.name = std::filesystem::path(path).lexically_normal().filename().string();
+  if (!std::filesystem::is_directory(path)) {
+    trajectory.points = readPositions(path);
+    return trajectory;
+  }
+  SequenceOptions options;
+  options.labels.clear();  // only the poses matter
+  const Sequence sequence(path, options);
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
+    trajectory.points.push_back(sequence.pose(i).translation());
+  }
+  return trajectory;
+}
+
+}  // namespace bki_mapping

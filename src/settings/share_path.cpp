@@ -1,0 +1,21 @@
+#include "settings/share_path.h"
+
+#include <dlfcn.h>
+
+#include <filesystem>
+
+namespace bki_mapping {
+
+std::string sharePath() {
+  namespace fs = std::filesystem;
+  Dl_info library{};
+  if (dladdr(reinterpret_cast<void*>(&sharePath), &library) != 0 && library.dli_fname != nullptr) {
+    std::error_code ignored;
+    const fs::path lib = fs::canonical(library.dli_fname, ignored).parent_path();
+    const fs::path share = lib.parent_path() / "share" / "bki_mapping";
+    if (fs::exists(share / "config" / "classes", ignored)) return share.string();
+  }
+  return BKI_MAPPING_SOURCE_DIR;
+}
+
+}  // namespace bki_mapping
