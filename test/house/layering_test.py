@@ -39,7 +39,7 @@ LIBRARIES = {
     'sequence': ('pcl/',),
     'city': ('nlohmann/',),
     'export': ('nlohmann/', 'octomap/', 'pcl/', 'png.h', 'yaml-cpp/', 'zlib.h'),
-    'evaluation': ('nlohmann/', 'pcl/'),
+    'evaluation': ('nlohmann/', 'octomap/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
