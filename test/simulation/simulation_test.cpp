@@ -86,13 +86,53 @@ TEST(Scene, ACrowdStandsAndWalks) {
   for (const auto& way : waysOf(scene, 254, {30.0})) EXPECT_GT(way[0], 0.0);
 }
 
+bool isGate(const Shape& shape) {
+  return shape.label == 259 && shape.centre.y() == 8.5;
+}
+
+TEST(Scene, GatesOpenAndCloseAgain) {
+  const Scene scene = makeScene(SceneKind::kArrivals, 100.0, 60.0, 0.0, 1);
+  std::size_t gates = 0;
+  for (const Shape& gate : scene.shapes) {
+    if (!isGate(gate)) continue;
+    ++gates;
+    double farthest = 0.0;
+    int returns = 0;
+    for (double time = 0.0, before = 0.0; time < 60.0; time += 0.1) {
+      const Eigen::Vector3d way = gate.centreAt(time) - gate.centre;
+      EXPECT_NEAR(way.tail<2>().norm(), 0.0, 1e-9) << "it slides along the street";
+      returns += before > 0.01 && way.x() <= 0.01;
+      before = way.x();
+      farthest = std::max(farthest, way.x());
+    }
+    EXPECT_NEAR(farthest, 2.3, 0.01);
+    EXPECT_GT(returns, 2);
+  }
+  EXPECT_GT(gates, 4u);
+}
+
+TEST(Scene, SomeWhoStopSitDownAndGetUp) {
+  const Scene scene = makeScene(SceneKind::kArrivals, 100.0, 60.0, 0.0, 1);
+  std::size_t sit = 0;
+  for (const Shape& person : scene.shapes) {
+    if (person.label != 254) continue;
+    double lowest = person.centre.z();
+    for (double time = 0.0; time < 60.0; time += 0.1) lowest = std::min(lowest, person.centreAt(time).z());
+    if (lowest == person.centre.z()) continue;
+    ++sit;
+    EXPECT_NEAR(lowest, person.centre.z() - 0.6, 1e-9);
+    EXPECT_NEAR(person.centreAt(60.0).z(), person.centre.z(), 1e-9);
+  }
+  EXPECT_GT(sit, 4u);
+}
+
 TEST(Scene, VisitorsArriveAndStayAndLeave) {
   constexpr double kDuration = 60.0;
   const Scene scene = makeScene(SceneKind::kArrivals, 100.0, kDuration, 0.0, 1);
   for (const std::uint32_t label : {252u, 254u, 259u}) {
     std::size_t come = 0, stay = 0, leave = 0;
     for (const Shape& shape : scene.shapes) {
-      if (shape.label != label) continue;
+      if (shape.label != label || isGate(shape)) continue;
       const auto moves = [&](double time) {
         return !shape.centreAt(time).isApprox(shape.centreAt(time + 0.1), 1e-6);
       };
