@@ -6,7 +6,7 @@ namespace bki_mapping {
 namespace {
 
 /// Modes `uniform` and `linear`: a fixed number of random samples for each beam. `Distance` maps (u, length)
-/// to the distance from the sensor: uniformDistance or linearDistance, in beam_samples.h.
+/// to the distance from the sensor: uniformDistance, or linearDistance (Theorem 1), in beam_samples.h.
 template <double (*Distance)(double, double)>
 class RandomSamples : public FreeSpaceModel {
  public:

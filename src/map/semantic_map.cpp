@@ -1,3 +1,4 @@
+// The blocks that a scan changes are copied in src/update/map_updater.cpp.
 #include "bki_mapping/map/semantic_map.h"
 
 #include <algorithm>

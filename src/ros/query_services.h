@@ -1,4 +1,4 @@
-/// @file The services that answer queries of the map.
+/// @file The services that answer queries of the map: their threads. queries/queries.h lists them.
 #pragma once
 
 #include <ros/callback_queue.h>

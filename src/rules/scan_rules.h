@@ -1,5 +1,5 @@
 /// @file The rules that are applied to the sums of a scan before they enter the map. (Limits of blocks and
-/// memory: UpdateLimits in map_updater.h.)
+/// memory: UpdateLimits in update/map_updater.h.)
 #pragma once
 
 #include <cmath>

@@ -4,7 +4,7 @@
 namespace bki_mapping {
 namespace {
 
-/// The largest relative error of log and logOnePlus. test/map/read_block_test.cpp compares both with
+/// The largest relative error of log and logOnePlus. test/rules/read_block_test.cpp compares both with
 /// std::log and std::log1p.
 constexpr float kLogError = 5e-7f;
 

@@ -1,4 +1,5 @@
-/// @file What decides the state of a voxel when a map is read. The map itself holds evidence only.
+/// @file The settings that decide the state of a voxel when a map is read; voxel_state.h applies them. The
+/// map itself holds only what was seen.
 #pragma once
 
 #include <algorithm>
@@ -62,7 +63,8 @@ class StateRules {
   bool latestDecides() const { return latest_decides_; }
   StateRules withLatest(bool decides) const;
 
-  /// Whether equal blocks, with equal blocks around, have the same states and labels by both rules.
+  /// Whether equal blocks, with equal blocks around, have the same states and labels by these
+  /// rules and by the others.
   bool decidesAs(const StateRules& other) const;
 
  private:
