@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-namespace bki_mapping {
+#include "map/voxel_mask.h"
 
+namespace bki_mapping {
 namespace {
 
 using LatestFirst = std::vector<Look>::const_reverse_iterator;
@@ -82,16 +83,19 @@ bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& ove
     undecided &= ~look->seen();
   }
   bool decides = false;
-  for (std::size_t v = 0; v < overruled.size(); ++v) {
-    if (!ever_hit[v]) continue;
-    std::int32_t verdict = kKept;
-    if (!just_hit[v]) {
-      const auto [label, best] = likeliestClass(block, v);
-      verdict = verdictOf(block.looks(), v, stayOf(best, rules.mostVote()), rules.canLeave(label));
+  const LayerBits hit = bitsOf(ever_hit);
+  for (std::size_t layer = 0; layer < hit.size(); ++layer) {
+    for (std::uint64_t left = hit[layer]; left != 0; left &= left - 1) {
+      const std::size_t v = 64 * layer + static_cast<std::size_t>(__builtin_ctzll(left));
+      std::int32_t verdict = kKept;
+      if (!just_hit[v]) {
+        const auto [label, best] = likeliestClass(block, v);
+        verdict = verdictOf(block.looks(), v, stayOf(best, rules.mostVote()), rules.canLeave(label));
+      }
+      if (verdict == kNotOverruled) continue;
+      overruled[v] = verdict;
+      decides = true;
     }
-    if (verdict == kNotOverruled) continue;
-    overruled[v] = verdict;
-    decides = true;
   }
   return decides;
 }
