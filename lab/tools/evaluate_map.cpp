@@ -323,9 +323,10 @@ int evaluate(const po::variables_map& given) {
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
     const ScanStats stats = mapper.integrate(input);
     times.push_back(stats.totalMs());
-    if (OctomapRun* const octomap = evaluation.octomap ? &*evaluation.octomap : nullptr) {
-      octomap->times.push_back(octomap->mapper.integrate(input));
-      if (sequence.labelled()) octomap->presence.add(scan, mapper.classes(), octomap->mapper);
+    if (evaluation.octomap) {
+      OctomapRun& octomap = *evaluation.octomap;
+      octomap.times.push_back(octomap.mapper.integrate(input));
+      if (sequence.labelled()) octomap.presence.add(scan, mapper.classes(), octomap.mapper);
     }
     tools::warn(watch.report(mapper, input, stats.counts));
     if (sequence.labelled()) {

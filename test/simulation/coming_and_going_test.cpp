@@ -1,4 +1,4 @@
-// With the preset robot, a map shows within a scan or two what comes back to a place, and clears within two
+// With the preset robot, a map shows within three scans what comes back to a place, and clears within two
 // seconds what leaves it: a door of a class that cannot move, and a person who sits down.
 #include <gtest/gtest.h>
 

@@ -180,6 +180,20 @@ class Tools(unittest.TestCase):
         self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
         self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
 
+    def test_an_octomap_of_the_same_points_is_measured_beside(self):
+        alone = self.evaluation()
+        both = self.evaluation(more=('--octomap',))
+        octomap = both.pop('octomap')
+        self.assertNotIn('octomap', alone)
+        for figure in ('sa', 'da', 'floor_holes', 'presence'):
+            self.assertEqual(both[figure], alone[figure], figure)
+        for count in ('static_points', 'moving_points', 'floor_voxels'):
+            self.assertEqual(octomap[count], alone[count], count)
+        self.assertGreater(octomap['sa'], 0.5)
+        self.assertNotEqual(octomap['sa'], alone['sa'])
+        self.assertGreater(octomap['bytes'], 0)
+        self.assertIn('OctoMap of the same scans: SA ', self.table)
+
     def test_a_map_is_judged_by_other_gains(self):
         gains = ('free_gain/dynamic=30', 'free_gain/static=0.1,free_gain/dynamic=30,free_gain/persistence=2')
         judged = self.evaluation(more=[word for each in gains for word in ('--judge', each)])['judged']
