@@ -8,6 +8,7 @@
 #include "core/pi.h"
 #include "parallel/counter_random.h"
 #include "parallel/thread_pool.h"
+#include "simulation/rooms.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -60,13 +61,14 @@ const DriveConfig& checked(const DriveConfig& config) {
 
 void checkDrive(const DriveConfig& config) {
   const LidarConfig& lidar = config.lidar;
+  const bool rooms = config.scene == SceneKind::kRooms;
   struct Limit {
     const char* name;
     double value, least, most;
   };
   for (const Limit& l : {Limit{"scans", static_cast<double>(config.scans), 1, 1e6},
                          {"speed", config.speed, 0, 100},
-                         {"height", config.height, 0.1, 100},
+                         {"height", config.height, 0.1, rooms ? kDoorHeight - 0.1 : 100.0},
                          {"beams", static_cast<double>(lidar.beams), 1, 1024},
                          {"columns", static_cast<double>(lidar.columns), 1, 100000},
                          {"lowest", lidar.lowest, -kPi / 2, kPi / 2},
@@ -83,6 +85,30 @@ void checkDrive(const DriveConfig& config) {
     throw std::invalid_argument(
         "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
   }
+}
+
+DriveConfig usualDrive(SceneKind scene) {
+  DriveConfig drive;
+  drive.scene = scene;
+  switch (scene) {
+    case SceneKind::kStreet:
+      break;
+    case SceneKind::kTraffic:
+      drive.speed = 3.0;
+      break;
+    case SceneKind::kCrowd:
+      drive.speed = 2.0;
+      break;
+    case SceneKind::kArrivals:
+      drive.speed = 1.0;
+      break;
+    case SceneKind::kRooms:
+      drive.speed = 0.5;
+      drive.height = 0.35;
+      drive.lidar = lidarNamed("vlp16");
+      break;
+  }
+  return drive;
 }
 
 LidarConfig lidarNamed(const std::string& name) {
@@ -144,6 +170,7 @@ Drive::Drive(const DriveConfig& config)
                        config.speed, config.seed)) {}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
+  if (config_.scene == SceneKind::kRooms) return poseInRooms(config_.speed * timeOf(i), config_.height);
   // In the right lane, weaving slightly.
   const double x = config_.speed * timeOf(i), wave = 0.06;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();

@@ -41,10 +41,15 @@ struct DriveConfig {
   double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };
 
+/// A drive with the speed, the sensor and its height that are usual in a scene: at 8 m/s through a street, at
+/// 3 in traffic, 2 in a crowd and 1 among arrivals; at 0.5 m/s with a lidar of 16 rows, 0.35 m above the
+/// floor, through rooms.
+DriveConfig usualDrive(SceneKind scene);
+
 /// @throws std::invalid_argument if a setting is out of its limits.
 void checkDrive(const DriveConfig& config);
 
-/// A drive along the street of makeScene.
+/// A drive along the street of makeScene, or round and round through its rooms.
 class Drive {
  public:
   /// @throws std::invalid_argument if a setting is out of its limits.

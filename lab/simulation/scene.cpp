@@ -44,6 +44,7 @@ void clipToQuadric(double a, double b, double c, double& enter, double& leave) {
 }  // namespace
 
 Eigen::Vector3d Shape::centreAt(double time) const {
+  if (period > 0.0) time -= period * std::floor(time / period);
   Eigen::Vector3d at = centre;
   double begin = 0.0;
   for (const Leg& leg : legs) {

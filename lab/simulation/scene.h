@@ -29,6 +29,7 @@ struct Shape {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< after the last leg [m/s]
   std::uint32_t label = 0;                             ///< raw SemanticKITTI label
   std::vector<Leg> legs = {};                          ///< by rising time; the first begins at time 0
+  double period = 0.0;  ///< after which the shape is back at its centre and repeats its legs [s]; 0: never
 
   Eigen::Vector3d centreAt(double time) const;
   bool contains(const Eigen::Vector3d& point, double time) const;
@@ -65,13 +66,15 @@ enum class SceneKind {
   kTraffic,   ///< stop-and-go traffic in both directions, and parked cars of which some drive off
   kCrowd,     ///< many pedestrians, who walk and stand, and cyclists
   kArrivals,  ///< cars that come, park and leave, people who stop or sit down, trolleys, gates
+  kRooms,     ///< no street: furnished rooms along a corridor, people who walk and stand, a sliding door
 };
 /// @throws std::invalid_argument if there is no kind of this name.
 SceneKind sceneKindNamed(const std::string& name);
-/// "street", "traffic", "crowd" or "arrivals".
+/// "street", "traffic", "crowd", "arrivals" or "rooms".
 std::string nameOf(SceneKind kind);
 
-/// A street along x with buildings, fences, trees, poles, signs, and the road users of its kind.
+/// A street along x with buildings, fences, trees, poles, signs, and the road users of its kind; or the rooms
+/// of makeRooms, which depend on the seed alone.
 /// @param length of the street, which begins at x = -30 m [m]. @param duration of the drive [s]. @param speed
 /// of the sensor, which drives at y = -1.5 m and is at x = 0 at time 0 [m/s]. @param seed equal arguments
 /// give equal streets.

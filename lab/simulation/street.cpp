@@ -1,6 +1,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "simulation/rooms.h"
 #include "simulation/street_parts.h"
 
 namespace bki_mapping::simulation {
@@ -94,17 +95,17 @@ void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>&
     addGate(x, 8.5, Motion::sliding(2.3, dice.between(2.0, 6.0), dice.between(2.0, 6.0), duration), shapes);
 }
 
-constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals"};
+constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals", "rooms"};
 
 }  // namespace
 
 SceneKind sceneKindNamed(const std::string& name) {
-  for (const SceneKind kind :
-       {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd, SceneKind::kArrivals}) {
+  for (const SceneKind kind : {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd,
+                               SceneKind::kArrivals, SceneKind::kRooms}) {
     if (nameOf(kind) == name) return kind;
   }
   throw std::invalid_argument("there is no scene " + name +
-                              "; known scenes: street, traffic, crowd, arrivals");
+                              "; known scenes: street, traffic, crowd, arrivals, rooms");
 }
 
 std::string nameOf(SceneKind kind) {
@@ -112,6 +113,7 @@ std::string nameOf(SceneKind kind) {
 }
 
 Scene makeScene(SceneKind kind, double length, double duration, double speed, std::uint64_t seed) {
+  if (kind == SceneKind::kRooms) return makeRooms(seed);
   Scene scene;
   Dice dice(seed);
   std::vector<Shape>& shapes = scene.shapes;
@@ -142,6 +144,8 @@ Scene makeScene(SceneKind kind, double length, double duration, double speed, st
       break;
     case SceneKind::kArrivals:
       addVisitors(length, duration, dice, shapes);
+      break;
+    case SceneKind::kRooms:
       break;
   }
   return scene;

@@ -19,8 +19,10 @@ po::options_description options() {
       "scene", tools::textOption("KIND")->default_value("street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
       "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop or "
-      "sit down, trolleys, gates")("scans", tools::optionWith("N", 100), "number of scans")(
-      "lidar", tools::textOption("NAME")->default_value("hdl64"), "rows of the lidar: hdl64, hdl32 or vlp16")(
+      "sit down, trolleys, gates; rooms: furnished rooms along a corridor, people, a sliding door")(
+      "scans", tools::optionWith("N", 100), "number of scans")(
+      "lidar", tools::textOption("NAME"),
+      "rows of the lidar: hdl64, hdl32 or vlp16; default: hdl64, in rooms vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
       "columns", tools::optionWith("N", lidar.columns), "azimuth steps per revolution")(
       "rate", tools::optionWith("HZ", lidar.rate), "revolutions per second")(
@@ -29,9 +31,9 @@ po::options_description options() {
       "label-noise", tools::optionWith("FRACTION", lidar.label_noise),
       "fraction of points with a wrong label")(
       "speed", po::value<double>()->value_name("M/S"),
-      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1")(
-      "height", tools::optionWith("M", simulation::DriveConfig().height),
-      "height of the sensor above the ground [m]")(
+      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1, in rooms 0.5")(
+      "height", po::value<double>()->value_name("M"),
+      "height of the sensor above the ground [m]; default: 1.73, in rooms 0.35")(
       "layout", tools::textOption("NAME")->default_value("semantic_kitti"),
       "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
@@ -39,28 +41,14 @@ po::options_description options() {
   return options;
 }
 
-/// [m/s]
-double usualSpeed(simulation::SceneKind scene) {
-  switch (scene) {
-    case simulation::SceneKind::kTraffic:
-      return 3.0;
-    case simulation::SceneKind::kCrowd:
-      return 2.0;
-    case simulation::SceneKind::kArrivals:
-      return 1.0;
-    default:
-      return 8.0;
-  }
-}
-
 simulation::DriveConfig driveConfig(const po::variables_map& given) {
-  simulation::DriveConfig drive;
+  simulation::DriveConfig drive =
+      simulation::usualDrive(simulation::sceneKindNamed(given["scene"].as<std::string>()));
   drive.scans = given["scans"].as<int>();
-  drive.scene = simulation::sceneKindNamed(given["scene"].as<std::string>());
-  drive.speed = given.count("speed") ? given["speed"].as<double>() : usualSpeed(drive.scene);
-  drive.height = given["height"].as<double>();
+  if (given.count("speed")) drive.speed = given["speed"].as<double>();
+  if (given.count("height")) drive.height = given["height"].as<double>();
   drive.seed = tools::count(given, "seed");
-  drive.lidar = simulation::lidarNamed(given["lidar"].as<std::string>());
+  if (given.count("lidar")) drive.lidar = simulation::lidarNamed(given["lidar"].as<std::string>());
   if (given.count("beams")) drive.lidar.beams = given["beams"].as<int>();
   drive.lidar.columns = given["columns"].as<int>();
   drive.lidar.rate = given["rate"].as<double>();
