@@ -22,7 +22,10 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     voxel.standing_points += !moving && known.dynamic;
     voxel.other_points += !moving && !known.ground && !known.dynamic;
     voxel.last_hit = added_;
-    if (!moving) continue;
+    if (!moving) {
+      countLabel(voxel, scan.labels[i] & 0xffffu);
+      continue;
+    }
     moving_points_.push_back({n, added_});
     voxel.last_moved = added_;
     if (!voxel.moved) unseen_.push_back(n);
@@ -33,6 +36,16 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
   }
   findSeenAgain(whole);
   ++added_;
+}
+
+void DynamicsEvaluation::countLabel(Voxel& voxel, std::uint32_t label) {
+  for (std::uint32_t n = voxel.labels; n != kNone; n = labels_[n].next) {
+    if (labels_[n].label != label) continue;
+    ++labels_[n].points;
+    return;
+  }
+  labels_.push_back({label, 1, voxel.labels});
+  voxel.labels = static_cast<std::uint32_t>(labels_.size() - 1);
 }
 
 std::vector<std::uint32_t> DynamicsEvaluation::earlyMovingPoints() const {
@@ -91,6 +104,11 @@ DynamicsQuality DynamicsEvaluation::compare(Occupants& map, const Taken& taken) 
     quality.ground_points += voxel.ground_points;
     quality.standing_points += voxel.standing_points;
     quality.other_points += voxel.other_points;
+    for (std::uint32_t l = voxel.labels; l != kNone; l = labels_[l].next) {
+      KeptPoints& of_label = quality.by_label[labels_[l].label];
+      of_label.points += labels_[l].points;
+      if (occupied) of_label.kept += labels_[l].points;
+    }
     quality.floor_voxels += voxel.ground_points > 0;
     if (occupied) {
       quality.ground_kept += voxel.ground_points;

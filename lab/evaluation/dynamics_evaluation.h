@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -38,6 +39,12 @@ struct Accuracies {
   }
 };
 
+/// Static points, and those of them that the map keeps.
+struct KeptPoints {
+  std::size_t points = 0, kept = 0;
+  double accuracy() const { return static_cast<double>(kept) / static_cast<double>(points); }  ///< SA
+};
+
 /// The accuracies of a map, counted over the labelled points of the scans: static ones of all scans, and
 /// moving ones of the first half, in voxels that no point of the last scans hits and that are not taken. The
 /// map keeps a point if its voxel is occupied.
@@ -46,6 +53,9 @@ struct DynamicsQuality : Accuracies {
   /// and neither.
   std::size_t ground_points = 0, ground_kept = 0, standing_points = 0, standing_kept = 0, other_points = 0,
               other_kept = 0;
+  /// The same by the lower 16 bits of the labels, which also differ where the class table has one class for
+  /// all.
+  std::map<std::uint32_t, KeptPoints> by_label;
   std::size_t floor_voxels = 0;  ///< voxels with static points of ground
   std::size_t floor_holes = 0;   ///< of these, those that are not occupied
   /// Moving points that no map can tell to be gone: those in voxels shared with static points, and those in
@@ -108,15 +118,23 @@ class DynamicsEvaluation {
                                                       const Taken& taken = {}) const;
 
  private:
+  static constexpr std::uint32_t kNone = 0xffffffff;
+
   struct Voxel {
     VoxelIndex index;
     std::uint32_t ground_points = 0, standing_points = 0, other_points = 0;
-    std::size_t last_hit = 0;    ///< the last scan with a point
-    std::size_t last_moved = 0;  ///< the last scan with a moving point, if moved
+    std::size_t last_hit = 0;      ///< the last scan with a point
+    std::size_t last_moved = 0;    ///< the last scan with a moving point, if moved
+    std::uint32_t labels = kNone;  ///< position of the first in labels_
     bool moved = false;
     bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
 
     bool isShared() const { return ground_points + standing_points + other_points > 0; }
+  };
+
+  /// Static points of one label in a voxel; a list, because few voxels have more than one.
+  struct LabelPoints {
+    std::uint32_t label, points, next;
   };
 
   struct MovingPoint {
@@ -124,6 +142,7 @@ class DynamicsEvaluation {
     std::size_t scan;
   };
 
+  void countLabel(Voxel& voxel, std::uint32_t label);
   /// The number of moving points in the first half of the scans, for each voxel.
   std::vector<std::uint32_t> earlyMovingPoints() const;
   /// Notes the voxels that something moving has left and that beams of the scan come near.
@@ -138,6 +157,7 @@ class DynamicsEvaluation {
   std::size_t scans_, late_, added_ = 0;
   GridTable index_of_;
   std::vector<Voxel> voxels_;
+  std::vector<LabelPoints> labels_;
   std::vector<MovingPoint> moving_points_;
   std::vector<std::uint32_t> unseen_;  ///< voxels with moving points that were not seen again
   PassingBeams beams_;                 ///< of the last scan

@@ -71,6 +71,9 @@ Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
 }
 
 Json dynamicsJson(const DynamicsQuality& d) {
+  Json by_label = Json::array();
+  for (const auto& [label, kept] : d.by_label)
+    by_label.push_back({{"label", label}, {"static_points", kept.points}, {"sa", kept.accuracy()}});
   return {{"static_points", d.static_points},
           {"static_kept", d.static_kept},
           {"moving_points", d.moving_points},
@@ -81,6 +84,7 @@ Json dynamicsJson(const DynamicsQuality& d) {
           {"sa_ground", d.groundAccuracy()},
           {"sa_standing", d.standingAccuracy()},
           {"sa_other", d.otherAccuracy()},
+          {"sa_by_label", by_label},
           {"da", d.dynamicAccuracy()},
           {"da_decidable", d.decidableAccuracy()},
           {"moving_shared", d.moving_shared},

@@ -17,7 +17,7 @@ constexpr double kFlatFrom[] = {-0.1, -5.4, 0.0}, kFlatTo[] = {14.4, 7.7, 2.75};
 /// corridor. @param seed equal seeds give equal rooms; walls are the same for all.
 Scene makeRooms(std::uint64_t seed);
 
-/// Pose on the round that the robot drives through the flat again and again, keeping 0.5 m from all that
+/// Pose on the round that the robot drives through the flat again and again, 0.35 m and more from all that
 /// stands. @param way that has been driven [m]. @param height of the sensor [m].
 Eigen::Isometry3d poseInRooms(double way, double height);
 /// Length of one round [m].

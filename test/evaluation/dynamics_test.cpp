@@ -72,6 +72,28 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   EXPECT_FALSE(evaluation.isStillThere({5, 0, 0}));
 }
 
+TEST(DynamicsQuality, CountsStaticPointsByTheirLabels) {
+  // The table has one class for all of them, and the upper 16 bits are an instance.
+  SemanticClass anything;
+  anything.name = "anything";
+  anything.any_raw = true;
+  const ClassTable all("all", {anything});
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {99}, 1, 1);
+  evaluation.add(scanOf({{{0.5f, 0, 0}, 10},
+                         {{0.6f, 0, 0}, 10 | (7u << 16)},
+                         {{0.7f, 0, 0}, 20},
+                         {{1.5f, 0, 0}, 10},
+                         {{2.5f, 0, 0}, 30},
+                         {{2.5f, 0, 0}, 99}}),
+                 all);
+  const DynamicsQuality quality = evaluation.compare(mapOf({{0.5, 0, 0}}), StateRules());
+  ASSERT_EQ(quality.by_label.size(), 3u);
+  EXPECT_EQ(quality.by_label.at(10).points, 3u);
+  EXPECT_EQ(quality.by_label.at(10).kept, 2u);
+  EXPECT_DOUBLE_EQ(quality.by_label.at(20).accuracy(), 1.0);
+  EXPECT_DOUBLE_EQ(quality.by_label.at(30).accuracy(), 0.0);
+}
+
 TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
   std::vector<SemanticClass> flagged = reference::smallTable()->classes();
   flagged[1].ground = true;

@@ -312,7 +312,7 @@ class Tools(unittest.TestCase):
 
     def test_simulated_scenes(self):
         moving = {}
-        for scene in ('street', 'traffic', 'crowd'):
+        for scene in ('street', 'traffic', 'crowd', 'rooms'):
             folder = self.path(scene)
             result = call('simulate_drive', '--output', folder, '--scene', scene, '--scans', '2', '--lidar', 'vlp16',
                           '--columns', '300')
@@ -320,8 +320,19 @@ class Tools(unittest.TestCase):
             result = call('evaluate_map', '--sequence', folder, '--late', '1', '--json', self.path('figures.json'))
             self.assertEqual(result.returncode, 0, result.stderr)
             with open(self.path('figures.json')) as file:
-                moving[scene] = json.load(file)['moving_points']
+                figures = json.load(file)
+            moving[scene] = figures['moving_points']
+            self.assertIn('truth', figures)
+            by_label = {entry['label']: entry for entry in figures['sa_by_label']}
+            self.assertEqual(sum(entry['static_points'] for entry in by_label.values()), figures['static_points'])
+            kept = sum(entry['static_points'] * entry['sa'] for entry in by_label.values())
+            self.assertAlmostEqual(kept, figures['static_kept'], places=3)
         self.assertGreater(moving['crowd'], moving['street'])
+        # The last are the rooms: floor, walls, tables, chairs, furniture, within the usual reach of a low sensor.
+        for label in (40, 50, 51, 70, 71):
+            self.assertGreater(by_label[label]['static_points'], 10, label)
+        with open(os.path.join(self.path('rooms'), 'simulation.yaml')) as file:
+            self.assertRegex(file.read(), r'(?s)scene: rooms.*speed: 0\.5\n.*height: 0\.3')
 
     def test_evaluation_of_class_ids(self):
         table = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'classes', 'semantic_kitti.yaml')
