@@ -89,17 +89,17 @@ void addSofa(const Place& place, std::vector<Shape>& shapes) {
 }
 
 void addHangingCable(double x, double y, double low, double high, std::vector<Shape>& shapes) {
-  Builder({x, y}, kCable, shapes).addRod(0.0, 0.0, low, high, 0.012);
+  Builder({x, y, 0.0}, kThin, shapes).addRod(0.0, 0.0, low, high, 0.012);
 }
 
 void addLyingCable(const Place& place, double length, std::vector<Shape>& shapes) {
-  Builder(place, kCable, shapes).addBox(0.0, 0.0, 0.0, 0.02, length, 0.02);
+  Builder(place, kSmall, shapes).addBox(0.0, 0.0, 0.0, 0.02, length, 0.02);
 }
 
 void addFloorLamp(double x, double y, std::vector<Shape>& shapes) {
-  Builder lamp({x, y}, kFurniture, shapes);
+  Builder lamp({x, y, 0.0}, kFurniture, shapes);
   lamp.addRod(0.0, 0.0, 0.0, 0.03, 0.15);
-  lamp.addRod(0.0, 0.0, 0.03, 1.5, 0.015);
+  Builder({x, y, 0.0}, kThin, shapes).addRod(0.0, 0.0, 0.03, 1.5, 0.015);
   lamp.addRod(0.0, 0.0, 1.5, 1.8, 0.18);
 }
 

@@ -11,9 +11,10 @@
 namespace bki_mapping::simulation {
 
 // SemanticKITTI has no classes of furniture. Its fixed classes stand for them, one for each kind of thing,
-// so that figures by label tell them apart.
+// so that figures by label tell them apart. Thin are cables and rods that hang or stand, small are boxes and
+// cables on the floor.
 constexpr std::uint32_t kFloor = 40, kWall = kBuilding, kTable = kFence, kChair = kTrunk,
-                        kFurniture = kVegetation, kCable = kPole, kSmallBox = kSign, kTrolley = 20;
+                        kFurniture = kVegetation, kThin = kPole, kSmall = kSign, kTrolley = 20;
 
 /// Where a piece of furniture stands. Its front looks along its own y axis.
 struct Place {

@@ -79,9 +79,9 @@ class Furnisher {
   void boxes(double x, double y) {
     const double edge = dice_.between(0.3, 0.45), height = dice_.between(0.2, 0.4);
     const Place place = off({x, y, dice_.between(0.0, 1.5)}, 0.02, 0.0);
-    addBlock(place, edge, 0.8 * edge, height, kSmallBox, shapes_);
+    addBlock(place, edge, 0.8 * edge, height, kSmall, shapes_);
     if (dice_.between(0.0, 1.0) < 0.5) return;
-    addBlock({place.x, place.y, place.yaw + 0.3}, 0.7 * edge, 0.6 * edge, 0.25, kSmallBox, shapes_);
+    addBlock({place.x, place.y, place.yaw + 0.3}, 0.7 * edge, 0.6 * edge, 0.25, kSmall, shapes_);
     shapes_.back().centre.z() += height;
   }
 

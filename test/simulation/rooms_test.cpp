@@ -182,16 +182,17 @@ TEST(Rooms, BeamsEndOnSurfacesWithinTheFlat) {
 
 TEST(Rooms, ALowLidarSeesTableTopsFromBelowLegsAndCables) {
   std::map<std::uint32_t, std::size_t> points;
-  std::size_t below = 0, above = 0, chair_legs = 0, table_legs = 0, hanging = 0, lying = 0, ceiling = 0,
-              floor_amiss = 0;
+  std::size_t below = 0, above = 0, chair_legs = 0, table_legs = 0, hanging = 0, rod = 0, lying = 0,
+              ceiling = 0, floor_amiss = 0;
   forEachPoint(oneRound(), [&](const Eigen::Vector3d& at, std::uint32_t label, double) {
     ++points[label];
     below += label == kTable && std::abs(at.z() - (kTableHeight - kTableTop)) < 1e-4;
     above += label == kTable && std::abs(at.z() - kTableHeight) < 1e-4;
     table_legs += label == kTable && at.z() < 0.35;
     chair_legs += label == kChair && at.z() < 0.42;
-    hanging += label == kCable && at.z() > 0.8;
-    lying += label == kCable && at.z() < 0.021;
+    hanging += label == kThin && at.z() > 1.5 + 1e-4;
+    rod += label == kThin && at.z() < kTableHeight - 1e-4;
+    lying += label == kSmall && at.z() < 0.021;
     ceiling += label == kWall && std::abs(at.z() - kCeiling) < 1e-4;
     floor_amiss += label == kFloor && std::abs(at.z()) > 1e-4;
   });
@@ -200,10 +201,11 @@ TEST(Rooms, ALowLidarSeesTableTopsFromBelowLegsAndCables) {
   EXPECT_GT(table_legs, 200u);
   EXPECT_GT(chair_legs, 1000u);
   EXPECT_GT(hanging, 20u);
+  EXPECT_GT(rod, 20u);
   EXPECT_GT(lying, 100u);
   EXPECT_GT(ceiling, 20u);
   EXPECT_EQ(floor_amiss, 0u);
-  for (const std::uint32_t label : {kFloor, kWall, kTable, kChair, kFurniture, kCable, kSmallBox, kTrolley,
+  for (const std::uint32_t label : {kFloor, kWall, kTable, kChair, kFurniture, kThin, kSmall, kTrolley,
                                     kPerson, kMovingPerson, kMovingVehicle}) {
     EXPECT_GT(points[label], 100u) << label;
   }
