@@ -161,7 +161,8 @@ void furnishSouth(Furnisher& put, std::vector<Shape>& shapes) {
 /// What something does next.
 struct Step {
   double duration;  ///< [s]
-  Eigen::Vector3d velocity;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  double turn = 0.0;  ///< [rad/s]
 };
 
 double durationOf(const std::vector<Step>& steps) {
@@ -170,32 +171,33 @@ double durationOf(const std::vector<Step>& steps) {
   return sum;
 }
 
-/// Lets a shape repeat steps that end where they begin. @param phase when in them time 0 is [s].
+/// Lets a shape repeat steps that end where they begin.
+/// @param phase when in them time 0 is, before anything turns [s].
 void repeat(std::vector<Step> steps, double phase, Shape& shape) {
   shape.period = durationOf(steps);
   while (phase > 0.0) {
     const Step step = steps.front();
     const double gone = std::min(phase, step.duration);
     shape.centre += gone * step.velocity;
-    steps.push_back({gone, step.velocity});
+    steps.push_back({gone, step.velocity, step.turn});
     steps.front().duration -= gone;
     if (gone == step.duration) steps.erase(steps.begin());
     phase -= gone;
   }
   double until = 0.0;
-  for (const Step& step : steps) shape.legs.push_back({until += step.duration, step.velocity});
+  for (const Step& step : steps) shape.legs.push_back({until += step.duration, step.velocity, step.turn});
 }
 
 /// A way to and fro along points, with a rest at both ends.
 std::vector<Step> toAndFro(const std::vector<Eigen::Vector2d>& points, double speed, double rest_first,
                            double rest_last) {
-  std::vector<Step> steps{{rest_first, Eigen::Vector3d::Zero()}};
+  std::vector<Step> steps{{rest_first}};
   const auto go = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
     const Eigen::Vector2d way = to - from;
     steps.push_back({way.norm() / speed, {speed * way.normalized().x(), speed * way.normalized().y(), 0.0}});
   };
   for (std::size_t i = 1; i < points.size(); ++i) go(points[i - 1], points[i]);
-  steps.push_back({rest_last, Eigen::Vector3d::Zero()});
+  steps.push_back({rest_last});
   for (std::size_t i = points.size() - 1; i > 0; --i) go(points[i], points[i - 1]);
   return steps;
 }
@@ -211,9 +213,10 @@ std::vector<Shape> personAt(const Eigen::Vector2d& at, std::uint32_t label) {
   return parts;
 }
 
-void addWalker(const std::vector<Eigen::Vector2d>& points, const std::vector<Step>& steps, double phase,
+/// @param start where the steps begin.
+void addWalker(const Eigen::Vector2d& start, const std::vector<Step>& steps, double phase,
                std::vector<Shape>& shapes) {
-  for (Shape& part : personAt(points.front(), kMovingPerson)) {
+  for (Shape& part : personAt(start, kMovingPerson)) {
     repeat(steps, phase, part);
     shapes.push_back(std::move(part));
   }
@@ -228,18 +231,18 @@ void addDoorUser(Dice& dice, std::vector<Shape>& shapes) {
   const std::vector<Step> steps = toAndFro(points, speed, inside, outside);
   const double through = steps[1].duration, along = steps[2].duration;
   constexpr double kOpening = 1.0, kWait = 0.3;  // [s]
-  const Eigen::Vector3d none = Eigen::Vector3d::Zero(), open(kDoorWidth + 0.05, 0.0, 0.0);
-  const std::vector<Step> door_steps{{kWait, none},
+  const Eigen::Vector3d open(kDoorWidth + 0.05, 0.0, 0.0);
+  const std::vector<Step> door_steps{{kWait},
                                      {kOpening, -open / kOpening},
-                                     {inside - kWait - 2.0 * kOpening, none},
+                                     {inside - kWait - 2.0 * kOpening},
                                      {kOpening, open / kOpening},
-                                     {through + kWait, none},
+                                     {through + kWait},
                                      {kOpening, -open / kOpening},
-                                     {2.0 * along + outside - kWait - 2.0 * kOpening, none},
+                                     {2.0 * along + outside - kWait - 2.0 * kOpening},
                                      {kOpening, open / kOpening},
-                                     {through, none}};
+                                     {through}};
   const double phase = dice.between(0.0, inside);
-  addWalker(points, steps, phase, shapes);
+  addWalker(points.front(), steps, phase, shapes);
   // It slides in front of the wall, on the side of the corridor, and is open at the start of the steps.
   Shape door = box(kSlidingDoor + open.x(), kCorridorNorth - 0.5 * kThickness - 0.06, 1.03, kDoorWidth, 0.04,
                    2.04, kMovingVehicle);
@@ -247,19 +250,38 @@ void addDoorUser(Dice& dice, std::vector<Shape>& shapes) {
   shapes.push_back(door);
 }
 
+/// Somebody who goes to the wardrobe in the bedroom, whose door turns about its hinge.
+void addWardrobeUser(Dice& dice, std::vector<Shape>& shapes) {
+  const double speed = dice.between(0.6, 1.1), away = dice.between(4.0, 8.0), there = dice.between(6.0, 9.0);
+  const std::vector<Step> steps = toAndFro({{6.4, -3.9}, {4.25, -3.9}}, speed, away, there);
+  constexpr double kOpening = 1.2, kWait = 0.5, kAngle = 1.8, kWidth = 0.55;  // [s], [s], [rad], [m]
+  const double phase = dice.between(0.0, away);
+  addWalker({6.4, -3.9}, steps, phase, shapes);
+  Shape door = box(4.875, -4.56, 1.05, kWidth, 0.03, 2.0, kMovingVehicle);
+  door.hinge.x() = 0.5 * kWidth;
+  const double way = steps[1].duration;
+  repeat({{away + way + kWait},
+          {kOpening, Eigen::Vector3d::Zero(), -kAngle / kOpening},
+          {there - 2.0 * (kOpening + kWait)},
+          {kOpening, Eigen::Vector3d::Zero(), kAngle / kOpening},
+          {kWait + way}},
+         phase, door);
+  shapes.push_back(door);
+}
+
 /// People on ways that keep 0.8 m from that of the robot.
 void addPeople(Dice& dice, std::vector<Shape>& shapes) {
   addDoorUser(dice, shapes);
+  addWardrobeUser(dice, shapes);
   for (const std::vector<Eigen::Vector2d>& points :
        {std::vector<Eigen::Vector2d>{{0.9, 3.7}, {0.9, 5.6}, {1.4, 5.7}},  // office
         {{6.2, 6.5}, {9.4, 6.5}, {9.4, 3.2}},                              // living room
         {{3.6, 1.75}, {6.9, 1.75}},                                        // corridor
-        {{13.2, -0.8}, {13.2, -4.0}, {12.4, -4.2}},                        // dining room
-        {{3.0, -3.95}, {6.3, -3.95}}}) {                                   // bedroom
+        {{13.2, -0.8}, {13.2, -4.0}, {12.4, -4.2}}}) {                     // dining room
     const double speed = dice.between(0.5, 1.2), first = dice.between(3.0, 8.0),
                  last = dice.between(3.0, 8.0);
     const std::vector<Step> steps = toAndFro(points, speed, first, last);
-    addWalker(points, steps, dice.between(0.0, durationOf(steps)), shapes);
+    addWalker(points.front(), steps, dice.between(0.0, durationOf(steps)), shapes);
   }
   for (const Shape& part : personAt({7.75, -4.6}, kPerson)) shapes.push_back(part);
 }

@@ -1,4 +1,4 @@
-/// @file A flat of furnished rooms along a corridor, with people and a door that slides.
+/// @file A flat of furnished rooms along a corridor, with people and doors.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,5 +1,6 @@
 #include "simulation/scene.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,20 +44,27 @@ void clipToQuadric(double a, double b, double c, double& enter, double& leave) {
 
 }  // namespace
 
-Eigen::Vector3d Shape::centreAt(double time) const {
+Shape::Placement Shape::placeAt(double time) const {
   if (period > 0.0) time -= period * std::floor(time / period);
   Eigen::Vector3d at = centre;
-  double begin = 0.0;
+  double begin = 0.0, turned = 0.0;
+  bool ends = true;
   for (const Leg& leg : legs) {
-    if (time <= leg.until) return at + (time - begin) * leg.velocity;
-    at += (leg.until - begin) * leg.velocity;
+    ends = time > leg.until;
+    const double duration = (ends ? leg.until : time) - begin;
+    at += duration * leg.velocity;
+    turned += duration * leg.turn;
     begin = leg.until;
+    if (!ends) break;
   }
-  return at + (time - begin) * velocity;
+  if (ends) at += (time - begin) * velocity;
+  if (turned != 0.0) at.head<2>() += hinge - Eigen::Rotation2Dd(turned) * hinge;
+  return {at, yaw + turned};
 }
 
 bool Shape::contains(const Eigen::Vector3d& point, double time) const {
-  const Eigen::Array3d r = intoAxes(point - centreAt(time), yaw).cwiseQuotient(half).array();
+  const Placement place = placeAt(time);
+  const Eigen::Array3d r = intoAxes(point - place.centre, place.yaw).cwiseQuotient(half).array();
   switch (type) {
     case ShapeType::kBox:
       return (r.abs() <= 1.0).all();
@@ -71,8 +79,9 @@ bool Shape::contains(const Eigen::Vector3d& point, double time) const {
 std::optional<double> Shape::hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                  double time) const {
   // In coordinates where the shape has half extents 1.
-  const Eigen::Vector3d o = intoAxes(origin - centreAt(time), yaw).cwiseQuotient(half);
-  const Eigen::Vector3d d = intoAxes(direction, yaw).cwiseQuotient(half);
+  const Placement place = placeAt(time);
+  const Eigen::Vector3d o = intoAxes(origin - place.centre, place.yaw).cwiseQuotient(half);
+  const Eigen::Vector3d d = intoAxes(direction, place.yaw).cwiseQuotient(half);
   double enter = 0.0, leave = kInfinity;
   switch (type) {
     case ShapeType::kBox:

@@ -15,6 +15,7 @@ enum class ShapeType { kBox, kCylinder, kEllipsoid };
 struct Leg {
   double until = 0.0;                                  ///< when it ends [s]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
+  double turn = 0.0;                                   ///< of a box about its hinge [rad/s]
 };
 
 /// A shape that moves with constant velocity, after other legs if it has some. Boxes may be rotated about the
@@ -29,14 +30,23 @@ struct Shape {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< after the last leg [m/s]
   std::uint32_t label = 0;                             ///< raw SemanticKITTI label
   std::vector<Leg> legs = {};                          ///< by rising time; the first begins at time 0
+  /// From the centre at time 0 to the vertical axis about which legs turn the shape, in the world's axes [m].
+  Eigen::Vector2d hinge = Eigen::Vector2d::Zero();
   double period = 0.0;  ///< after which the shape is back at its centre and repeats its legs [s]; 0: never
 
-  Eigen::Vector3d centreAt(double time) const;
+  Eigen::Vector3d centreAt(double time) const { return placeAt(time).centre; }
   bool contains(const Eigen::Vector3d& point, double time) const;
   /// Distance along a ray to the surface [m]; nullopt if the ray misses, or starts inside of the shape.
   /// @param direction unit vector.
   std::optional<double> hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                             double time) const;
+
+ private:
+  struct Placement {
+    Eigen::Vector3d centre;
+    double yaw;
+  };
+  Placement placeAt(double time) const;
 };
 
 /// The plane z = 0 with a road along x, whose axis is y = 0, or with a grid of roads along x and y.
@@ -66,7 +76,7 @@ enum class SceneKind {
   kTraffic,   ///< stop-and-go traffic in both directions, and parked cars of which some drive off
   kCrowd,     ///< many pedestrians, who walk and stand, and cyclists
   kArrivals,  ///< cars that come, park and leave, people who stop or sit down, trolleys, gates
-  kRooms,     ///< no street: furnished rooms along a corridor, people who walk and stand, a sliding door
+  kRooms,     ///< no street: furnished rooms along a corridor, people who walk and stand, doors
 };
 /// @throws std::invalid_argument if there is no kind of this name.
 SceneKind sceneKindNamed(const std::string& name);

@@ -19,7 +19,7 @@ po::options_description options() {
       "scene", tools::textOption("KIND")->default_value("street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
       "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop or "
-      "sit down, trolleys, gates; rooms: furnished rooms along a corridor, people, a sliding door")(
+      "sit down, trolleys, gates; rooms: furnished rooms along a corridor, people, doors")(
       "scans", tools::optionWith("N", 100), "number of scans")(
       "lidar", tools::textOption("NAME"),
       "rows of the lidar: hdl64, hdl32 or vlp16; default: hdl64, in rooms vlp16")(

@@ -15,8 +15,11 @@ namespace {
 
 constexpr std::uint64_t kSeeds = 12;
 
-bool isDoor(const Shape& shape) {
-  return shape.label == kMovingVehicle;
+bool slides(const Shape& shape) {
+  return shape.label == kMovingVehicle && shape.hinge.isZero();
+}
+bool isWardrobeDoor(const Shape& shape) {
+  return shape.label == kMovingVehicle && !shape.hinge.isZero();
 }
 
 /// Whether a shape comes within a distance of an upright line. @param low, high ends of the line [m].
@@ -117,12 +120,12 @@ TEST(Rooms, PeopleWalkAndStandAndTouchNothing) {
   }
 }
 
-TEST(Rooms, TheDoorOpensForWhomeverComesAndCloses) {
+TEST(Rooms, TheSlidingDoorOpensAndCloses) {
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
     const Scene scene = makeRooms(seed);
-    const auto door = std::find_if(scene.shapes.begin(), scene.shapes.end(), isDoor);
+    const auto door = std::find_if(scene.shapes.begin(), scene.shapes.end(), slides);
     ASSERT_NE(door, scene.shapes.end());
-    EXPECT_EQ(std::count_if(scene.shapes.begin(), scene.shapes.end(), isDoor), 1);
+    EXPECT_EQ(std::count_if(scene.shapes.begin(), scene.shapes.end(), slides), 1);
     double least = 1e9, most = -1e9, closed = 0.0, open = 0.0;
     int closings = 0;
     bool was_closed = false;
@@ -151,6 +154,34 @@ TEST(Rooms, TheDoorOpensForWhomeverComesAndCloses) {
     EXPECT_GE(closings, 4) << "twice in each period";
     EXPECT_GT(closed, 6.0);
     EXPECT_GT(open, 6.0);
+  }
+}
+
+TEST(Rooms, TheWardrobeDoorTurnsAboutItsHinge) {
+  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+    const Scene scene = makeRooms(seed);
+    const auto door = std::find_if(scene.shapes.begin(), scene.shapes.end(), isWardrobeDoor);
+    ASSERT_NE(door, scene.shapes.end());
+    const Eigen::Vector2d hinge = door->centre.head<2>() + door->hinge;
+    double closed = 0.0, open = 0.0;
+    for (double time = 0.0; time < door->period; time += 0.1) {
+      const Eigen::Vector2d arm = door->centreAt(time).head<2>() - hinge;
+      EXPECT_NEAR(arm.norm(), door->hinge.norm(), 1e-9);
+      const double angle = std::acos(-arm.x() / arm.norm());
+      EXPECT_GE(arm.y(), -1e-9) << "into the room";
+      closed += angle < 1e-3 ? 0.1 : 0.0;
+      open += angle > 1.79 ? 0.1 : 0.0;
+      // The furniture behind and the person before it are in nobody's way.
+      for (const double part : {0.1, 0.5, 1.0, 1.5, 1.99}) {
+        const Eigen::Vector2d at = hinge + part * arm;
+        for (const Shape& shape : scene.shapes) {
+          if (isWardrobeDoor(shape)) continue;
+          EXPECT_FALSE(shape.contains({at.x(), at.y(), 1.0}, time)) << time << ", label " << shape.label;
+        }
+      }
+    }
+    EXPECT_GT(closed, 5.0);
+    EXPECT_GT(open, 2.0);
   }
 }
 

@@ -49,6 +49,36 @@ TEST(Shape, GoesLegByLeg) {
   EXPECT_EQ(car.centreAt(9.0), Eigen::Vector3d(15, 6, 0));
 }
 
+TEST(Shape, TurnsAboutItsHinge) {
+  Shape door{ShapeType::kBox, {10, 0, 1}, {0.5, 0.02, 1}};
+  door.hinge = {0.5, 0.0};
+  door.legs = {{1.0, Eigen::Vector3d::Zero()}, {2.0, Eigen::Vector3d::Zero(), -M_PI / 2}};
+  const Eigen::Vector3d forward = Eigen::Vector3d::UnitX(), left = Eigen::Vector3d::UnitY();
+  EXPECT_NEAR(*door.hit({0, 0, 1}, forward, 1.0), 9.5, 1e-9);
+  EXPECT_TRUE(door.contains({9.6, 0, 1}, 0.5));
+  for (const double time : {2.0, 7.0}) {
+    EXPECT_TRUE(door.centreAt(time).isApprox(Eigen::Vector3d(10.5, 0.5, 1), 1e-9)) << time;
+    EXPECT_NEAR(*door.hit({0, 0.5, 1}, forward, time), 10.48, 1e-9);
+    EXPECT_NEAR(*door.hit({10.5, -1, 1}, left, time), 1.0, 1e-9);
+    EXPECT_FALSE(door.contains({9.6, 0, 1}, time));
+    EXPECT_TRUE(door.contains({10.5, 0.9, 1}, time));
+  }
+  const double r = 0.9 * std::sqrt(0.5);
+  EXPECT_TRUE(door.contains({10.5 - r, r, 1}, 1.5)) << "half way";
+}
+
+TEST(Shape, RepeatsItsLegs) {
+  Shape person{ShapeType::kBox, {0, 0, 1}, {0.2, 0.2, 1}};
+  person.legs = {{2.0, {1, 0, 0}}, {3.0, {0, 0, 0}}, {5.0, {-1, 0, 0}}};
+  person.period = 6.0;
+  for (const double cycle : {0.0, 6.0, 600.0, -6.0}) {
+    EXPECT_NEAR(person.centreAt(cycle + 1.5).x(), 1.5, 1e-9);
+    EXPECT_NEAR(person.centreAt(cycle + 2.5).x(), 2.0, 1e-9);
+    EXPECT_NEAR(person.centreAt(cycle + 4.5).x(), 0.5, 1e-9);
+    EXPECT_NEAR(person.centreAt(cycle + 5.5).x(), 0.0, 1e-9);
+  }
+}
+
 /// The distances that the shapes with a label are from where they were at time 0, at each of the given times.
 std::vector<std::vector<double>> waysOf(const Scene& scene, std::uint32_t label,
                                         const std::vector<double>& times) {
