@@ -5,7 +5,8 @@ endif()
 find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
 
 bki_mapping_room(simulation FOLDER lab/simulation SOURCES
-    city.cpp drive_file.cpp furniture.cpp lidar.cpp rooms.cpp scene.cpp street.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp
+    city.cpp drive_file.cpp furniture.cpp lidar.cpp rooms.cpp scene.cpp street.cpp street_parts.cpp
+    truth_cloud.cpp voxel_truth.cpp
   LINK bki_mapping_sequence bki_mapping_settings)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
