@@ -127,6 +127,41 @@ std::string shortText(const std::string& text, std::size_t most) {
   return out;
 }
 
+ParameterFacts numberFacts(std::string_view name, ParameterType kind, const NumberRange& range,
+                           std::string_view unit, Changes changes, std::string_view description) {
+  const std::string values = range.text(kind == ParameterType::kInteger ? "an integer" : "a number");
+  return {std::string(name), kind, values, std::string(unit), std::string(description), changes, {}, range};
+}
+
+ParameterFacts wordFacts(std::string_view name, const std::vector<std::string>& words, Changes changes,
+                         std::string_view description) {
+  return {std::string(name),
+          ParameterType::kWord,
+          wordsText(words),
+          "",
+          std::string(description),
+          changes,
+          words,
+          {}};
+}
+
+ParameterFacts textFacts(std::string_view name, std::string_view values, Changes changes,
+                         std::string_view description) {
+  return {std::string(name),
+          ParameterType::kText,
+          std::string(values),
+          "",
+          std::string(description),
+          changes,
+          {},
+          {}};
+}
+
+std::optional<double> kinds::Real::parse(const ParameterFacts& facts, const std::string& text) {
+  const double number = parseNumber(text);
+  return facts.range.allows(number) ? std::optional(number) : std::nullopt;
+}
+
 void refuseValue(const ParameterFacts& parameter, const std::string& value) {
   throw std::invalid_argument("parameter " + parameter.name + " is '" + shortText(value) + "', but must be " +
                               parameter.values + nearestWord(value, parameter.words));

@@ -1,7 +1,9 @@
 /// @file Parameters that name a frame.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "core/frame_name.h"
@@ -9,18 +11,19 @@
 namespace bki_mapping::ros_interface {
 
 /// A frame of tf, or empty. One leading slash is removed; more are refused, as tf2 knows no such frame.
-template <typename Config>
-NamedParameter<Config> frameParameter(const std::string& name, std::string Config::*field,
-                                      const std::string& values, Changes changes,
-                                      const std::string& description) {
-  const auto parse = [](const std::string& text) {
+struct FrameKind : kinds::Text {
+  static std::optional<std::string> parse(const ParameterFacts& facts, const std::string& text) {
     const std::string frame = frameName(text);
-    return frame == frameName(frame) ? std::optional(frame) : std::nullopt;
-  };
-  const auto same = [](const std::string& frame) { return frame; };
-  const auto allows = [](const std::string& frame) { return frame == frameName(frame); };
-  return memberParameter<Config>({name, ParameterType::kText, values, "", description, changes, {}, {}},
-                                 field, parse, same, allows);
+    return allows(facts, frame) ? std::optional(frame) : std::nullopt;
+  }
+  static bool allows(const ParameterFacts&, const std::string& frame) { return frame == frameName(frame); }
+};
+
+template <typename Config>
+NamedParameter<Config> frameParameter(std::string_view name, std::string Config::*field,
+                                      std::string_view values, Changes changes,
+                                      std::string_view description) {
+  return memberParameter<FrameKind>(textFacts(name, values, changes, description), field);
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -4,6 +4,7 @@
 
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
@@ -63,6 +64,34 @@ std::map<std::string, std::string> fileParameters(const std::string& file) {
 struct Both {
   ServerConfig server;
   MapperConfig mapper;
+};
+
+/// The access to a parameter of one input, whose text is kept.
+class InputAccess : public ParameterAccess<Both> {
+ public:
+  InputAccess(std::string input, NamedParameter<InputConfig> parameter)
+      : input_(std::move(input)), parameter_(std::move(parameter)) {}
+
+  bool assign(const ParameterFacts&, Both& both, const std::string& value) const override {
+    InputConfig checked;
+    const bool allowed = parameter_.assign(checked, value);
+    if (allowed) both.server.inputs[input_][parameter_.name] = value;
+    return allowed;
+  }
+  std::string get(const ParameterFacts&, const Both& both) const override { return textIn(both); }
+  // No other value is ever kept.
+  bool allowed(const ParameterFacts&, const Both&) const override { return true; }
+  bool equal(const Both& a, const Both& b) const override { return textIn(a) == textIn(b); }
+
+ private:
+  std::string textIn(const Both& both) const {
+    const auto input = both.server.inputs.find(input_);
+    if (input == both.server.inputs.end()) return "";
+    const auto value = input->second.find(parameter_.name);
+    return value == input->second.end() ? "" : value->second;
+  }
+  std::string input_;
+  NamedParameter<InputConfig> parameter_;
 };
 
 /// inputParameters of all inputs.
@@ -213,13 +242,7 @@ void setParameters(const std::map<std::string, std::string>& values, ServerConfi
     for (const auto& p : ownInputParameters()) {
       ParameterFacts facts = p;
       facts.name = kInputs + name + "/" + p.name;
-      const auto assign = [p, name](Both& both, const std::string& value) {
-        InputConfig checked;
-        const bool allowed = p.assign(checked, value);
-        if (allowed) both.server.inputs[name][p.name] = value;
-        return allowed;
-      };
-      parameters.push_back({facts, assign, nullptr, nullptr, nullptr});
+      parameters.push_back({facts, std::make_shared<InputAccess>(name, p)});
     }
   }
   Both both = {server, mapper};

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -73,14 +74,31 @@ struct ParameterFacts {
 /// @throws std::invalid_argument that says that the parameter can change only at the start.
 [[noreturn]] void refuseChange(const ParameterFacts& parameter);
 
-/// One named setting of a struct `Config`. Values are text as YAML writes it.
+/// How a setting of a struct `Config` is read and written. Values are text as YAML writes it. The functions
+/// get the setting's facts, which say what is allowed.
+template <typename Config>
+class ParameterAccess {
+ public:
+  using Facts = ParameterFacts;
+  virtual ~ParameterAccess() = default;
+  /// Sets the value; false, with `config` unchanged, if it is not allowed.
+  virtual bool assign(const Facts& facts, Config& config, const std::string& value) const = 0;
+  virtual std::string get(const Facts& facts, const Config& config) const = 0;
+  /// Whether the value in `config` is allowed.
+  virtual bool allowed(const Facts& facts, const Config& config) const = 0;
+  /// Whether both values are the same to the bit.
+  virtual bool equal(const Config& a, const Config& b) const = 0;
+};
+
+/// One named setting of a struct `Config`.
 template <typename Config>
 struct NamedParameter : ParameterFacts {
-  /// Sets the value; false, with `config` unchanged, if it is not allowed.
-  std::function<bool(Config&, const std::string& value)> assign;
-  std::function<std::string(const Config&)> get;
-  std::function<bool(const Config&)> allowed;               ///< whether the value in a Config is allowed
-  std::function<bool(const Config&, const Config&)> equal;  ///< whether both values are the same to the bit
+  std::shared_ptr<const ParameterAccess<Config>> access;
+
+  bool assign(Config& config, const std::string& value) const { return access->assign(*this, config, value); }
+  std::string get(const Config& config) const { return access->get(*this, config); }
+  bool allowed(const Config& config) const { return access->allowed(*this, config); }
+  bool equal(const Config& a, const Config& b) const { return access->equal(a, b); }
 
   /// Sets the value. @throws std::invalid_argument (refuseValue).
   void set(Config& config, const std::string& value) const {
@@ -109,75 +127,132 @@ double parseNumber(const std::string& text);
 /// flood a log, and control characters become '?', so that they cannot reach a terminal.
 std::string shortText(const std::string& text, std::size_t most = 100);
 
-/// The member `field` as a parameter.
-/// @param parse std::optional<Value>(text), without a value if the text spells no allowed value.
-/// @param print text(Value). @param allows bool(Value).
-template <typename Config, typename Value, typename Parse, typename Print, typename Allows>
-NamedParameter<Config> memberParameter(ParameterFacts facts, Value Config::*field, Parse parse, Print print,
-                                       Allows allows) {
-  const auto assign = [=](Config& config, const std::string& text) {
-    const std::optional<Value> value = parse(text);
-    if (value) config.*field = *value;
+/// The facts of a number. @param kind kReal or kInteger.
+ParameterFacts numberFacts(std::string_view name, ParameterType kind, const NumberRange& range,
+                           std::string_view unit, Changes changes, std::string_view description);
+/// The facts of a choice between words.
+ParameterFacts wordFacts(std::string_view name, const std::vector<std::string>& words, Changes changes,
+                         std::string_view description);
+/// The facts of a text. @param values what the text means.
+ParameterFacts textFacts(std::string_view name, std::string_view values, Changes changes,
+                         std::string_view description);
+
+/// The access to a member. Kind has `Value`, the type of the member, and functions of facts: `parse` of text,
+/// which has no value if the text spells no allowed value; `print`; and `allows`.
+template <typename Config, typename Kind>
+class MemberAccess : public ParameterAccess<Config> {
+ public:
+  using Value = typename Kind::Value;
+  using Facts = ParameterFacts;
+  explicit MemberAccess(Value Config::*field) : field_(field) {}
+
+  bool assign(const Facts& facts, Config& config, const std::string& text) const override {
+    const std::optional<Value> value = Kind::parse(facts, text);
+    if (value) config.*field_ = *value;
     return value.has_value();
-  };
-  return {std::move(facts), assign, [=](const Config& config) { return print(config.*field); },
-          [=](const Config& config) { return allows(config.*field); },
-          [=](const Config& a, const Config& b) { return a.*field == b.*field; }};
+  }
+  std::string get(const Facts& facts, const Config& config) const override {
+    return Kind::print(facts, config.*field_);
+  }
+  bool allowed(const Facts& facts, const Config& config) const override {
+    return Kind::allows(facts, config.*field_);
+  }
+  bool equal(const Config& a, const Config& b) const override { return a.*field_ == b.*field_; }
+
+ private:
+  Value Config::*field_;
+};
+
+/// The member `field` as a parameter.
+template <typename Kind, typename Config>
+NamedParameter<Config> memberParameter(const ParameterFacts& facts, typename Kind::Value Config::*field) {
+  return {facts, std::make_shared<MemberAccess<Config, Kind>>(field)};
 }
 
+/// The kinds of values, for MemberAccess.
+namespace kinds {
+
+struct Real {
+  using Value = double;
+  static std::optional<double> parse(const ParameterFacts& facts, const std::string& text);
+  static std::string print(const ParameterFacts&, double value) { return numberText(value); }
+  static bool allows(const ParameterFacts& facts, double value) { return facts.range.allows(value); }
+};
+
+template <typename Integer>
+struct Whole {
+  using Value = Integer;
+  static std::optional<Value> parse(const ParameterFacts& facts, const std::string& text) {
+    const std::optional<double> number = Real::parse(facts, text);
+    const bool allowed = number && *number == std::floor(*number);
+    return allowed ? std::optional(static_cast<Value>(*number)) : std::nullopt;
+  }
+  static std::string print(const ParameterFacts&, Value value) { return std::to_string(value); }
+  static bool allows(const ParameterFacts& facts, Value value) {
+    return facts.range.allows(static_cast<double>(value));
+  }
+};
+
+template <typename Enumeration>
+struct Choice {
+  using Value = Enumeration;
+  static std::optional<Value> parse(const ParameterFacts& facts, const std::string& text) {
+    const std::optional<std::size_t> index = indexOf(facts.words, text);
+    return index ? std::optional(static_cast<Value>(*index)) : std::nullopt;
+  }
+  static std::string print(const ParameterFacts& facts, Value value) {
+    const auto index = static_cast<std::size_t>(value);
+    return index < facts.words.size() ? facts.words[index] : std::to_string(index);
+  }
+  static bool allows(const ParameterFacts& facts, Value value) {
+    return static_cast<std::size_t>(value) < facts.words.size();
+  }
+};
+
+struct Text {
+  using Value = std::string;
+  static std::optional<std::string> parse(const ParameterFacts&, const std::string& text) { return text; }
+  static std::string print(const ParameterFacts&, const std::string& text) { return text; }
+  static bool allows(const ParameterFacts&, const std::string&) { return true; }
+};
+
+struct Word : Text {
+  static std::optional<std::string> parse(const ParameterFacts& facts, const std::string& text) {
+    return allows(facts, text) ? std::optional(text) : std::nullopt;
+  }
+  static bool allows(const ParameterFacts& facts, const std::string& text) {
+    return indexOf(facts.words, text).has_value();
+  }
+};
+
+}  // namespace kinds
+
 template <typename Config>
-NamedParameter<Config> realParameter(const std::string& name, double Config::*field, const NumberRange& range,
-                                     const std::string& unit, Changes changes,
-                                     const std::string& description) {
-  const auto allows = [=](double value) { return range.allows(value); };
-  const auto parse = [=](const std::string& text) {
-    const double number = parseNumber(text);
-    return allows(number) ? std::optional(number) : std::nullopt;
-  };
-  const std::string values = range.text("a number");
-  return memberParameter<Config>({name, ParameterType::kReal, values, unit, description, changes, {}, range},
-                                 field, parse, numberText, allows);
+NamedParameter<Config> realParameter(std::string_view name, double Config::*field, const NumberRange& range,
+                                     std::string_view unit, Changes changes, std::string_view description) {
+  return memberParameter<kinds::Real>(
+      numberFacts(name, ParameterType::kReal, range, unit, changes, description), field);
 }
 
 /// @param range of integers that both Value and double represent exactly.
 template <typename Config, typename Value>
-NamedParameter<Config> integerParameter(const std::string& name, Value Config::*field,
-                                        const NumberRange& range, Changes changes,
-                                        const std::string& description) {
-  const auto allows = [=](Value value) { return range.allows(static_cast<double>(value)); };
-  const auto parse = [=](const std::string& text) {
-    const double number = parseNumber(text);
-    const bool allowed = range.allows(number) && number == std::floor(number);
-    return allowed ? std::optional(static_cast<Value>(number)) : std::nullopt;
-  };
-  const auto print = [](Value value) { return std::to_string(value); };
-  const std::string values = range.text("an integer");
-  return memberParameter<Config>({name, ParameterType::kInteger, values, "", description, changes, {}, range},
-                                 field, parse, print, allows);
+NamedParameter<Config> integerParameter(std::string_view name, Value Config::*field, const NumberRange& range,
+                                        Changes changes, std::string_view description) {
+  return memberParameter<kinds::Whole<Value>>(
+      numberFacts(name, ParameterType::kInteger, range, "", changes, description), field);
 }
 
 /// A choice between words. @param words in the order of the enumeration Value, or of false and true.
 template <typename Config, typename Value>
-NamedParameter<Config> choiceParameter(const std::string& name, Value Config::*field,
+NamedParameter<Config> choiceParameter(std::string_view name, Value Config::*field,
                                        const std::vector<std::string>& words, Changes changes,
-                                       const std::string& description) {
-  const auto allows = [=](Value value) { return static_cast<std::size_t>(value) < words.size(); };
-  const auto parse = [=](const std::string& text) {
-    const std::optional<std::size_t> index = indexOf(words, text);
-    return index ? std::optional(static_cast<Value>(*index)) : std::nullopt;
-  };
-  const auto print = [=](Value value) {
-    const auto index = static_cast<std::size_t>(value);
-    return index < words.size() ? words[index] : std::to_string(index);
-  };
-  const std::string values = wordsText(words);
-  return memberParameter<Config>({name, ParameterType::kWord, values, "", description, changes, words, {}},
-                                 field, parse, print, allows);
+                                       std::string_view description) {
+  return memberParameter<kinds::Choice<Value>>(wordFacts(name, words, changes, description), field);
 }
 
 template <typename Config>
-NamedParameter<Config> truthParameter(const std::string& name, bool Config::*field, Changes changes,
-                                      const std::string& description) {
+NamedParameter<Config> truthParameter(std::string_view name, bool Config::*field, Changes changes,
+                                      std::string_view description) {
   NamedParameter<Config> parameter = choiceParameter(name, field, {"false", "true"}, changes, description);
   parameter.type = ParameterType::kTruth;
   return parameter;
@@ -185,29 +260,42 @@ NamedParameter<Config> truthParameter(const std::string& name, bool Config::*fie
 
 /// A choice between words that is stored as text.
 template <typename Config>
-NamedParameter<Config> wordParameter(const std::string& name, std::string Config::*field,
+NamedParameter<Config> wordParameter(std::string_view name, std::string Config::*field,
                                      const std::vector<std::string>& words, Changes changes,
-                                     const std::string& description) {
-  const auto allows = [=](const std::string& text) { return indexOf(words, text).has_value(); };
-  const auto parse = [=](const std::string& text) {
-    return allows(text) ? std::optional(text) : std::nullopt;
-  };
-  const auto print = [](const std::string& text) { return text; };
-  const std::string values = wordsText(words);
-  return memberParameter<Config>({name, ParameterType::kWord, values, "", description, changes, words, {}},
-                                 field, parse, print, allows);
+                                     std::string_view description) {
+  return memberParameter<kinds::Word>(wordFacts(name, words, changes, description), field);
 }
 
 /// Any text. @param values what the text means.
 template <typename Config>
-NamedParameter<Config> textParameter(const std::string& name, std::string Config::*field,
-                                     const std::string& values, Changes changes,
-                                     const std::string& description) {
-  const auto same = [](const std::string& text) { return text; };
-  const auto parse = [](const std::string& text) { return std::optional(text); };
-  return memberParameter<Config>({name, ParameterType::kText, values, "", description, changes, {}, {}},
-                                 field, parse, same, [](const std::string&) { return true; });
+NamedParameter<Config> textParameter(std::string_view name, std::string Config::*field,
+                                     std::string_view values, Changes changes, std::string_view description) {
+  return memberParameter<kinds::Text>(textFacts(name, values, changes, description), field);
 }
+
+/// The access to a setting of the member `part`.
+template <typename Config, typename Part>
+class PartAccess : public ParameterAccess<Config> {
+ public:
+  using Facts = ParameterFacts;
+  PartAccess(Part Config::*part, std::shared_ptr<const ParameterAccess<Part>> of_part)
+      : part_(part), of_part_(std::move(of_part)) {}
+
+  bool assign(const Facts& facts, Config& config, const std::string& text) const override {
+    return of_part_->assign(facts, config.*part_, text);
+  }
+  std::string get(const Facts& facts, const Config& config) const override {
+    return of_part_->get(facts, config.*part_);
+  }
+  bool allowed(const Facts& facts, const Config& config) const override {
+    return of_part_->allowed(facts, config.*part_);
+  }
+  bool equal(const Config& a, const Config& b) const override { return of_part_->equal(a.*part_, b.*part_); }
+
+ private:
+  Part Config::*part_;
+  std::shared_ptr<const ParameterAccess<Part>> of_part_;
+};
 
 /// Appends the parameters of the member `part`. @param prefix of their names.
 template <typename Config, typename Part>
@@ -216,11 +304,7 @@ void appendParameters(std::vector<NamedParameter<Config>>& parameters, const std
   for (const NamedParameter<Part>& p : of_part) {
     ParameterFacts facts = p;
     facts.name = prefix + p.name;
-    parameters.push_back(
-        {facts, [=](Config& config, const std::string& text) { return p.assign(config.*part, text); },
-         [=](const Config& config) { return p.get(config.*part); },
-         [=](const Config& config) { return p.allowed(config.*part); },
-         [=](const Config& a, const Config& b) { return p.equal(a.*part, b.*part); }});
+    parameters.push_back({facts, std::make_shared<PartAccess<Config, Part>>(part, p.access)});
   }
 }
 
