@@ -60,6 +60,7 @@ bki_mapping_core_room(query SOURCES
     column_map.cpp distance_field.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_rules)
+bki_mapping_join(bki_mapping_query)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
@@ -82,19 +83,22 @@ bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/spars
 
 # Class tables and parameters from YAML.
 find_package(yaml-cpp REQUIRED)
-bki_mapping_core_room(settings SOURCES
+bki_mapping_room(settings SOURCES
     class_table_yaml.cpp config_yaml.cpp label_watch.cpp named_file.cpp share_path.cpp yaml_file.cpp
   LINK bki_mapping_mapping)
 set_source_files_properties(src/settings/share_path.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_settings PRIVATE yaml-cpp ${CMAKE_DL_LIBS})
 bki_mapping_join(bki_mapping_settings)
+bki_mapping_light(bki_mapping_settings)
+bki_mapping_precompile(bki_mapping_settings
+  <Eigen/Geometry> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
 
 # Map files: SQLite and zlib. They name the program that wrote them.
 file(STRINGS package.xml version_line REGEX "<version>")
 string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${version_line}")
 find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
-bki_mapping_core_room(store SOURCES
+bki_mapping_room(store SOURCES
     database.cpp drive_cover.cpp drive_overlap.cpp grid_transform.cpp map_clear.cpp map_file.cpp map_file_state.cpp map_info.cpp map_keeper.cpp
     map_merge.cpp mapper_file.cpp migration.cpp new_map_file.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp
     tile_store.cpp whole_map.cpp
@@ -102,5 +106,7 @@ bki_mapping_core_room(store SOURCES
 target_compile_definitions(bki_mapping_store PRIVATE BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 target_link_libraries(bki_mapping_store PRIVATE SQLite::SQLite3 ZLIB::ZLIB)
 bki_mapping_join(bki_mapping_store)
+bki_mapping_light(bki_mapping_store)
+bki_mapping_precompile(bki_mapping_store REUSE bki_mapping_settings)
 # The linkage of a private class counts as the main file's only there.
 set_source_files_properties(src/store/map_keeper.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

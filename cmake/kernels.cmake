@@ -25,6 +25,8 @@ function(bki_mapping_kernels room file)
     configure_file(cmake/kernels_of_set.cpp.in ${folder}/${name}_${set}.cpp @ONLY)
     list(APPEND sources ${folder}/${name}_${set}.cpp)
   endforeach()
+  # In them the same names stand for other instruction sets.
+  set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   target_sources(bki_mapping_${room} PRIVATE ${sources})
 endfunction()
 

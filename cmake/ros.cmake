@@ -49,6 +49,7 @@ add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT
 add_dependencies(bki_mapping_core ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 
 bki_mapping_join(bki_mapping_ros)
+bki_mapping_light(bki_mapping_ros)
 bki_mapping_shell_flags(bki_mapping_ros)
 # bki_mapping_uses_ros(TARGET): includes ROS, so it is compiled as the shell is.
 function(bki_mapping_uses_ros target)

@@ -21,12 +21,16 @@ target_include_directories(bki_mapping_export SYSTEM PRIVATE ${OCTOMAP_INCLUDE_D
 # In debug builds OctoMap would print what it writes to standard error.
 set_source_files_properties(src/export/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
 bki_mapping_join(bki_mapping_sequence bki_mapping_city bki_mapping_export)
-bki_mapping_precompile(bki_mapping_export
-  <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
+bki_mapping_light(bki_mapping_sequence bki_mapping_city bki_mapping_export)
+bki_mapping_precompile(bki_mapping_sequence <Eigen/Geometry> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <memory>
+  <optional> <pcl/io/pcd_io.h> <set> <string> <vector>)
+bki_mapping_precompile(bki_mapping_export REUSE bki_mapping_sequence)
+bki_mapping_precompile(bki_mapping_city REUSE bki_mapping_settings)
 
 bki_mapping_room(tools SOURCES interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp
   LINK bki_mapping_city bki_mapping_query bki_mapping_sequence Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
+bki_mapping_join(bki_mapping_tools)
 # Of one file: precompiled headers serve only targets with all the definitions of theirs.
 set_source_files_properties(src/tools/options.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
 target_compile_options(bki_mapping_tools PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the other libraries

@@ -10,7 +10,7 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::size_t kPointsPerJob = 32;  ///< some 500 us
+constexpr std::size_t kSearchesPerJob = 32;  ///< some 500 us
 
 /// Squared distance from a point to a cube of voxels [voxels].
 double squaredDistance(const Eigen::Vector3d& point, const GridIndex& cube, double edge) {
@@ -156,9 +156,9 @@ void nearestObstacles(const StateMap& states, Span<const Eigen::Vector3d> points
     checkPoint(states.geometry(), points[n], [&] { return "point " + std::to_string(n); });
   }
   checkDistance(max_distance);
-  states.parallelFor((points.size() + kPointsPerJob - 1) / kPointsPerJob, [&](std::size_t job) {
-    const std::size_t end = std::min(points.size(), (job + 1) * kPointsPerJob);
-    for (std::size_t n = job * kPointsPerJob; n < end; ++n) {
+  states.parallelFor((points.size() + kSearchesPerJob - 1) / kSearchesPerJob, [&](std::size_t job) {
+    const std::size_t end = std::min(points.size(), (job + 1) * kSearchesPerJob);
+    for (std::size_t n = job * kSearchesPerJob; n < end; ++n) {
       found[n] = search(states, points[n], classes, max_distance);
     }
   });

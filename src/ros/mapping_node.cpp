@@ -2,10 +2,11 @@
 #include <ros/ros.h>
 
 #include <iostream>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "ros/mapping_server.h"
+#include "ros/start_server.h"
 #include "ros/termination.h"
 
 namespace {
@@ -35,7 +36,7 @@ int main(int argc, char** argv) {
   const ros::NodeHandle node,
       private_node("~");  // while a handle exists, ROS keeps the log open for the error below
   try {
-    bki_mapping::ros_interface::MappingServer server(node, private_node);
+    const std::shared_ptr<void> server = bki_mapping::ros_interface::startMappingServer(node, private_node);
     ros::spin();
   } catch (const std::exception& fault) {
     ROS_FATAL("%s", fault.what());

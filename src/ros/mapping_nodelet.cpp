@@ -3,7 +3,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "ros/mapping_server.h"
+#include "ros/start_server.h"
 
 namespace bki_mapping::ros_interface {
 
@@ -12,14 +12,14 @@ class MappingNodelet : public nodelet::Nodelet {
  private:
   void onInit() override {
     try {
-      server_ = std::make_unique<MappingServer>(getNodeHandle(), getPrivateNodeHandle());
+      server_ = startMappingServer(getNodeHandle(), getPrivateNodeHandle());
     } catch (const std::exception& fault) {
       NODELET_FATAL("%s", fault.what());
       throw;  // the manager refuses to load the nodelet
     }
   }
 
-  std::unique_ptr<MappingServer> server_;
+  std::shared_ptr<void> server_;
 };
 
 }  // namespace bki_mapping::ros_interface

@@ -10,6 +10,7 @@
 #include "ros/map_file_settings.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"
+#include "ros/start_server.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
@@ -377,6 +378,10 @@ ServerSnapshot MappingServer::snapshot() {
 std::shared_ptr<const ServerSnapshot> MappingServer::askForSnapshot() {
   return QueuedCall<std::shared_ptr<const ServerSnapshot>>::ask(
       queue_, [this] { return std::make_shared<const ServerSnapshot>(snapshot()); });
+}
+
+std::shared_ptr<void> startMappingServer(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
+  return std::make_shared<MappingServer>(node, private_node);
 }
 
 }  // namespace bki_mapping::ros_interface
