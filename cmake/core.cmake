@@ -39,6 +39,7 @@ function(bki_mapping_core_room room)
   bki_mapping_room(${room} ${ARGN})
   target_compile_options(bki_mapping_${room} PRIVATE -fno-math-errno -fno-trapping-math
     $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition> $<$<NOT:$<CONFIG:Debug>>:-O3>)
+  bki_mapping_join(bki_mapping_${room})
   if(room STREQUAL "core")
     bki_mapping_precompile(bki_mapping_core
       <Eigen/Geometry> <algorithm> <array> <bitset> <cmath> <map> <memory> <optional> <stdexcept> <string> <vector>)
@@ -60,7 +61,6 @@ bki_mapping_core_room(query SOURCES
     column_map.cpp distance_field.cpp
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_rules)
-bki_mapping_join(bki_mapping_query)
 bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)

@@ -10,7 +10,7 @@ namespace bki_mapping {
 namespace {
 
 /// How far ahead points are prefetched [blocks].
-constexpr std::size_t kAhead = 2;
+constexpr std::size_t kBlocksAhead = 2;
 
 }  // namespace
 
@@ -141,7 +141,7 @@ void PointEvidence::prefetch(std::size_t block) const {
 void PointEvidence::accumulate(const BlockGroup&, const std::vector<GroupBlock>& blocks, std::size_t worker,
                                SumSink& sink) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (b + kAhead < blocks.size()) prefetch(blocks[b + kAhead].position);
+    if (b + kBlocksAhead < blocks.size()) prefetch(blocks[b + kBlocksAhead].position);
     sink.add(b, [&](BlockSums& sums) { sumBlock(blocks[b].position, workspaces_[worker], sums); });
   }
 }
