@@ -57,9 +57,9 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
 
 /// Equation 12b: what the voxels around say of one that asks them.
 VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel) {
-  constexpr int kReach = kNeighbourhoodReach;
-  static_assert(2 * kReach < kBlockEdge, "they are in at most two blocks along each axis");
-  const BlockIndex first = GridGeometry::blockOf({{voxel.x - kReach, voxel.y - kReach, voxel.z - kReach}});
+  constexpr int kAround = kNeighbourhoodReach;
+  static_assert(2 * kAround < kBlockEdge, "they are in at most two blocks along each axis");
+  const BlockIndex first = GridGeometry::blockOf({{voxel.x - kAround, voxel.y - kAround, voxel.z - kAround}});
   std::array<const Block*, 8> blocks;
   for (int n = 0; n < 8; ++n) {
     blocks[static_cast<std::size_t>(n)] =
@@ -67,9 +67,9 @@ VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const Voxe
   }
   VoteSums sums;
   const EvidenceUnits most = rules.mostVote();
-  for (int z = rules.neighbourhoodIsBelow() ? -kReach : 0; z <= kReach; ++z) {
-    for (int y = -kReach; y <= kReach; ++y) {
-      for (int x = -kReach; x <= kReach; ++x) {
+  for (int z = rules.neighbourhoodIsBelow() ? -kAround : 0; z <= kAround; ++z) {
+    for (int y = -kAround; y <= kAround; ++y) {
+      for (int x = -kAround; x <= kAround; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
         const BlockIndex index = GridGeometry::blockOf(at);
         const int n = index.x - first.x + 2 * (index.y - first.y) + 4 * (index.z - first.z);
