@@ -32,7 +32,7 @@ function(bki_mapping_room room)
   set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_ROOMS ${target})
 endfunction()
 
-# A room in which scans are computed.
+# A room in which scans are computed, or the map is read.
 # Without traps and errno the compiler may use vector instructions for comparisons and roots; results stay the same. Not -O3 in
 # Debug builds, which are for debuggers and sanitizers.
 function(bki_mapping_core_room room)

@@ -19,9 +19,8 @@ function(bki_mapping_precompile target)
   endif()
 endfunction()
 
-# Compiles several files as one, which reads their headers once. Not for rooms with vector files, in which the same names stand
-# for other instruction sets, and not for those in which scans are computed: their code is inlined as measured.
-option(BKI_MAPPING_JOIN "Compile several files as one, optimised less where no scan is computed: faster from scratch, slower after a change" OFF)
+# Compiles several files as one, which reads their headers once, and optimises those less in which no scan is computed.
+option(BKI_MAPPING_JOIN "Make the first build fast: join files, which makes later ones slower, and optimise some less" OFF)
 option(BKI_MAPPING_JOIN_TESTS "The same for the unit tests of a room, which are then one program" ${BKI_MAPPING_JOIN})
 function(bki_mapping_join_always)
   set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 14)
@@ -32,8 +31,16 @@ function(bki_mapping_join)
   endif()
 endfunction()
 
-# Targets in which no scan is computed take half the time with -O1. Their precompiled headers must be theirs, or another such
-# target's. Only where files are joined: who has time to wait gets the fastest code.
+# The same as bki_mapping_precompile(TARGET header...), for a target that joined consists of one or two files: they read the headers
+# in less time than it takes to precompile them.
+function(bki_mapping_precompile_files target)
+  if(NOT BKI_MAPPING_JOIN)
+    bki_mapping_precompile(${target} ${ARGN})
+  endif()
+endfunction()
+
+# Joined, targets in which no scan is computed are compiled with -O1, which takes half the time. They may use precompiled headers
+# only of each other.
 function(bki_mapping_light)
   if(BKI_MAPPING_JOIN)
     foreach(target ${ARGN})
@@ -42,7 +49,7 @@ function(bki_mapping_light)
   endif()
 endfunction()
 
-# GCC collects garbage from 128 MiB on; all that it needs for the largest file is 1 GiB.
+# GCC looks for garbage from 128 MiB of memory on, in vain: it needs at most 1 GiB for any file.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options("SHELL:--param ggc-min-heapsize=1048576")
 endif()

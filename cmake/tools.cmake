@@ -22,9 +22,8 @@ target_include_directories(bki_mapping_export SYSTEM PRIVATE ${OCTOMAP_INCLUDE_D
 set_source_files_properties(src/export/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
 bki_mapping_join(bki_mapping_sequence bki_mapping_city bki_mapping_export)
 bki_mapping_light(bki_mapping_sequence bki_mapping_city bki_mapping_export)
-bki_mapping_precompile(bki_mapping_sequence <Eigen/Geometry> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <memory>
-  <optional> <pcl/io/pcd_io.h> <set> <string> <vector>)
-bki_mapping_precompile(bki_mapping_export REUSE bki_mapping_sequence)
+bki_mapping_precompile_files(bki_mapping_export
+  <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
 bki_mapping_precompile(bki_mapping_city REUSE bki_mapping_settings)
 
 bki_mapping_room(tools SOURCES interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp

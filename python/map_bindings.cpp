@@ -79,7 +79,7 @@ void save(const FixedMap& map, py::handle path) {
   saveMap(file, map.stored.info, map.stored.drives, map.stored.map);
 }
 
-std::string description(const FixedMap& map) {
+std::string mapDescription(const FixedMap& map) {
   return "<bki_mapping.Map: " + std::to_string(map.stored.map.size()) + " blocks of 8 x 8 x 8 voxels of " +
          numberText(map.stored.info.resolution) + " m, frame '" + map.stored.info.frame + "', classes '" +
          map.stored.info.classes->name() + "'>";
@@ -167,7 +167,7 @@ py::array_t<std::int32_t> blockIndices(const FixedMap& map) {
 }
 
 /// The box of all blocks: its corners [m].
-py::object boundsOf(const FixedMap& map) {
+py::object mapBoundsOf(const FixedMap& map) {
   Eigen::AlignedBox3d box;
   {
     const py::gil_scoped_release release;
@@ -221,7 +221,7 @@ void addMap(py::module& m) {
            "probability, occupancy, class_probability, variance, entropy [nat] and evidence. Sorted by "
            "block.\n\nRaises ValueError for an unknown state.")
       .def_property_readonly(
-          "bounds", &boundsOf,
+          "bounds", &mapBoundsOf,
           "The box that holds all blocks: its lower and its upper corner [m], (2, 3), float64. None if the "
           "map has no block.")
       .def_property_readonly("blocks", &blockIndices,
@@ -239,7 +239,7 @@ void addMap(py::module& m) {
            "OctoMap; .yaml, with an image .pgm beside it, for map_server, with obstacles from min_z to max_z "
            "[m] above the origin of the map frame (height 'map') or the ground (height 'ground').\n\nRaises "
            "ValueError for another ending, RuntimeError if the file cannot be written.")
-      .def("__repr__", &description);
+      .def("__repr__", &mapDescription);
   addQueries(m, map);
 }
 
