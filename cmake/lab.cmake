@@ -18,8 +18,6 @@ target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_jso
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 set_source_files_properties(lab/evaluation/octomap_mapper.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
 bki_mapping_join(bki_mapping_simulation bki_mapping_evaluation)
-bki_mapping_light(bki_mapping_simulation bki_mapping_evaluation)
-bki_mapping_precompile(bki_mapping_simulation REUSE bki_mapping_settings)
 
 foreach(name simulate_city simulate_drive)
   bki_mapping_program(lab/tools ${name} bki_mapping_simulation)

@@ -40,7 +40,8 @@ function(bki_mapping_precompile_files target)
 endfunction()
 
 # Joined, targets in which no scan is computed are compiled with -O1, which takes half the time. They may use precompiled headers
-# only of each other.
+# only of each other. The ROS shell then publishes a map in a third more processor time; files, exports and mapping take as long as
+# before.
 function(bki_mapping_light)
   if(BKI_MAPPING_JOIN)
     foreach(target ${ARGN})
