@@ -331,7 +331,7 @@ void addMapper(py::module& m) {
       .def("integrate", &integrate, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
            kIntegrateHelp)
       .def("withdraw", &withdraw, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
-           "Take back a scan that was integrated with these arguments: its looks stay (free_gain/latest); "
+           "Take back a scan that was integrated with these arguments: its looks stay (rules/latest); "
            "otherwise "
            "the map is then the same to the bit "
            "as if the scan had never been there.\n\nRaises RuntimeError with free_space/extent 'mapped' or "

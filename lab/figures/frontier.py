@@ -10,23 +10,13 @@ def line(extent='mapped', weight='bilinear'):
     return {'free_space/mode': 'line', 'free_space/extent': extent, 'free_space/weight': weight}
 
 
-# Steps from plain lines to the preset `robot`, in tenfold units of evidence.
+# Steps from plain lines to the preset `robot`.
 STEPS = {
-    '+ hits before misses': {'free_space/hits_before_misses': 'true'},
-    '+ free_gain/static 0.1': {'free_gain/static': 0.1},
-    '+ evidence before misses': {'free_space/evidence_before_misses': 'true'},
-    '+ scan_limit 0.2, 0.1': {'scan_limit/hits': 0.2, 'scan_limit/free': 0.1, 'kernel/scale': 100},
-    '+ free_gain/dynamic 16': {'free_gain/dynamic': 16},
-    '+ free_gain/persistence 0.5': {'free_gain/persistence': 0.5},
-    '+ free_gain/living 10000': {'free_gain/living': 10000},
-    '+ scan_limit/void 24': {'scan_limit/void': 24, 'kernel/scale': 20, 'free_gain/static': 0.0005},
-    '+ free_gain/remaining 0.1': {'free_gain/remaining': 0.1},
-    '+ scan_limit/free_threshold 0.6': {'scan_limit/free_threshold': 0.6},
-    '+ free_gain/neighbourhood 1.25': {'free_gain/neighbourhood': 1.25},
-    '+ kernel/static_spread false': {'kernel/static_spread': 'false'},
-    '+ limits and gains of robot': {
-        'kernel/scale': 3, 'scan_limit/free': 0.015, 'scan_limit/free_threshold': 0.09, 'scan_limit/void': 6,
-        'free_gain/dynamic': 3000, 'free_gain/living': 60000, 'free_gain/persistence': 0.4},
+    '+ rules, without voids, time and neighbours': {
+        'rules/enabled': 'true', 'rules/void_outweighs': 0, 'rules/latest': 'false', 'rules/together': 0},
+    '+ rules/void_outweighs 30': {'rules/void_outweighs': 30},
+    '+ rules/together 0.6': {'rules/together': 0.6},
+    '+ rules/latest': {'rules/latest': 'true'},
 }
 
 
@@ -129,10 +119,7 @@ def draw(programs, sequence, name, title, presets, output):
     figures_of = {}
     for file in sorted(os.listdir(presets)):
         preset = file[:-len('.yaml')]
-        words = ['--config', os.path.join(presets, file)]
-        if preset == 'occupancy_only':  # it is for clouds without labels
-            words += ['--classes', 'occupancy']
-        figures_of[preset] = programs.evaluate(sequence, {}, words)
+        figures_of[preset] = programs.evaluate(sequence, {}, ['--config', os.path.join(presets, file)])
         rows.append(row_of('preset ' + preset, figures_of[preset]))
     calibration = draw_calibration(figures_of, name, output)
     draw_frontier(rows, name, title, output)

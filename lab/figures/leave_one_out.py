@@ -12,18 +12,18 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-GAINS = {'persistence': (0.03, 0.04), 'dynamic': (200, 1000, 3000), 'neighbourhood': (1.25, 1.5, 1.75, 2)}  # for robot
+SETTINGS = {'stands_after': (3, 4, 5, 7), 'living_stands_after': (8, 12), 'together': (0.3, 0.6, 0.9)}
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},
              'crowd': {'scene': 'crowd', 'scans': 200}}
 
 
-def judgements(gains=None):
-    """All settings of free_gain, as --judge of evaluate_map takes them."""
-    gains = gains or GAINS
-    return [','.join(f'free_gain/{name}={value:g}' for name, value in zip(gains, values))
-            for values in itertools.product(*gains.values())]
+def judgements(rules=None):
+    """All settings of rules/ to compare, as --judge of evaluate_map takes them."""
+    rules = rules or SETTINGS
+    return [','.join(f'rules/{name}={value:g}' for name, value in zip(rules, values))
+            for values in itertools.product(*rules.values())]
 
 
 def figure_of(figures, least_sa):
@@ -57,15 +57,15 @@ def table(rows):
                      for drive, setting, figures in rows])
 
 
-def measured(programs, sequences, preset, voids, gains=None, more=()):
-    """figures_of, with one pass over each sequence for each value of scan_limit/void, which changes evidence."""
-    judged = [word for gain in gains or judgements() for word in ('--judge', gain)]
+def measured(programs, sequences, preset, voids, rules=None, more=()):
+    """figures_of, with one pass over each sequence for each value of rules/void_outweighs, which changes evidence."""
+    judged = [word for each in rules or judgements() for word in ('--judge', each)]
     figures_of = {}
     for void in voids:
         for name, sequence in sequences.items():
-            figures = programs.evaluate(sequence, {'scan_limit/void': void}, ['--config', preset, *more, *judged])
+            figures = programs.evaluate(sequence, {'rules/void_outweighs': void}, ['--config', preset, *more, *judged])
             for each in figures['judged']:
-                figures_of.setdefault(f'scan_limit/void={void:g},' + each['settings'], {})[name] = each
+                figures_of.setdefault(f'rules/void_outweighs={void:g},' + each['settings'], {})[name] = each
     return figures_of
 
 
@@ -76,20 +76,20 @@ def main():
     parser.add_argument('--scratch', required=True, help='folder for simulated drives')
     parser.add_argument('--preset', default='robot', help='the preset to start from')
     parser.add_argument('--classes', help='class table, as for evaluate_map')
-    parser.add_argument('--gain', action='append', nargs='+', default=[], metavar=('NAME', 'VALUE'),
-                        help='values of free_gain/NAME to compare, instead of those for robot; repeatable')
+    parser.add_argument('--rule', action='append', nargs='+', default=[], metavar=('NAME', 'VALUE'),
+                        help='values of rules/NAME to compare, instead of the usual ones; repeatable')
     parser.add_argument('--least-sa', type=float, default=0.994, help='SA below which a setting is not chosen')
-    parser.add_argument('--void', type=float, nargs='+', default=[0.6], help='values of scan_limit/void to compare')
+    parser.add_argument('--void', type=float, nargs='+', default=[30.0], help='values of rules/void_outweighs to compare')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
     given = parser.parse_args()
     programs = Programs(given.programs, os.path.abspath(given.scratch))
     sequences = {name: programs.simulate(name, **options) for name, options in SIMULATED.items()}
     sequences.update({os.path.basename(os.path.abspath(path)): path for path in given.sequence})
-    gains = {name: [float(value) for value in values] for name, *values in given.gain}
+    rules = {name: [float(value) for value in values] for name, *values in given.rule}
     preset = os.path.join(given.presets, given.preset + '.yaml')
     more = ['--classes', given.classes] if given.classes else []
-    rows, best = left_out(measured(programs, sequences, preset, given.void, judgements(gains), more), given.least_sa)
+    rows, best = left_out(measured(programs, sequences, preset, given.void, judgements(rules), more), given.least_sa)
     print(table(rows) + f'\nchosen on all: {best}')
 
 

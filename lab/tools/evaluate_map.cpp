@@ -65,7 +65,7 @@ po::options_description options() {
       "octomap", po::bool_switch(),
       "also map the same points with OctoMap, with its defaults, and measure that map")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
-      "also give SA and DA of the same map with other free_gain settings; repeatable")(
+      "also give SA and DA of the same map with other values of rules/stands_after, rules/living_stands_after or rules/together; repeatable")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
       "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -247,6 +247,9 @@ struct Judgement {
   MapperConfig config;
 };
 
+/// The parameters that change what the map says and not what is in it.
+constexpr const char* kDecide[] = {"rules/stands_after", "rules/living_stands_after", "rules/together"};
+
 /// @throws std::invalid_argument if settings change more than decisions.
 std::vector<Judgement> judgements(const po::variables_map& given, const MapperConfig& config) {
   std::vector<Judgement> all;
@@ -254,9 +257,10 @@ std::vector<Judgement> judgements(const po::variables_map& given, const MapperCo
   for (const std::string& settings : given["judge"].as<std::vector<std::string>>()) {
     std::istringstream names(settings);
     for (std::string name; std::getline(names, name, ',');) {
-      if (name.rfind("free_gain/", 0) == 0) continue;
-      throw std::invalid_argument("--judge " + settings +
-                                  " changes more than decisions; give it settings of free_gain only");
+      const std::string changed = name.substr(0, name.find('='));
+      if (std::find(std::begin(kDecide), std::end(kDecide), changed) != std::end(kDecide)) continue;
+      throw std::invalid_argument("--judge " + settings + " changes more than decisions; give it " + kDecide[0] +
+                                  ", " + kDecide[1] + " or " + kDecide[2] + " only");
     }
     all.push_back({settings, tools::withSettings(config, "--judge", settings)});
   }

@@ -175,15 +175,15 @@ RuledMap TiledMap::readTiles(const std::vector<GridIndex>& tiles, std::size_t me
 
 RuledMap TiledMap::readTilesAt(const std::vector<Eigen::Vector3d>& points, std::size_t memory_limit) {
   const GridGeometry grid(resolution());
-  const bool asks =
-      storedRules(path(), info()).neighbourhoodRatio() > 0.0f;  // states depend on voxels around
+  const StateRules rules = storedRules(path(), info());
+  const bool asks = rules.neighbourhoodRatio() > 0.0f;  // states depend on voxels around
   std::vector<GridIndex> tiles;
   for (const Eigen::Vector3d& point : points) {
     if (!point.allFinite()) throw std::invalid_argument("a coordinate of a point is not a finite number");
     if (!grid.contains(point)) continue;
     const VoxelIndex voxel = grid.voxelAt(point);
     for (int corner = 0; corner < (asks ? 8 : 1); ++corner) {
-      const int reach = asks ? kNeighbourhoodReach : 0;
+      const int reach = asks ? rules.neighbourhoodReach() : 0;
       const auto at = [&](std::int32_t centre, int bit) {
         return centre + (corner >> bit & 1 ? reach : -reach);
       };

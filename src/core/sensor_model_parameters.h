@@ -20,6 +20,13 @@ inline std::vector<NamedParameter<SensorModelConfig>> sensorModelParameters() {
           "Hits beyond this range do not occupy voxels. Set it to the range that the sensor measures "
           "reliably; with -1, points beyond " +
               numberText(SensorModelConfig::kFarthest) + " m are dropped as faults of the driver."),
+      realParameter(
+          "height", &C::height, NumberRange::atLeast(0.01).upTo(1000.0).orElse(0.0, "found from the ground"),
+          "m", Changes::kWhileMapping,
+          "Height of the sensor above the ground, on which it depends how little a beam that ends on "
+          "the ground clears of the voxels in it. With 0, each scan finds it from its hits of classes with "
+          "the flag ground within 20 m; where there are none, such voxels may become free. Set it if the "
+          "class table flags no ground. Used with rules/enabled."),
   };
 }
 

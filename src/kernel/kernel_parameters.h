@@ -21,14 +21,8 @@ inline std::vector<NamedParameter<KernelConfig>> kernelParameters() {
       realParameter(
           "scale", &C::scale, NumberRange::atLeast(0.001).upTo(1000.0), "", Changes::kAtStart,
           "Value sigma0 of the sparse kernel at distance 0: the evidence that a hit adds at its own "
-          "position. Only its ratio to prior and to scan_limit matters. Keep it far from both ends of the "
-          "range of evidence, 1.5e-5 to 32768."),
-      truthParameter(
-          "static_spread", &C::static_spread, Changes::kWhileMapping,
-          "Let hits of classes that cannot move (those neither dynamic nor unlabelled) add evidence to all "
-          "voxels within kernel/length, as other hits do. Set false to let each add all of its evidence to "
-          "the voxel that contains it, so that floors and walls look no thicker than they are; "
-          "downsample_resolution should then divide resolution without a remainder."),
+          "position. Only its ratio to prior matters. Keep it far from both ends of the range of evidence, "
+          "1.5e-5 to 32768. With rules/enabled it has no effect: scans are counted."),
   };
 }
 

@@ -10,7 +10,8 @@
 #include "core/sensor_model_parameters.h"
 #include "free_space/free_space_parameters.h"
 #include "kernel/kernel_parameters.h"
-#include "rules/free_gain_parameters.h"
+#include "mapping/former_parameters.h"
+#include "rules/rules_parameters.h"
 #include "rules/scan_limit_parameters.h"
 
 namespace bki_mapping {
@@ -23,17 +24,17 @@ std::vector<Parameter> mapperParameters() {
                     "Edge length of a voxel. Smaller voxels show more detail and take more time and memory."),
       realParameter("prior", &C::prior, NumberRange::above(0.0).upTo(kMostEvidence), "", Changes::kAtStart,
                     "Concentration alpha0 that free and each class start with. Raise it to require more "
-                    "evidence before a probability becomes certain."),
+                    "evidence before a probability becomes certain. With rules/enabled it has no effect."),
       realParameter(
           "downsample_resolution", &C::downsample_resolution,
           NumberRange::atLeast(0.001).upTo(1000.0).orElse(0.0), "m", Changes::kAtStart,
           "Edge length of the cells in which hits, or free samples, are merged into one point. Larger "
-          "cells take less time; set 0 to keep every point."),
+          "cells take less time; set 0 to keep every point. With rules/enabled, a voxel holds a whole number "
+          "of cells along each edge, at least two, of about this size; 0 keeps every point."),
   };
   appendParameters(all, "kernel/", &C::kernel, kernelParameters());
   appendParameters(all, "free_space/", &C::free_space, freeSpaceParameters());
-  appendParameters(all, "free_space/", &C::scan_limit, missParameters());
-  appendParameters(all, "free_gain/", &C::free_gain, freeGainParameters());
+  appendParameters(all, "rules/", &C::rules, rulesParameters());
   appendParameters(all, "scan_limit/", &C::scan_limit, scanLimitParameters());
   appendParameters(all, "sensor_model/", &C::sensor_model, sensorModelParameters());
   const std::vector<Parameter> others = {
@@ -69,6 +70,7 @@ std::vector<Parameter> mapperParameters() {
 }
 
 void setParameters(MapperConfig& config, const std::map<std::string, std::string>& values) {
+  refuseFormerParameters(values);
   setNamedParameters(mapperParameters(), config, values);
 }
 
@@ -93,39 +95,39 @@ std::vector<std::string> settingWarnings(const MapperConfig& config) {
                        " m: hits that reach no voxel's centre are lost; leave kernel/length 0, or make "
                        "resolution finer");
   }
-  for (const auto& [name, limit] :
-       {std::pair("hits", config.scan_limit.hits), std::pair("free", config.scan_limit.free),
-        std::pair("void", config.scan_limit.void_space)}) {
-    if (limit == 0.0 || unitsOf(std::min(limit, 1.0)) > 0) continue;
-    warnings.push_back(
-        "scan_limit/" + std::string(name) + " " + numberText(limit) +
-        " is below the smallest evidence, 1.5e-5: the scans add none; raise it, or set 0 for no limit");
-  }
-  if (config.scan_limit.void_space > 0.0 && config.scan_limit.free == 0.0) {
-    warnings.push_back(
-        "scan_limit/void adds nothing without scan_limit/free, which says what counts as seen empty; set "
-        "scan_limit/free, such as 0.1");
-  }
-  if (config.free_gain.latest && config.scan_limit.free == 0.0) {
-    warnings.push_back(
-        "free_gain/latest sees nothing leave without scan_limit/free, which says what counts as seen empty; "
-        "set "
-        "scan_limit/free, such as 0.1");
+  if (config.rules.enabled && config.free_space.mode != "line") {
+    warnings.push_back("rules/enabled needs whole beams to see what has left, but free_space/mode is " +
+                       config.free_space.mode + "; set free_space/mode to line");
   }
   return warnings;
 }
 
 std::vector<std::string> settingWarnings(const MapperConfig& config, const ClassTable& classes) {
   std::vector<std::string> warnings = settingWarnings(config);
-  const FreeGainConfig& gain = config.free_gain;
-  const double moving = std::max(gain.dynamic_classes, gain.ofLiving());
-  if (!classes.saysWhatMoves() && moving > gain.static_classes) {
-    warnings.push_back("class table '" + classes.name() +
-                       "' flags no class as dynamic, so free_gain/static " + numberText(gain.static_classes) +
-                       " applies to all, and what has left stays in the map; take the preset occupancy_only, "
-                       "or flag the classes that can move");
+  const auto& all = classes.classes();
+  const bool has_ground =
+      std::any_of(all.begin(), all.end(), [](const SemanticClass& c) { return c.ground; });
+  if (config.rules.enabled && !has_ground && !(config.sensor_model.height > 0.0)) {
+    warnings.push_back(
+        "class table '" + classes.name() +
+        "' flags no class as ground, so scans do not show the height of the sensor, and voxels "
+        "mostly in the ground may become free; set sensor_model/height");
   }
   return warnings;
+}
+
+MapperConfig applied(const MapperConfig& config) {
+  MapperConfig result = config;
+  if (!config.rules.enabled) return result;
+  result.prior = RulesConfig::kPrior;
+  result.kernel.scale = RulesConfig::kPeak;
+  result.scan_limit = limitsOf(config.rules);
+  result.scan_limit.blocks = config.scan_limit.blocks;
+  if (config.downsample_resolution > 0.0) {
+    const double cells = std::round(config.resolution / config.downsample_resolution);
+    result.downsample_resolution = config.resolution / std::max(cells, 2.0);
+  }
+  return result;
 }
 
 }  // namespace bki_mapping

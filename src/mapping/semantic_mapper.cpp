@@ -17,6 +17,7 @@
 #include "free_space/beam_samples.h"
 #include "free_space/registry.h"
 #include "mapping/scan_preprocessor.h"
+#include "mapping/sensor_height.h"
 #include "points/point_evidence.h"
 #include "rules/scan_rules.h"
 #include "update/map_updater.h"
@@ -105,6 +106,7 @@ ScanRefused refusalOf(const TooMuchWork& work, const MapperConfig& config, std::
 }  // namespace
 
 struct SemanticMapper::Pipeline {
+  MapperConfig config;  ///< applied()
   ScanRules rules;
   ScanPreprocessor preprocessor;
   PointEvidence hits;
@@ -113,24 +115,25 @@ struct SemanticMapper::Pipeline {
   Occlusion occlusion;
   MapUpdater updater;
 
-  Pipeline(const MapperConfig& config, const GridGeometry& geometry, const ClassTable& classes)
-      : rules(config.scan_limit, classes),
+  Pipeline(const MapperConfig& asked, const GridGeometry& geometry, const ClassTable& classes)
+      : config(applied(asked)),
+        rules(config.scan_limit, classes),
         preprocessor(config),
-        hits(geometry, config.kernel, config.scan_limit.hits_before_misses || config.free_gain.latest,
-             config.kernel.static_spread ? ClassSet() : rules.fixed),
+        hits(geometry, config.kernel, config.scan_limit.hits_before_misses,
+             config.scan_limit.static_spread ? ClassSet() : rules.fixed),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
         occlusion(config.occlusion) {
-    rules.keeps_looks = config.free_gain.latest;
+    rules.keeps_looks = config.rules.enabled && config.rules.latest;
   }
 };
 
 SemanticMapper::SemanticMapper(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
     : config_(checked(config, *classes)),
       classes_(std::move(classes)),
-      map_(GridGeometry(config_.resolution), config_.prior, classes_->size()),
-      state_rules_(config_.free_gain, *classes_),
+      map_(GridGeometry(config_.resolution), applied(config_).prior, classes_->size()),
+      state_rules_(config_.rules, *classes_, config_.resolution),
       pool_(std::make_unique<ThreadPool>(config_.threads)),
       pipeline_(std::make_unique<Pipeline>(config_, map_.geometry(), *classes_)) {}
 
@@ -141,7 +144,7 @@ void SemanticMapper::reconfigure(const MapperConfig& config) {
   checkChanges(config_, allowed);
   pipeline_ = std::make_unique<Pipeline>(allowed, map_.geometry(), *classes_);
   config_ = allowed;
-  state_rules_ = StateRules(config_.free_gain, *classes_);
+  state_rules_ = StateRules(config_.rules, *classes_, config_.resolution);
 }
 
 void SemanticMapper::reset() {
@@ -251,6 +254,14 @@ ScanStats SemanticMapper::addOrWithdraw(const ScanView& scan, bool withdraws) {
   }
 }
 
+double SemanticMapper::thresholdFor(const ScanView& scan, const Pipeline& p) const {
+  if (!p.config.rules.enabled) return p.config.scan_limit.free_threshold;
+  double height = scan.sensor_model.value_or(p.config.sensor_model).height;
+  if (!(height > 0.0)) height = heightAboveGround(p.preprocessor.hitGroups(), *classes_);
+  if (!(height > 0.0)) return 0.0;
+  return groundThreshold(p.config.kernel.scale, p.config.kernel.lengthFor(p.config.resolution), height);
+}
+
 /// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or subtracts
 /// it.
 ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
@@ -280,6 +291,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
     evidence.occlusion = &p.occlusion;
   }
+  p.rules.free_threshold = static_cast<float>(thresholdFor(scan, p));
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 

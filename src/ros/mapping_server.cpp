@@ -110,7 +110,7 @@ void MappingServer::subscribe() {
         mapper_->classes().size() > 1) {
       ROS_WARN(
           "Clouds of %s are taken without labels (label_field is empty), so all points get label 0 of class "
-          "table '%s'; set classes to occupancy, and take the preset occupancy_only",
+          "table '%s'; set classes to occupancy",
           cloud_subscribers_.back().getTopic().c_str(), mapper_->classes().name().c_str());
     }
   }

@@ -8,6 +8,7 @@
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
+#include "mapping/former_parameters.h"
 #include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {
@@ -234,6 +235,7 @@ std::vector<InputConfig> allInputs(const ServerConfig& server, const MapperConfi
 
 void setParameters(const std::map<std::string, std::string>& values, ServerConfig& server,
                    MapperConfig& mapper) {
+  refuseFormerParameters(values);
   std::vector<NamedParameter<Both>> parameters;
   appendParameters(parameters, "", &Both::server, serverParameters());
   appendParameters(parameters, "", &Both::server, inputParametersOfServer());

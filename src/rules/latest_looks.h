@@ -28,8 +28,8 @@ enum class Stay : std::uint8_t {
   kSome,
   kLong,  ///< in about a hundred scans or more
 };
-/// @param best evidence of the likeliest class. @param most_vote StateRules::mostVote, with the preset
-/// `robot` what about 16 scans add.
+/// @param best evidence of the likeliest class. @param most_vote StateRules::mostVote, the hits of
+/// StateRules::kMostVotes scans.
 constexpr Stay stayOf(EvidenceUnits best, EvidenceUnits most_vote) {
   if (best >= 6 * most_vote) return Stay::kLong;
   return 2 * std::int64_t{best} >= most_vote ? Stay::kSome : Stay::kPassing;

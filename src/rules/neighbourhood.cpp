@@ -2,68 +2,97 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 #include "bki_mapping/core/grid_table.h"
 
 namespace bki_mapping {
 namespace {
 
-constexpr int kReach = kNeighbourhoodReach, kWindow = 2 * kReach + 1, kEdge = kBlockEdge + 2 * kReach;
+/// Votes of a block with its surroundings, as far as the reach of a neighbourhood.
+class Votes {
+ public:
+  explicit Votes(int reach) : reach_(reach), edge_(kBlockEdge + 2 * reach) {
+    std::fill_n(votes_.begin(), edge_ * edge_ * edge_, 0);
+  }
+  int edge() const { return edge_; }
+  /// The row along x of the voxel (0, y, z), counted from the corner of the surroundings.
+  std::int32_t* row(int y, int z) { return votes_.data() + edge_ * (y + edge_ * z); }
+  const std::int32_t* row(int y, int z) const { return votes_.data() + edge_ * (y + edge_ * z); }
 
-/// A block with its surroundings.
-using Votes = std::array<std::array<std::array<std::int32_t, kEdge>, kEdge>, kEdge>;
+  /// Copies what reaches into the surroundings of the votes of the block that lies (x, y, z) blocks beside
+  /// the one in the middle.
+  void copy(const std::array<EvidenceUnits, kBlockVoxels>& from, int x, int y, int z) {
+    const Part along_x(x, reach_), along_y(y, reach_), along_z(z, reach_);
+    for (int k = 0; k < along_z.count; ++k) {
+      for (int j = 0; j < along_y.count; ++j) {
+        const int voxel = along_x.from + kBlockEdge * (along_y.from + j + kBlockEdge * (along_z.from + k));
+        std::copy_n(from.data() + voxel, along_x.count, row(along_y.to + j, along_z.to + k) + along_x.to);
+      }
+    }
+  }
+  /// The layers along z of a block that lies z blocks beside the one in the middle which copy() takes.
+  Block::Layers layersOf(int z) const {
+    const Part part(z, reach_);
+    return {part.from, part.from + part.count};
+  }
 
-/// The part of an axis that a block covers which lies `step` beside the one in the middle.
-struct Part {
-  explicit Part(int step)
-      : to(step < 0   ? 0
-           : step > 0 ? kReach + kBlockEdge
-                      : kReach),
-        from(step < 0 ? kBlockEdge - kReach : 0),
-        count(step == 0 ? kBlockEdge : kReach) {}
-  int to, from, count;  ///< in Votes, in the block
+ private:
+  /// The part of an axis that a block covers which lies `step` beside the one in the middle.
+  struct Part {
+    Part(int step, int reach)
+        : to(step < 0   ? 0
+             : step > 0 ? reach + kBlockEdge
+                        : reach),
+          from(step < 0 ? kBlockEdge - reach : 0),
+          count(step == 0 ? kBlockEdge : reach) {}
+    int to, from, count;  ///< in the surroundings, in the block
+  };
+  static constexpr int kMostEdge = kBlockEdge + 2 * StateRules::kMostReach;
+
+  int reach_, edge_;
+  std::array<std::int32_t, static_cast<std::size_t>(kMostEdge* kMostEdge* kMostEdge)> votes_;
 };
 
-void copyPart(const std::array<EvidenceUnits, kBlockVoxels>& from, const Part& x, const Part& y,
-              const Part& z, Votes& to) {
-  const auto at = [](int n) { return static_cast<std::size_t>(n); };
-  for (int k = 0; k < z.count; ++k) {
-    for (int j = 0; j < y.count; ++j) {
-      const int voxel = x.from + kBlockEdge * (y.from + j + kBlockEdge * (z.from + k));
-      std::copy_n(from.data() + voxel, x.count, to[at(z.to + k)][at(y.to + j)].data() + x.to);
-    }
+/// Sums over a window that slides along rows of values. @param values of `kInner` windows of `window` rows
+/// each, `stride` apart, the first at `values`. @param count length of a row. @param[out] sums rows of
+/// `count`, one after another.
+void slideWindow(const std::int32_t* values, int stride, int window, int count, std::int32_t* sums) {
+  std::copy_n(values, count, sums);
+  for (int n = 1; n < window; ++n) {
+    for (int v = 0; v < count; ++v) sums[v] += values[n * stride + v];
+  }
+  for (int row = 1; row < kBlockEdge; ++row) {
+    const std::int32_t* const leaves = values + (row - 1) * stride;
+    const std::int32_t* const enters = leaves + window * stride;
+    for (int v = 0; v < count; ++v)
+      sums[row * count + v] = sums[(row - 1) * count + v] + enters[v] - leaves[v];
   }
 }
 
-/// Sums over the window of each voxel of the block, one axis after the other. @param first_layer of the
-/// window, along z.
-void sumWindows(const Votes& votes, std::size_t first_layer, std::array<EvidenceUnits, kBlockVoxels>& sums) {
-  static_assert(std::int64_t{StateRules::kMostVote} * kWindow * kWindow * kWindow <= kMostUnits,
+/// Sums over the window of each voxel of the block, one axis after the other. @param has_below whether
+/// windows include the layers below a voxel.
+void sumWindows(const Votes& votes, int reach, bool has_below,
+                std::array<EvidenceUnits, kBlockVoxels>& sums) {
+  constexpr int kMostWindow = 2 * StateRules::kMostReach + 1,
+                kMostEdge = kBlockEdge + 2 * StateRules::kMostReach;
+  static_assert(std::int64_t{StateRules::kMostVote} * kMostWindow * kMostWindow * kMostWindow <= kMostUnits,
                 "sums do not overflow");
-  static_assert(kWindow == 5, "as many terms");
-  constexpr std::size_t kInner = kBlockEdge, kRows = kEdge;
-  std::array<std::array<std::array<std::int32_t, kInner>, kRows>, kRows> along_x;
-  std::array<std::array<std::array<std::int32_t, kInner>, kInner>, kRows> along_y{};
-  for (std::size_t z = 0; z < kRows; ++z) {
-    for (std::size_t y = 0; y < kRows; ++y) {
-      for (std::size_t x = 0; x < kInner; ++x) {
-        const std::int32_t* const row = votes[z][y].data() + x;
-        along_x[z][y][x] = row[0] + row[1] + row[2] + row[3] + row[4];
-      }
-    }
-    for (std::size_t y = 0; y < kInner; ++y) {
-      for (std::size_t n = 0; n < kWindow; ++n) {
-        for (std::size_t x = 0; x < kInner; ++x) along_y[z][y][x] += along_x[z][y + n][x];
-      }
+  const int edge = votes.edge(), window = 2 * reach + 1;
+  std::array<std::int32_t, static_cast<std::size_t>(kBlockEdge * kBlockEdge * kMostEdge)> layers;
+  std::array<std::int32_t, static_cast<std::size_t>(kBlockEdge * kMostEdge)> rows;
+  for (int z = 0; z < edge; ++z) {
+    slideWindow(votes.row(0, z), edge, window, edge, rows.data());  // along y
+    for (int y = 0; y < kBlockEdge; ++y) {
+      const std::int32_t* const row = rows.data() + edge * y;
+      std::int32_t* const sum = layers.data() + kBlockEdge * (y + kBlockEdge * z);
+      sum[0] = std::accumulate(row, row + window, 0);
+      for (int x = 1; x < kBlockEdge; ++x) sum[x] = sum[x - 1] + row[x + window - 1] - row[x - 1];
     }
   }
-  sums.fill(0);
-  for (std::size_t z = 0; z < kInner; ++z) {
-    for (std::size_t n = first_layer; n < kWindow; ++n) {
-      const std::int32_t* const layer = along_y[z + n][0].data();
-      for (std::size_t v = 0; v < kInner * kInner; ++v) sums[kInner * kInner * z + v] += layer[v];
-    }
-  }
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  const int skipped = has_below ? 0 : reach;
+  slideWindow(layers.data() + skipped * kLayer, kLayer, window - skipped, kLayer, sums.data());
 }
 
 }  // namespace
@@ -79,32 +108,30 @@ bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const Sta
   if (!mayAskNeighbourhood(rules, block)) return false;
   BlockVotes own;
   if (!kernels.votes(planesOf(map, rules, block), {}, own)) return false;
-  Votes kept{}, cleared{}, keeping{};
+  const int reach = rules.neighbourhoodReach();
+  Votes kept(reach), cleared(reach), keeping(reach);
   BlockVotes beside;
   for (int z = rules.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
-    const Part layers(z);
     for (int y = -1; y <= 1; ++y) {
       for (int x = -1; x <= 1; ++x) {
         const BlockVotes* votes = &own;
         if (x != 0 || y != 0 || z != 0) {
           const Block* const neighbour = map.find({{index.x + x, index.y + y, index.z + z}});
           if (!neighbour || !mayAskNeighbourhood(rules, *neighbour) ||
-              !kernels.votes(planesOf(map, rules, *neighbour), {layers.from, layers.from + layers.count},
-                             beside))
+              !kernels.votes(planesOf(map, rules, *neighbour), kept.layersOf(z), beside))
             continue;
           votes = &beside;
         }
-        copyPart(votes->kept, Part(x), Part(y), layers, kept);
-        copyPart(votes->cleared, Part(x), Part(y), layers, cleared);
-        copyPart(votes->is_kept, Part(x), Part(y), layers, keeping);
+        kept.copy(votes->kept, x, y, z);
+        cleared.copy(votes->cleared, x, y, z);
+        keeping.copy(votes->is_kept, x, y, z);
       }
     }
   }
   std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums, keeping_sums;
-  const std::size_t first_layer = rules.neighbourhoodIsBelow() ? 0 : kReach;
-  sumWindows(kept, first_layer, kept_sums);
-  sumWindows(cleared, first_layer, cleared_sums);
-  sumWindows(keeping, first_layer, keeping_sums);
+  sumWindows(kept, reach, rules.neighbourhoodIsBelow(), kept_sums);
+  sumWindows(cleared, reach, rules.neighbourhoodIsBelow(), cleared_sums);
+  sumWindows(keeping, reach, rules.neighbourhoodIsBelow(), keeping_sums);
   for (std::size_t v = 0; v < overruled.size(); ++v) {
     const VoteSums sums{kept_sums[v], cleared_sums[v], keeping_sums[v]};
     overruled[v] = kNotOverruled;

@@ -10,10 +10,6 @@
 
 namespace bki_mapping {
 
-/// The voxels that are asked: those of a cube about the voxel, this far from it along each axis; without
-/// StateRules::neighbourhoodIsBelow, none of the layers below it.
-constexpr int kNeighbourhoodReach = 2;
-
 /// Sums of votes around a voxel.
 struct VoteSums {
   std::int64_t kept = 0, cleared = 0;

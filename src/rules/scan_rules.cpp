@@ -63,6 +63,22 @@ void holdBack(const ScanRules& rules, const LimitKernels& kernels, const float* 
 
 }  // namespace
 
+double groundThreshold(double peak, double length, double height) {
+  // The maximum of y k(y) over the height y above the ground: beams have the weight y / height there.
+  constexpr double kMost = 0.166;
+  return kMost * peak * length / height;
+}
+
+ScanLimitConfig limitsOf(const RulesConfig& rules) {
+  ScanLimitConfig limits;
+  limits.hits_before_misses = limits.evidence_before_misses = true;
+  limits.static_spread = false;
+  limits.hits = rules.hit();
+  limits.free = RulesConfig::kCrossing;
+  limits.void_space = rules.emptiness();
+  return limits;
+}
+
 ScanRules::ScanRules(const ScanLimitConfig& config, const ClassTable& classes)
     : hits_before_misses(config.hits_before_misses),
       evidence_before_misses(config.evidence_before_misses),

@@ -1,5 +1,7 @@
 #include "bki_mapping/rules/state_rules.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "rules/class_sets.h"
@@ -13,37 +15,67 @@ float finite(double gain) {
   return static_cast<float>(std::min(gain, kMost));
 }
 
-/// The gain of a class that sets none itself.
-double gainOf(const SemanticClass& c, const FreeGainConfig& config) {
-  if (c.unlabelled) return 1.0;
-  if (!c.dynamic) return config.static_classes;
-  return c.living ? config.ofLiving() : config.dynamic_classes;
+/// Gain of what passes: a thousandth of a scan's free space outweighs several hits.
+constexpr double kGainOfPassing = 3000.0;
+/// Classes that cannot move keep their voxels, however many beams graze them; only looks clear them (12c).
+constexpr double kGainOfFixed = 0.0;
+/// A fixed class remains where it was hit in one scan of about a hundred (12a).
+constexpr double kRemaining = 0.1;
+/// Of kept to cleared evidence (12b).
+constexpr double kNeighbourhoodRatio = 1.0;
+/// The same, and the gain of what passes, and the scans after which things stand, where no class says what
+/// can move: most things stand, so a scan must cross a voxel cleanly to outweigh a hit.
+constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAfter = 2.0;
+
+/// Evidence from which on a thing stands that does so after this many scans with hits in a voxel of 0.3 m.
+/// What passes stays in a voxel for its own depth and the voxel's edge. Half a hit may be missing.
+double evidenceToStand(double scans, const RulesConfig& config, double resolution) {
+  constexpr double kDepth = 0.2, kUsual = 0.3;  // [m]
+  const double here = scans * (resolution + kDepth) / (kUsual + kDepth);
+  return std::max(here - 0.5, 0.0) * config.hit();
 }
 
 }  // namespace
 
-StateRules::StateRules(const FreeGainConfig& config, const ClassTable& classes)
-    : StateRules(StateRules()
-                     .withPersistence(config.persistence)
-                     .withRemaining(config.remaining, fixedClasses(classes))
-                     // Where floors ask, too, they would keep whatever moves on them: the layers below are
-                     // left out.
-                     .withNeighbourhood(config.neighbourhood, askingClasses(classes), classes.saysWhatMoves())
-                     .withLatest(config.latest)) {
+StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, double resolution)
+    : StateRules() {
+  if (!config.enabled) return;
+  const bool says_what_moves = classes.saysWhatMoves();
+  const int reach =
+      static_cast<int>(std::lround(std::clamp(config.together / resolution, 1.0, 1.0 * kMostReach)));
+  const double ratio = !(config.together > 0.0) ? 0.0
+                       : says_what_moves        ? kNeighbourhoodRatio
+                                                : kRatioOfUnknown;
+  *this = withHitOfScan(config.hit())
+              .withRemaining(kRemaining, fixedClasses(classes))
+              // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
+              .withNeighbourhood(ratio, askingClasses(classes), says_what_moves, reach)
+              .withLatest(config.latest);
   for (const SemanticClass& c : classes.classes()) {
-    free_gains_[c.id] = finite(c.free_gain.value_or(gainOf(c, config)));
+    if (c.free_gain) {
+      *this = withFreeGain(c.id, *c.free_gain);
+    } else if (c.dynamic || (!says_what_moves && !c.unlabelled)) {
+      const double scans = !says_what_moves ? std::min(kUnknownStandsAfter, config.stands_after)
+                           : c.living       ? config.living_stands_after
+                                            : config.stands_after;
+      *this = withFreeGain(c.id, says_what_moves ? kGainOfPassing : kGainOfUnknown,
+                           evidenceToStand(scans, config, resolution));
+    } else if (!c.unlabelled) {
+      *this = withFreeGain(c.id, kGainOfFixed);
+    }
   }
 }
 
-StateRules StateRules::withFreeGain(ClassId id, double gain) const {
+StateRules StateRules::withFreeGain(ClassId id, double gain, double stands_after) const {
   StateRules rules = *this;
   rules.free_gains_[id] = finite(gain);
+  rules.stands_after_[id] = static_cast<float>(stands_after);
   return rules;
 }
 
-StateRules StateRules::withPersistence(double persistence) const {
+StateRules StateRules::withHitOfScan(double evidence) const {
   StateRules rules = *this;
-  rules.persistence_ = static_cast<float>(persistence);
+  rules.hit_of_scan_ = static_cast<float>(evidence);
   return rules;
 }
 
@@ -55,11 +87,13 @@ StateRules StateRules::withRemaining(double gain, const ClassSet& fixed) const {
   return rules;
 }
 
-StateRules StateRules::withNeighbourhood(double ratio, const ClassSet& asking, bool is_below) const {
+StateRules StateRules::withNeighbourhood(double ratio, const ClassSet& asking, bool is_below,
+                                         int reach) const {
   StateRules rules = *this;
   rules.neighbourhood_ratio_ = finite(ratio);
   rules.asking_ = asking;
   rules.neighbourhood_is_below_ = is_below;
+  rules.neighbourhood_reach_ = reach;
   return rules;
 }
 
@@ -70,9 +104,11 @@ StateRules StateRules::withLatest(bool decides) const {
 }
 
 bool StateRules::decidesAs(const StateRules& other) const {
-  return free_gains_ == other.free_gains_ && persistence_ == other.persistence_ &&
+  return free_gains_ == other.free_gains_ && stands_after_ == other.stands_after_ &&
+         hit_of_scan_ == other.hit_of_scan_ &&
          (neighbourhood_ratio_ == 0.0f ||
-          (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_)) &&
+          (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_ &&
+           neighbourhood_reach_ == other.neighbourhood_reach_)) &&
          latest_decides_ == other.latest_decides_ && neighbourhood_ratio_ == other.neighbourhood_ratio_ &&
          remaining_gain_ == other.remaining_gain_ && (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
 }

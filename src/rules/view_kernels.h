@@ -19,10 +19,10 @@ struct BlockPlanes {
   struct Plane {
     const EvidenceUnits* units;
     ClassId id;
-    float gain;   ///< on the evidence for `free` in voxels whose likeliest class this is, before it decays
-    bool decays;  ///< whether the gain depends on the evidence for the class
-    bool fixed;   ///< whether the class cannot move, and so may remain by (12a)
-    bool asks;    ///< whether voxels whose likeliest class this is ask their neighbourhood (12b)
+    float gain;          ///< StateRules::freeGain of a voxel without hits
+    float stands_after;  ///< StateRules::standsAfter
+    bool fixed;          ///< whether the class cannot move, and so may remain by (12a)
+    bool asks;           ///< whether voxels whose likeliest class this is ask their neighbourhood (12b)
   };
 
   const SemanticMap* map;
@@ -77,7 +77,5 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRu
 bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free);
 /// log2 of the share that (12a) asks of what remains: a quarter of the evidence of what has left.
 constexpr int kRemainingShift = 2;
-/// StateRules::freeGain, compiled for any processor.
-float decayedGain(const StateRules& rules, ClassId id, float hits);
 
 }  // namespace bki_mapping

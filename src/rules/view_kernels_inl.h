@@ -2,6 +2,8 @@
 /// the same for one voxel, in double precision.
 #pragma once
 
+#include <algorithm>
+
 #include "rules/occupancy_constants.h"
 #include "rules/vec_log_inl.h"
 #include "rules/view_kernels.h"
@@ -50,14 +52,13 @@ struct Likeliest {
   IntVec best;    ///< evidence of the class with the most [units]
   IntVec label;   ///< that class; kFreeClass if no class has evidence
   FloatVec gain;  ///< of that class
-  Mask decays;    ///< whether the gain depends on `best`
   ExactSum classes;
   CompensatedSum squares;  ///< of the evidence of the classes
 };
 
 template <bool kPosterior>
 [[gnu::always_inline]] inline Likeliest findLikeliest(const BlockPlanes& planes, int v) {
-  Likeliest found = {{}, Set(kFreeClass), Set(1.0f), {}, {{}, {}}, {{}, {}}};
+  Likeliest found = {{}, Set(kFreeClass), Set(1.0f), {{}, {}}, {{}, {}}};
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
     const IntVec units = Max(LoadU(plane.units + v), IntVec{});
@@ -65,8 +66,6 @@ template <bool kPosterior>
     found.best = Max(units, found.best);
     found.label = IfThenElse(more, Set(plane.id), found.label);
     if constexpr (!kPosterior) continue;
-    found.gain = IfThenElse(more, Set(plane.gain), found.gain);
-    found.decays = IfThenElse(more, Set(-static_cast<int>(plane.decays)), found.decays);
     found.classes.add(units);
     const FloatVec evidence = evidenceOf(units);
     found.squares.add(evidence * evidence);
@@ -74,29 +73,15 @@ template <bool kPosterior>
   return found;
 }
 
-/// Finds the gains of the likeliest classes.
+/// Finds the gains of the likeliest classes: StateRules::freeGain.
 [[gnu::always_inline]] inline void findGains(const BlockPlanes& planes, Likeliest& found) {
+  const FloatVec hits = evidenceOf(found.best);
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
-    const Mask is_likeliest = found.label == plane.id;
-    found.gain = IfThenElse(is_likeliest, Set(plane.gain), found.gain);
-    found.decays = IfThenElse(is_likeliest, Set(-static_cast<int>(plane.decays)), found.decays);
+    const Mask stands = hits >= plane.stands_after;
+    const FloatVec gain = IfThenElse(stands, Set(std::min(plane.gain, 1.0f)), Set(plane.gain));
+    found.gain = IfThenElse(found.label == plane.id, gain, found.gain);
   }
-}
-
-/// Lets gains decay where a voxel has evidence for `free`; elsewhere they make no difference. Lane by lane:
-/// few voxels are of a class whose gain decays, and states must not depend on the instruction set.
-[[gnu::always_inline]] inline void decay(const BlockPlanes& planes, IntVec free, Likeliest& found) {
-  const Mask decays = found.decays & (free > 0);
-  if (!AnyTrue(decays)) return;
-  const FloatVec hits = evidenceOf(found.best);
-  float gain[kLanes];  // an element of a vector by a variable index would keep the vector in memory
-  StoreU(found.gain, gain);
-  for (int lane = 0; lane < kLanes; ++lane) {
-    if (decays[lane])
-      gain[lane] = decayedGain(*planes.rules, static_cast<ClassId>(found.label[lane]), hits[lane]);
-  }
-  found.gain = LoadU(gain);
 }
 
 /// Equation 11, as isOccupied decides it.
@@ -122,7 +107,7 @@ template <bool kPosterior>
   const float gain = planes.rules->remainingGain();
   const Mask left = ~is_occupied & (found.best > 0);
   if (!(gain > 0.0f) || !AnyTrue(left)) return is_occupied;
-  Likeliest fixed = {{}, Set(kFreeClass), Set(gain), {}, {{}, {}}, {{}, {}}};
+  Likeliest fixed = {{}, Set(kFreeClass), Set(gain), {{}, {}}, {{}, {}}};
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
     if (!plane.fixed) continue;
@@ -268,8 +253,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     // Elsewhere the gain makes no difference to the state.
     const Mask disputed = (is_occupied & (free > 0)) | (overruling != 0);
     if (kPosterior || AnyTrue(disputed)) {
-      if constexpr (!kPosterior) findGains(planes, found);
-      decay(planes, free, found);
+      findGains(planes, found);
       is_occupied &= occupied(found, free);
       restored = (overruling == kKept) & (found.best > 0) & ~is_occupied;
       cleared = (overruling == kCleared) & is_occupied;
@@ -305,7 +289,7 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
     }
     const IntVec vote = Min(found.best, Set(planes.most_vote)) & asks;
     any |= vote;
-    decay(planes, free, found);
+    findGains(planes, found);
     const Mask is_kept = occupied(found, free);
     StoreU(vote & is_kept, votes.kept.data() + v);
     constexpr EvidenceUnits kMostHits = kMostUnits / kFreeOfOneHit;  // more outweigh all

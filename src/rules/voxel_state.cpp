@@ -57,22 +57,24 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
 
 /// Equation 12b: what the voxels around say of one that asks them.
 VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel) {
-  constexpr int kAround = kNeighbourhoodReach;
-  static_assert(2 * kAround < kBlockEdge, "they are in at most two blocks along each axis");
-  const BlockIndex first = GridGeometry::blockOf({{voxel.x - kAround, voxel.y - kAround, voxel.z - kAround}});
-  std::array<const Block*, 8> blocks;
-  for (int n = 0; n < 8; ++n) {
+  const int reach = rules.neighbourhoodReach();
+  const BlockIndex first = GridGeometry::blockOf({{voxel.x - reach, voxel.y - reach, voxel.z - reach}});
+  static_assert(2 * StateRules::kMostReach < 2 * kBlockEdge,
+                "they are in at most three blocks along each axis");
+  constexpr int kAlong = 3;
+  std::array<const Block*, kAlong * kAlong * kAlong> blocks;
+  for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
     blocks[static_cast<std::size_t>(n)] =
-        map.find({{first.x + (n & 1), first.y + (n >> 1 & 1), first.z + (n >> 2)}});
+        map.find({{first.x + n % kAlong, first.y + n / kAlong % kAlong, first.z + n / (kAlong * kAlong)}});
   }
   VoteSums sums;
   const EvidenceUnits most = rules.mostVote();
-  for (int z = rules.neighbourhoodIsBelow() ? -kAround : 0; z <= kAround; ++z) {
-    for (int y = -kAround; y <= kAround; ++y) {
-      for (int x = -kAround; x <= kAround; ++x) {
+  for (int z = rules.neighbourhoodIsBelow() ? -reach : 0; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
         const BlockIndex index = GridGeometry::blockOf(at);
-        const int n = index.x - first.x + 2 * (index.y - first.y) + 4 * (index.z - first.z);
+        const int n = index.x - first.x + kAlong * (index.y - first.y + kAlong * (index.z - first.z));
         const Block* const block = blocks[static_cast<std::size_t>(n)];
         if (!block) continue;
         const OwnEvidence own = ownEvidence(rules, *block, GridGeometry::offsetInBlock(at));
@@ -112,10 +114,6 @@ bool isOccupied(EvidenceUnits best, float gain, EvidenceUnits free) {
   return best >= static_cast<double>(gain) * free;
 }
 
-float decayedGain(const StateRules& rules, ClassId id, float hits) {
-  return rules.freeGain(id, hits);
-}
-
 BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Block& block) {
   BlockPlanes planes;
   planes.map = &map;
@@ -129,10 +127,9 @@ BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Bloc
       planes.has_free = true;
       continue;
     }
-    const float gain = rules.freeGain(id, 0.0f);
-    const bool decays = gain > 1.0f && rules.freeGain(id, std::numeric_limits<float>::infinity()) != gain;
+    const float gain = rules.freeGain(id, -1.0f);
     planes.planes[planes.count++] = {
-        block.plane(p), id, gain, decays, rules.isFixed(id), rules.asksNeighbourhood(id)};
+        block.plane(p), id, gain, rules.standsAfter(id), rules.isFixed(id), rules.asksNeighbourhood(id)};
   }
   return planes;
 }

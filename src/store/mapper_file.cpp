@@ -9,6 +9,16 @@
 #include "core/frame_name.h"
 
 namespace bki_mapping {
+namespace {
+
+/// Whether the parameters are those of a map made before there was rules/enabled, with a preset that counted
+/// scans: hits of one added 0.02, as much as RulesConfig's but for 3 %.
+bool countedScansBefore(const std::map<std::string, std::string>& values) {
+  const auto hits = values.find("scan_limit/hits");
+  return hits != values.end() && hits->second == "0.02";
+}
+
+}  // namespace
 
 bool isMapFileName(const std::string& path) {
   return std::filesystem::path(path).extension() == ".bkm";
@@ -34,16 +44,15 @@ StateRules storedRules(const std::string& path, const MapInfo& info) {
   MapperConfig config;
   try {
     const std::map<std::string, std::string> values = parseParameters(info.parameters);
-    std::map<std::string, std::string> gains;
+    std::map<std::string, std::string> rules;
     for (const Parameter& parameter : mapperParameters()) {
       const auto found = values.find(parameter.name);
-      if (found != values.end() && parameter.name.rfind("free_gain/", 0) == 0) gains.insert(*found);
+      if (found != values.end() && parameter.name.rfind("rules/", 0) == 0) rules.insert(*found);
     }
-    setParameters(config, gains);
-    config.resolution = info.resolution;
-    config.prior = info.prior;
+    setParameters(config, rules);
     checkParameters(config);
-    return StateRules(config.free_gain, *info.classes);
+    if (countedScansBefore(values)) config.rules.enabled = true;
+    return StateRules(config.rules, *info.classes, info.resolution);
   } catch (const std::invalid_argument& error) {
     throw MapFileError("the parameters in " + path + " cannot be used: " + error.what());
   }

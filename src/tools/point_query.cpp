@@ -74,7 +74,7 @@ void PointQuery::findNearest(double most, const ClassFilter& classes) {
       Eigen::AlignedBox3d box;
       for (const std::size_t n : waiting) box.extend(points_[n]);
       const Eigen::Vector3d margin =
-          Eigen::Vector3d::Constant(reach + (1.0 + kNeighbourhoodReach) * grid_.resolution());
+          Eigen::Vector3d::Constant(reach + (1.0 + StateRules::kMostReach) * grid_.resolution());
       const RuledMap stored = map_.readBox({box.min() - margin, box.max() + margin}, limit_);
       const StateMap states(stored.map, stored.rules);
       std::vector<std::size_t> left;

@@ -96,7 +96,7 @@ class City(unittest.TestCase):
 
 
 class DecidedByNeighbours(City):
-    """With free_gain/neighbourhood, a voxel's state depends on voxels of other tiles."""
+    """With rules/together, a voxel's state depends on voxels of other tiles."""
     EDGE = 0.3  # of a voxel [m]
     SETTINGS = ('--config', os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets', 'robot.yaml'))
 

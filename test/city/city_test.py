@@ -469,7 +469,7 @@ class Made(MadeCity):
         before = work.identity_of(prefix / 'bin', settings)
         self.assertEqual(work.identity_of(prefix / 'bin', settings), before)
         seen = {before}
-        for name, old, new in (('presets/robot.yaml', 'prior: ', '# prior: '),
+        for name, old, new in (('presets/robot.yaml', 'rules: ', '# rules: '),
                                ('classes/semantic_kitti.yaml', 'car', 'vehicle')):
             path = prefix / 'share/bki_mapping/config' / name
             self.assertIn(old, path.read_text())

@@ -194,7 +194,7 @@ TEST(TilesAtPoints, ComeWithTheirNeighbourhood) {
   info.classes = std::make_shared<ClassTable>("a table", classes);
   const Eigen::Vector3d point(63.5 * info.resolution, 0.5 * info.resolution, 0.5 * info.resolution);
   for (const bool asks : {true, false}) {
-    info.parameters = asks ? "free_gain: {dynamic: 50, neighbourhood: 1.5}\n" : "free_gain: {dynamic: 50}\n";
+    info.parameters = asks ? "rules: {enabled: true}\n" : "rules: {enabled: true, together: 0}\n";
     SemanticMap map = info.emptyMap();
     for (int x = 63; x < 66; ++x) {
       const VoxelIndex voxel{{x, 0, 0}};

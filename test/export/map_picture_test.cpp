@@ -22,8 +22,7 @@ MapInfo infoWithGains() {
   classes[1].living = false;  // so that its voxels ask their neighbourhood
   info.classes = std::make_shared<ClassTable>("a table", classes);
   info.parameters =
-      "resolution: 7\nunknown: 1\nfree_gain:\n  static: 0.01\n  dynamic: 50\n  persistence: 3\n  "
-      "neighbourhood: 1.5\n";
+      "resolution: 7\nunknown: 1\nrules:\n  enabled: true\n  stands_after: 3\n  together: 0.9\n";
   return info;
 }
 
@@ -59,12 +58,12 @@ SemanticMap markedMap(unsigned seed, int blocks, int extent) {
 
 /// The rules of infoWithGains().
 StateRules rulesWithGains() {
-  return StateRules()
-      .withPersistence(3.0)
-      .withNeighbourhood(1.5, ClassSet().set(40))
-      .withFreeGain(0, 1.0)   // unlabelled
-      .withFreeGain(40, 2.5)  // by its own gain
-      .withFreeGain(80, 0.01);
+  RulesConfig rules;
+  rules.enabled = true;
+  rules.stands_after = 3.0;
+  rules.together = 0.9;
+  const MapInfo info = infoWithGains();
+  return {rules, *info.classes, info.resolution};
 }
 
 /// Compares the counts with a look at each voxel.
@@ -334,12 +333,22 @@ TEST(MapPicture, WritesPng) {
   EXPECT_THROW(writePng(folder / "no/a.png", picture), std::runtime_error);
 }
 
+TEST(MapFileGains, OfAPresetBeforeRulesWereCountedInScansAreThoseOfRulesNow) {
+  MapInfo info = infoWithGains();
+  RulesConfig rules;
+  info.parameters = "scan_limit: {hits: 0.2}\nfree_gain: {dynamic: 3}\n";
+  EXPECT_TRUE(storedRules("FILE", info).decidesAs(StateRules(rules, *info.classes, info.resolution)));
+  info.parameters = "scan_limit: {hits: 0.02}\nfree_gain: {dynamic: 3000}\n";
+  rules.enabled = true;
+  EXPECT_TRUE(storedRules("FILE", info).decidesAs(StateRules(rules, *info.classes, info.resolution)));
+}
+
 TEST(MapFileGains, RefusesParametersThatAreNone) {
   MapInfo info = infoOf();
   std::vector<SemanticClass> classes = info.classes->classes();
   classes[1].living = false;  // so that its voxels ask their neighbourhood
   info.classes = std::make_shared<ClassTable>("a table", classes);
-  info.parameters = "free_gain: {static: -1}";
+  info.parameters = "rules: {stands_after: -1}";
   EXPECT_NE(sentenceOf([&] { storedRules("FILE", info); }).find("the parameters in FILE cannot be used"),
             std::string::npos);
   info.parameters = "[";

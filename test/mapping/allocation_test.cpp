@@ -198,7 +198,7 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.scan_limit.free_threshold = 0.02;
       config.scan_limit.void_space = 2.0;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
-      config.kernel.static_spread = false;
+      config.scan_limit.static_spread = false;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
     }
   }

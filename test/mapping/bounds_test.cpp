@@ -285,22 +285,28 @@ TEST(Kernel, AShortLengthIsWarnedOf) {
   EXPECT_TRUE(settingWarnings(config).empty());
 }
 
-TEST(ScanLimit, BelowTheUnitOfEvidenceIsToldOf) {
+TEST(Rules, WithoutWholeBeamsAreToldOf) {
   MapperConfig config;
-  config.scan_limit.hits = 0.2;
+  config.rules.enabled = true;
   EXPECT_TRUE(settingWarnings(config).empty());
-  config.scan_limit.free = 1e-6;
+  config.free_space.mode = "linear";
   ASSERT_EQ(settingWarnings(config).size(), 1u);
-  EXPECT_TRUE(has(settingWarnings(config)[0], "scan_limit/free 1e-6 is below")) << settingWarnings(config)[0];
+  EXPECT_TRUE(has(settingWarnings(config)[0], "set free_space/mode to line")) << settingWarnings(config)[0];
 }
 
-TEST(ScanLimit, VoidsWithoutALimitOfFreeSpaceAreToldOf) {
+TEST(Rules, WithoutAGroundAreToldOf) {
   MapperConfig config;
-  config.scan_limit.void_space = 1.0;
-  ASSERT_EQ(settingWarnings(config).size(), 1u);
-  EXPECT_TRUE(has(settingWarnings(config)[0], "scan_limit/void adds nothing without scan_limit/free"));
-  config.scan_limit.free = 0.1;
-  EXPECT_TRUE(settingWarnings(config).empty());
+  config.rules.enabled = true;
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();
+  for (SemanticClass& c : classes) c.ground = false;
+  const auto warnings = [&] { return settingWarnings(config, ClassTable("flat", classes)); };
+  ASSERT_EQ(warnings().size(), 1u);
+  EXPECT_TRUE(has(warnings()[0], "set sensor_model/height")) << warnings()[0];
+  config.sensor_model.height = 0.4;
+  EXPECT_TRUE(warnings().empty());
+  config.sensor_model.height = 0.0;
+  classes[1].ground = true;
+  EXPECT_TRUE(warnings().empty());
 }
 
 TEST(Kernel, LimitsOfItsLengthDoNotHoldForCounting) {
@@ -343,15 +349,10 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
 TEST(Bounds, NoSettingMakesEvidenceInfinite) {
   const char* const names[] = {"prior",
                                "kernel/scale",
-                               "free_gain/dynamic",
-                               "free_gain/living",
-                               "free_gain/static",
-                               "scan_limit/hits",
-                               "scan_limit/free",
-                               "scan_limit/free_threshold",
-                               "scan_limit/void",
-                               "free_gain/persistence",
-                               "free_gain/remaining"};
+                               "rules/hit_outweighs",
+                               "rules/void_outweighs",
+                               "rules/stands_after",
+                               "rules/living_stands_after"};
   for (const char* name : names) {
     MapperConfig config;
     EXPECT_THROW(setParameters(config, {{name, "1e39"}}), std::invalid_argument) << name;

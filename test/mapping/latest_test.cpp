@@ -186,9 +186,9 @@ TEST(Latest, WithoutStampsTheSumDecides) {
 }
 
 TEST(Latest, IsOffByDefaultAndInThePaperPresets) {
-  EXPECT_FALSE(MapperConfig().free_gain.latest);
+  EXPECT_FALSE(MapperConfig().rules.enabled);
   for (const char* preset : {"paper_line", "paper_linear", "paper_none", "baseline_even"}) {
-    EXPECT_EQ(loadParameterFile(preset).count("free_gain/latest"), 0u) << preset;
+    EXPECT_EQ(loadParameterFile(preset).count("rules/enabled"), 0u) << preset;
   }
 }
 

@@ -30,7 +30,7 @@ std::vector<Scan> someScans() {
 
 SemanticMap mapOf(const std::vector<Scan>& scans, MapperConfig config) {
   SemanticMapper mapper(config, reference::smallTable());
-  SemanticMap map = SemanticMap(mapper.map().geometry(), config.prior, mapper.classes().size());
+  SemanticMap map = SemanticMap(mapper.map().geometry(), applied(config).prior, mapper.classes().size());
   for (const Scan& scan : scans) mapper.integrate(scan);
   map.add(mapper.map());
   return map;
@@ -110,11 +110,10 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     config.scan_limit.free = 0.03;
     config.scan_limit.free_threshold = 0.002;
     config.scan_limit.void_space = 0.2;
-    config.free_gain.persistence = 3.0;
     configs.emplace_back(mode + ", with rules and limits", config);
-    config.kernel.static_spread = false;
+    config.scan_limit.static_spread = false;
     configs.emplace_back(mode + ", with rules and hits that stay in their voxels", config);
-    config.free_gain.latest = true;
+    config.rules.enabled = true;
     configs.emplace_back(mode + ", with looks", config);
   }
   return configs;
@@ -456,10 +455,10 @@ TEST(Laws, BytesAndChangedBlocksAreKeptUpWithTheMap) {
 TEST(Laws, NeighbourhoodsAreAskedByTheFlagsOfClasses) {
   std::vector<SemanticClass> classes = reference::smallTable()->classes();  // the first is unlabelled
   MapperConfig config;
-  config.free_gain.neighbourhood = 2.0;
+  config.rules.enabled = true;
   const auto asking = [&] {
     const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-    EXPECT_EQ(mapper.rules().neighbourhoodRatio(), 2.0f);
+    EXPECT_EQ(mapper.rules().neighbourhoodReach(), 2);
     std::vector<int> asked;
     for (const SemanticClass& c : classes) {
       if (mapper.rules().asksNeighbourhood(c.id)) asked.push_back(c.id);
@@ -479,33 +478,39 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   std::vector<SemanticClass> classes = reference::smallTable()->classes();
   classes[2].dynamic = true;
   MapperConfig config;
-  config.free_gain.dynamic_classes = 30.0;
-  config.free_gain.static_classes = 0.1;
-  const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-  EXPECT_EQ(mapper.rules().freeGain(0, 5.0f), 1.0f);  // unlabelled
-  EXPECT_EQ(mapper.rules().freeGain(1, 5.0f), 0.1f);
-  EXPECT_EQ(mapper.rules().freeGain(2, 5.0f), 30.0f);
-  EXPECT_EQ(mapper.rules().freeGain(kFreeClass, 5.0f), 1.0f);
+  const auto rulesOf = [&] {
+    return SemanticMapper(config, std::make_shared<ClassTable>("flags", classes)).rules();
+  };
+  for (const int id : {0, 1, 2})
+    EXPECT_EQ(rulesOf().freeGain(static_cast<ClassId>(id), 0.0f), 1.0f) << "the paper's";
+  config.rules.enabled = true;
+  config.rules.stands_after = 4.0;
+  config.rules.living_stands_after = 8.0;
+  const auto hits = [&](double scans) { return static_cast<float>(scans * config.rules.hit()); };
+  EXPECT_EQ(rulesOf().freeGain(0, 0.0f), 1.0f) << "what is unlabelled";
+  EXPECT_EQ(rulesOf().freeGain(1, hits(0.1)), 0.0f) << "what cannot move stays";
+  EXPECT_GT(rulesOf().freeGain(2, hits(3.0)), 1000.0f) << "it may pass";
+  EXPECT_EQ(rulesOf().freeGain(2, hits(4.0)), 1.0f) << "it stands";
+  EXPECT_EQ(rulesOf().freeGain(kFreeClass, 5.0f), 1.0f);
+  config.resolution = 0.8;  // twice the way through a voxel and what stands in it
+  EXPECT_GT(rulesOf().freeGain(2, hits(7.0)), 1000.0f);
+  EXPECT_EQ(rulesOf().freeGain(2, hits(8.0)), 1.0f);
+  config.resolution = 0.3;
   classes[2].living = true;
-  const auto living = std::make_shared<ClassTable>("living", classes);
-  EXPECT_EQ(SemanticMapper(config, living).rules().freeGain(2, 5.0f), 30.0f) << "by default that of dynamic";
-  config.free_gain.living_classes = 500.0;
-  EXPECT_EQ(SemanticMapper(config, living).rules().freeGain(2, 5.0f), 500.0f);
+  EXPECT_GT(rulesOf().freeGain(2, hits(7.0)), 1000.0f);
+  EXPECT_EQ(rulesOf().freeGain(2, hits(8.0)), 1.0f);
+  EXPECT_FALSE(rulesOf().isFixed(0)) << "what is unlabelled may move";
+  EXPECT_TRUE(rulesOf().isFixed(1));
+  EXPECT_FALSE(rulesOf().isFixed(2) || rulesOf().isFixed(kFreeClass));
   classes[2].free_gain = 7.0;
-  const SemanticMapper own(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_EQ(own.rules().freeGain(2, 5.0f), 7.0f);
-  config.free_gain.persistence = 2.0;
-  const SemanticMapper persistent(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_FLOAT_EQ(persistent.rules().freeGain(2, 2.0f), 1.0f + 6.0f * std::exp(-1.0f));
-  EXPECT_EQ(persistent.rules().freeGain(1, 2.0f), 0.1f) << "gains below 1 stay";
-  EXPECT_EQ(persistent.rules().remainingGain(), 0.0f);
-  config.free_gain.remaining = 0.25;
-  const SemanticMapper remaining(config, std::make_shared<ClassTable>("gains", classes));
-  EXPECT_EQ(remaining.rules().remainingGain(), 0.25f);
-  EXPECT_FALSE(remaining.rules().isFixed(0)) << "what is unlabelled may move";
-  EXPECT_TRUE(remaining.rules().isFixed(1));
-  EXPECT_FALSE(remaining.rules().isFixed(2));
-  EXPECT_FALSE(remaining.rules().isFixed(kFreeClass));
+  EXPECT_EQ(rulesOf().freeGain(2, 5.0f), 7.0f) << "its own";
+  classes[2].free_gain.reset();
+  classes[2].dynamic = classes[2].living = false;
+  EXPECT_GT(rulesOf().freeGain(1, hits(1.0)), 13.0f) << "nothing says what can move: all may";
+  EXPECT_EQ(rulesOf().freeGain(1, hits(2.0)), 1.0f);
+  EXPECT_EQ(rulesOf().freeGain(0, hits(1.0)), 1.0f) << "but what is unlabelled";
+  config.rules.stands_after = 1.0;
+  EXPECT_EQ(rulesOf().freeGain(1, hits(1.0)), 1.0f) << "fewer scans than two";
 }
 
 }  // namespace

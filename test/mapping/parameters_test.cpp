@@ -229,10 +229,42 @@ TEST(ParameterFile, NamesItsFaults) {
   EXPECT_NE(faultOf("prior: [1\n").find(file), std::string::npos);
 }
 
+TEST(Parameters, OfEarlierVersionsAreRefusedWithWhatToSetInstead) {
+  MapperConfig config;
+  try {
+    setParameters(config, {{"resolution", "0.1"}, {"scan_limit/free_threshold", "0.01"}});
+    FAIL();
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_STREQ(fault.what(),
+                 "parameter scan_limit/free_threshold is no longer one; set sensor_model/height instead");
+  }
+  EXPECT_EQ(config.resolution, 0.3);
+}
+
+TEST(Parameters, WithRulesVoxelsHoldWholeCells) {
+  MapperConfig config;
+  const auto cellOf = [&](double resolution, double downsample) {
+    config.resolution = resolution;
+    config.downsample_resolution = downsample;
+    return applied(config).downsample_resolution;
+  };
+  EXPECT_EQ(cellOf(0.25, 0.1), 0.1);
+  EXPECT_EQ(applied(config).prior, config.prior);
+  config.rules.enabled = true;
+  EXPECT_DOUBLE_EQ(cellOf(0.3, 0.1), 0.1);
+  EXPECT_DOUBLE_EQ(cellOf(0.15, 0.1), 0.075);
+  EXPECT_DOUBLE_EQ(cellOf(0.1, 0.1), 0.05);
+  EXPECT_DOUBLE_EQ(cellOf(0.4, 0.2), 0.2);
+  EXPECT_DOUBLE_EQ(cellOf(0.1, 5.0), 0.05);
+  EXPECT_EQ(cellOf(0.3, 0.0), 0.0) << "every point is kept";
+  EXPECT_LT(applied(config).prior, config.prior);
+  EXPECT_EQ(applied(config).scan_limit.blocks, config.scan_limit.blocks);
+}
+
 TEST(ParameterFile, HasAPathOrTheNameOfAPreset) {
   const TemporaryFolder folder;
   std::ofstream(folder / "robot.yaml") << "prior: 0.5\n";
-  EXPECT_EQ(loadParameterFile("robot").at("prior"), "0.0001");
+  EXPECT_EQ(loadParameterFile("robot").at("rules/enabled"), "true");
   EXPECT_EQ(loadParameterFile(folder / "robot.yaml").at("prior"), "0.5");
   const auto faultOf = [](const std::string& name) -> std::string {
     try {
@@ -243,12 +275,10 @@ TEST(ParameterFile, HasAPathOrTheNameOfAPreset) {
     return "";
   };
   const std::string known =
-      "neither a file nor one of baseline_even, crowded, occupancy_only, paper_line, paper_linear, "
-      "paper_none, "
-      "robot, small_cpu";
-  EXPECT_EQ(faultOf("crowdd"), "parameter file 'crowdd' is " + known + "; did you mean 'crowded'?");
-  EXPECT_EQ(faultOf("/no/such/crowded.yaml"),
-            "parameter file '/no/such/crowded.yaml' is " + known + "; did you mean 'crowded'?");
+      "neither a file nor one of baseline_even, paper_line, paper_linear, paper_none, robot";
+  EXPECT_EQ(faultOf("robott"), "parameter file 'robott' is " + known + "; did you mean 'robot'?");
+  EXPECT_EQ(faultOf("/no/such/robott.yaml"),
+            "parameter file '/no/such/robott.yaml' is " + known + "; did you mean 'robot'?");
   const std::string here = std::filesystem::current_path().string();
   EXPECT_EQ(faultOf("robot.yaml"),
             "parameter file 'robot.yaml' (" + here + "/robot.yaml) is " + known + "; did you mean 'robot'?");

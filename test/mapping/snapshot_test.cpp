@@ -87,17 +87,14 @@ TEST(Snapshot, KeepsTheGeometry) {
 
 TEST(Snapshot, KeepsTheRulesOfItsTime) {
   MapperConfig config;
-  config.free_gain.static_classes = 3.0;
-  config.free_gain.persistence = 2.0;
-  config.free_gain.remaining = 0.5;
+  config.rules.enabled = true;
   SemanticMapper mapper(config, reference::smallTable());
   const MapSnapshot snapshot = mapper.snapshot();
   EXPECT_TRUE(snapshot.rules.decidesAs(mapper.rules()));
-  config.free_gain.static_classes = 4.0;
-  config.free_gain.remaining = 0.0;
+  config.rules.together = 0.0;
   mapper.reconfigure(config);
-  EXPECT_FLOAT_EQ(snapshot.rules.freeGain(1, 2.0f), 1.0f + 2.0f * std::exp(-1.0f));
-  EXPECT_EQ(snapshot.rules.remainingGain(), 0.5f);
+  EXPECT_GT(snapshot.rules.neighbourhoodRatio(), 0.0f);
+  EXPECT_EQ(mapper.rules().neighbourhoodRatio(), 0.0f);
   EXPECT_TRUE(snapshot.rules.isFixed(1) && !snapshot.rules.isFixed(0)) << "what is unlabelled may move";
   EXPECT_FALSE(snapshot.rules.decidesAs(mapper.rules()));
 }

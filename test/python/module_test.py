@@ -114,7 +114,7 @@ class Mapping(WithFolder):
         self.assertEqual(nested.parameters, flat.parameters)
         self.assertEqual((flat.parameters['resolution'], flat.parameters['kernel/length'], flat.parameters['threads']), (0.2, 0.5, 1))
         preset = bki.SemanticMapper(config='robot', clear_beyond_max_range=False)
-        self.assertNotEqual(preset.parameters['free_space/hits_before_misses'], nested.parameters['free_space/hits_before_misses'])
+        self.assertNotEqual(preset.parameters['rules/enabled'], nested.parameters['rules/enabled'])
         self.assertIs(preset.parameters['clear_beyond_max_range'], False)
         preset.reconfigure(memory_limit=100)
         self.assertEqual(preset.parameters['memory_limit'], 100.0)

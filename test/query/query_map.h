@@ -41,7 +41,7 @@ struct QueryMapKind {
 /// Rules by which voxels depend on those around.
 inline const StateRules& queryRules() {
   static const StateRules rules =
-      StateRules().withFreeGain(7, 2.0).withPersistence(3.0).withNeighbourhood(0.15, 0b10001000);
+      StateRules().withFreeGain(7, 2.0).withHitOfScan(1.5).withNeighbourhood(0.15, 0b10001000);
   return rules;
 }
 

@@ -98,7 +98,7 @@ class RandomChanges {
         rules_ = rules_.withFreeGain(static_cast<ClassId>(3 * draw(2)), 0.2 + 3.0 * unit());
         break;
       case 4:
-        rules_ = rules_.withPersistence(draw(2) == 0 ? 0.0 : 3.0 * unit());
+        rules_ = rules_.withHitOfScan(draw(2) == 0 ? 0.0 : 3.0 * unit());
         rules_ = rules_.withRemaining(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
         rules_ = rules_.withNeighbourhood(draw(3) == 0 ? 0.0 : 3.0 * unit(), draw(3) == 0 ? 0b1000 : 0b1001);
         break;
@@ -211,7 +211,7 @@ TEST(StateMap, TakesOverWhatItWouldDecideItselfWhileAMapperMaps) {
         changed("without " + scenes[n].name);
       }
       MapperConfig other = mapper.config();
-      other.free_gain.static_classes = round == 0 ? 3.0 : 0.1;
+      other.rules.stands_after = round == 0 ? 1.0 : 20.0;
       mapper.reconfigure(other);
       changed("other gains");
       mapper.clearBox({Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 0, 2)});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "parallel/counter_random.h"
@@ -70,7 +71,10 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
 }
 
 ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config)
-    : config_(config), geometry_(config.resolution), origin_(scan.origin), classes_(classes.classes()) {
+    : config_(applied(config)),
+      geometry_(config.resolution),
+      origin_(scan.origin),
+      classes_(classes.classes()) {
   const SensorModelConfig sensor = scan.sensor_model.value_or(config.sensor_model);
   const double max_range = sensor.max_range;
   std::vector<Point> raw, cut;
@@ -102,10 +106,31 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
   for (const Eigen::Vector3f& direction : scan.no_returns) {
     cut.push_back({direction.cast<double>().normalized() * max_range, 255});
   }
-  hits_ = downsample(origin_, raw, config.downsample_resolution);
+  hits_ = downsample(origin_, raw, config_.downsample_resolution);
+  if (config.rules.enabled) setThreshold(sensor.height);
   for (const Point& hit : hits_) beams_.push_back(hit.p);
-  for (const Point& end : downsample(origin_, cut, config.downsample_resolution)) beams_.push_back(end.p);
+  for (const Point& end : downsample(origin_, cut, config_.downsample_resolution)) beams_.push_back(end.p);
   drawSamples(scan.stamp);
+}
+
+void ScanReference::setThreshold(double height) {
+  for (const double far : {10.0, 20.0}) {
+    if (height > 0.0) break;
+    std::vector<double> heights;
+    for (const Point& hit : hits_) {
+      for (const SemanticClass& c : classes_) {
+        const bool is_ground = c.ground && hit.shareOf(c.id) > 0.0;
+        if (is_ground && hit.p.head<2>().norm() <= far) heights.push_back(-hit.p.z());
+      }
+    }
+    if (heights.size() < 20) continue;
+    std::sort(heights.begin(), heights.end(), std::greater<>());
+    height = heights[heights.size() / 2];
+    break;
+  }
+  if (!(height > 0.0)) return;
+  config_.scan_limit.free_threshold =
+      0.166 * config_.kernel.scale * config_.kernel.lengthFor(config_.resolution) / height;
 }
 
 void ScanReference::drawSamples(std::uint64_t stamp) {
@@ -154,7 +179,7 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
 
 bool ScanReference::spreads(const SemanticClass& c) const {
   if (config_.kernel.type == KernelType::kCounting) return false;
-  return config_.kernel.static_spread || c.dynamic || c.unlabelled;
+  return config_.scan_limit.static_spread || c.dynamic || c.unlabelled;
 }
 
 Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {

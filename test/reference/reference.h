@@ -85,6 +85,8 @@ class ScanReference {
   Value anyHit(const VoxelIndex& voxel) const;
   Value lineEvidence(const VoxelIndex& voxel) const;
   bool blockIsHit(const BlockIndex& block) const;
+  /// Sets the threshold of free space. @param height of the sensor [m]; 0: found from the hits on ground.
+  void setThreshold(double height);
   void drawSamples(std::uint64_t stamp);
   /// Whether the beam's line reaches the voxel; sets rho and k there.
   bool reaches(const Eigen::Vector3d& beam, const Eigen::Vector3d& centre, double& rho, double& k) const;

@@ -23,10 +23,11 @@ inline std::shared_ptr<const ClassTable> smallTable() {
   return std::make_shared<ClassTable>("small", classes);
 }
 
-/// The same, but the last class can move.
+/// The same, but the last class can move, and class 1 is ground.
 inline std::shared_ptr<const ClassTable> tableWithDynamicClass() {
   std::vector<SemanticClass> classes = smallTable()->classes();
   classes.back().dynamic = true;
+  classes[1].ground = true;
   return std::make_shared<ClassTable>("dynamic", classes);
 }
 

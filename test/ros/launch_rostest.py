@@ -55,12 +55,11 @@ class Launch(unittest.TestCase):
 
     def test_every_preset_maps_and_says_what_it_did(self):
         presets = glob.glob(os.path.join(roslib.packages.get_pkg_dir('bki_mapping'), 'config/presets/*.yaml'))
-        self.assertGreaterEqual(len(presets), 8)
+        self.assertGreaterEqual(len(presets), 5)
         for number, preset in enumerate(sorted(presets)):
             name = os.path.splitext(os.path.basename(preset))[0]
-            plain = ['labelled:=false', 'classes:=occupancy'] if 'occupancy_only' in preset else []
             nodelet = 'true' if number % 2 else 'false'
-            with Mapping(f'config:={name}', f'nodelet:={nodelet}', *plain) as mapping:
+            with Mapping(f'config:={name}', f'nodelet:={nodelet}') as mapping:
                 status = mapping.scan()
             self.assertTrue(status.integrated_last, f'{preset}: {status}')
             self.assertGreater(status.blocks, 2, preset)
@@ -68,9 +67,8 @@ class Launch(unittest.TestCase):
             self.assertIn('Mapped 1 of 1 clouds; dropped none', mapping.printed(), preset)
 
     def test_without_labels_a_walker_leaves_nothing(self):
-        """The preset is the one for clouds without labels, and the log says so."""
         with Mapping('labelled:=false', 'classes:=occupancy') as mapping:
-            self.assertEqual(rospy.get_param('/mapping/config'), 'occupancy_only')
+            self.assertEqual(rospy.get_param('/mapping/config'), 'robot')
             walked = []
             for scan in range(30):
                 points, person = view_of_a_walker(y=0.15 * scan - 2.2)
@@ -83,14 +81,10 @@ class Launch(unittest.TestCase):
             wall = [point for point in points if abs(point[0] - 8.0) < 0.01]
             self.assertGreater(sum(state == 2 for state in query_points('/mapping', wall).state), 0.98 * len(wall))
         printed = mapping.printed()
-        self.assertIn("Settings: config occupancy_only, for class table 'occupancy', in which no class can move", printed)
-        self.assertNotIn('what has left stays in the map', printed)
+        self.assertIn("Settings: config robot, for class table 'occupancy', in which no class can move", printed)
+        self.assertIn("class table 'occupancy' flags no class as ground", printed)
 
-    def test_a_preset_that_needs_classes_that_move_is_warned_of(self):
-        with Mapping('labelled:=false', 'classes:=occupancy', 'config:=robot') as mapping:
-            self.assertEqual(rospy.get_param('/mapping/config'), 'robot', 'who names a preset gets it')
-        self.assertIn("class table 'occupancy' flags no class as dynamic, so free_gain/static 0.0005 applies to all, and what has left "
-                      'stays in the map; take the preset occupancy_only', mapping.printed())
+    def test_clouds_without_labels_need_a_table_of_one_class(self):
         with Mapping('labelled:=false') as mapping:
             self.assertEqual(rospy.get_param('/mapping/config'), 'robot')
         self.assertIn("are taken without labels (label_field is empty), so all points get label 0 of class table 'semantic_kitti'; set "
@@ -124,7 +118,7 @@ class Launch(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             with open(os.path.join(folder, 'two.yaml'), 'w') as file:
                 file.write('config: robot\nprior: 0.001\n')
-            for arguments, words in ((['config:=crowdd'], "neither a file nor one of baseline_even, crowded, occupancy_only, "),
+            for arguments, words in ((['config:=robott'], "neither a file nor one of baseline_even, paper_line, "),
                                      (['config:=none.yaml'], f"parameter file '{folder}/none.yaml' is neither a file nor one of"),
                                      (['config:=two.yaml'], f'parameter file {folder}/two.yaml names another one as config'),
                                      (['classes:=tooy'], "did you mean 'toy'?"),

@@ -182,8 +182,8 @@ class Live(MapperTest):
         updates, client = Listener('/mapping/reconfigure/parameter_updates', Config), self.client()
         before = client.get_configuration(TIMEOUT)
         names = set(before) - {'last_refusal', 'groups'}
-        for settings, words in (({'free_gain_dynamic': -1.0}, "free_gain/dynamic is '-1', but must be a number > 0"),
-                                ({'free_gain_dynamic': 0.0}, "free_gain/dynamic is '0'"),
+        for settings, words in (({'rules_stands_after': -1.0}, "rules/stands_after is '-1', but must be a number from 0 to 1000"),
+                                ({'rules_together': 11.0}, "rules/together is '11'"),
                                 ({'queue_size': -1}, "queue_size is '-1', but must be an integer from 1 to 10000"),
                                 ({'queue_size': 20000}, "queue_size is '20000'"),
                                 ({'view_range': 3.0, 'publish_rate': -1.0}, "publish_rate is '-1'")):
@@ -194,16 +194,16 @@ class Live(MapperTest):
             wait_until(lambda: len(updates.messages) > seen, 'an update for clients that show the values')
             shown = {p.name: p.value for p in updates.messages[-1].doubles + updates.messages[-1].ints}
             self.assertEqual(shown, {name: before[name] for name in shown}, 'the values in force')
-            self.assertEqual(rospy.get_param('/mapping/reconfigure/free_gain_dynamic'), before['free_gain_dynamic'])
+            self.assertEqual(rospy.get_param('/mapping/reconfigure/rules_stands_after'), before['rules_stands_after'])
             self.status.wait_for(lambda m: m.last_refusal == answer.last_refusal, 'the refusal in the status')
         self.assertIn('min', client.get_parameter_descriptions(TIMEOUT)[0], 'limits, for sliders')
 
     def test_settings_that_are_unknown_or_of_another_type_are_refused(self):
         change = rospy.ServiceProxy('/mapping/reconfigure/set_parameters', Reconfigure)
-        for asked, words in ((Config(doubles=[DoubleParameter('free_gain_dynamc', 2.0)]),
-                              "setting 'free_gain_dynamc' is unknown; did you mean 'free_gain_dynamic'?"),
-                             (Config(ints=[IntParameter('free_gain_dynamic', 2)]),
-                              'setting free_gain_dynamic is an integer, but must be a floating-point number'),
+        for asked, words in ((Config(doubles=[DoubleParameter('rules_stand_after', 2.0)]),
+                              "setting 'rules_stand_after' is unknown; did you mean 'rules_stands_after'?"),
+                             (Config(ints=[IntParameter('rules_stands_after', 2)]),
+                              'setting rules_stands_after is an integer, but must be a floating-point number'),
                              (Config(doubles=[DoubleParameter('window', 20.0), DoubleParameter('window', 30.0)]),
                               'setting window is given twice; keep one')):
             asked.doubles.append(DoubleParameter('view_range', 3.0))

@@ -144,7 +144,7 @@ class Replay(unittest.TestCase):
                   'classes:=./none.yaml')
         self.ends(f"'{self.path('none.yaml')}' is neither a file nor one of", 'semantic_kitti.launch', 'sequence:=drive',
                   'config:=none.yaml')
-        self.ends("did you mean 'crowded'?", 'replay.launch', 'bag:=my drive.bag', 'config:=crowdd')
+        self.ends("did you mean 'robot'?", 'replay.launch', 'bag:=my drive.bag', 'config:=robott')
 
     def test_rate_0_waits_for_the_mapper_and_not_for_just_any_listener(self):
         clouds, poses = Listener('/velodyne_points', PointCloud2), Listener('/tf', TFMessage)

@@ -140,7 +140,7 @@ TEST(LiveSettings, DefaultsAreTheParameters) {
   server.color_mode = ColorMode::kHeight;
   server.window = 7.0;
   mapper.free_space.mode = "even";
-  mapper.scan_limit.hits = 3.0;
+  mapper.rules.stands_after = 3.0;
   LiveSettings::take(defaults, server, mapper);
   for (const auto& p : serverParameters()) EXPECT_TRUE(p.equal(server, ServerConfig())) << p.name;
   for (const auto& p : mapperParameters()) EXPECT_TRUE(p.equal(mapper, MapperConfig())) << p.name;
@@ -175,11 +175,11 @@ TEST(LiveSettings, TakeWhatMayChangeAndRefuseTheRest) {
   config.free_space_mode = "linear";
   config.sensor_model_max_range = 40.0;
   config.color_mode = "height";
-  config.free_space_hits_before_misses = true;
+  config.rules_together = 0.0;
   LiveSettings::take(config, server, mapper);
   EXPECT_EQ(mapper.free_space.mode, "linear");
   EXPECT_EQ(mapper.sensor_model.max_range, 40.0);
-  EXPECT_TRUE(mapper.scan_limit.hits_before_misses);
+  EXPECT_EQ(mapper.rules.together, 0.0);
   EXPECT_EQ(server.color_mode, ColorMode::kHeight);
   config.resolution = 0.1;
   config.view_range = 7.0;

@@ -162,9 +162,10 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
         units = static_cast<EvidenceUnits>(random() % (round % 2 == 0 ? 1500 : 300));
       block.add(static_cast<ClassId>(id), plane.data());
     }
-    // With a persistence of an eighth of the most that a voxel counts for among others.
-    const StateRules rules =
-        StateRules().withPersistence(kMost * kEvidenceUnit / 8.0).withFreeGain(3, 2.0).withFreeGain(7, 0.5);
+    const StateRules rules = StateRules()
+                                 .withHitOfScan(kMost * kEvidenceUnit / StateRules::kMostVotes)
+                                 .withFreeGain(3, 2.0)
+                                 .withFreeGain(7, 0.5);
     ASSERT_EQ(rules.mostVote(), kMost);
     Overruled overruled;
     overruled.fill(kNotOverruled);

@@ -13,8 +13,8 @@ namespace {
 
 constexpr ClassId kRoad = 0, kCar = 1, kTruck = 2, kWalker = 3;
 constexpr double kPrior = 0.001;
-constexpr double kGain = 20.0, kPersistence = 0.5, kRatio = 1.5, kRemaining = 0.2;
-constexpr double kMost = 8.0 * kPersistence;  // evidence of one voxel counts up to this
+constexpr double kGain = 20.0, kStandsAfter = 1.6, kRatio = 1.5, kRemaining = 0.2;
+constexpr double kMost = 4.0;  // evidence of one voxel counts up to this
 
 /// The evidence for a class in a voxel.
 double evidenceFor(const SemanticMap& map, const VoxelIndex& voxel, ClassId id) {
@@ -37,20 +37,21 @@ bool asks(ClassId id) {
 
 /// Equations 11 and 12.
 bool holds(const SemanticMap& map, const VoxelIndex& voxel, ClassId id) {
-  const double hits = evidenceFor(map, voxel, id), most = id == kRoad ? 1.0 : kGain;
-  return hits >= (1.0 + (most - 1.0) * std::exp(-hits / kPersistence)) * evidenceFor(map, voxel, kFreeClass);
+  const double hits = evidenceFor(map, voxel, id), gain = id == kRoad || hits >= kStandsAfter ? 1.0 : kGain;
+  return hits >= gain * evidenceFor(map, voxel, kFreeClass);
 }
 
 /// The class that occupies a voxel, from the definitions; kFreeClass if none does.
 /// @param asks_below whether voxels below are asked, too.
-ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel, bool asks_below) {
+/// @param reach of the neighbourhood [voxels].
+ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel, bool asks_below, int reach) {
   const double free = evidenceFor(map, voxel, kFreeClass), road = evidenceFor(map, voxel, kRoad);
   const ClassId best = likeliest(map, voxel);
   if (evidenceFor(map, voxel, best) == 0.0) return kFreeClass;
   double kept = 0.0, cleared = 0.0, keeping = 0.0;
-  for (int z = asks_below ? -2 : 0; z <= 2; ++z) {
-    for (int y = -2; y <= 2; ++y) {
-      for (int x = -2; x <= 2; ++x) {
+  for (int z = asks_below ? -reach : 0; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
         const ClassId of_other = likeliest(map, at);
         if (!asks(of_other)) continue;
@@ -71,12 +72,12 @@ ClassId slowLabel(const SemanticMap& map, const VoxelIndex& voxel, bool asks_bel
   return road >= kRemaining * free && 4.0 * road >= evidenceFor(map, voxel, best) ? kRoad : kFreeClass;
 }
 
-StateRules rulesOfAll(bool asks_below = true) {
+StateRules rulesOfAll(bool asks_below = true, int reach = 2) {
   StateRules rules = StateRules()
-                         .withPersistence(kPersistence)
-                         .withNeighbourhood(kRatio, ClassSet().set(kCar).set(kTruck), asks_below)
+                         .withHitOfScan(kMost / StateRules::kMostVotes)
+                         .withNeighbourhood(kRatio, ClassSet().set(kCar).set(kTruck), asks_below, reach)
                          .withRemaining(kRemaining, ClassSet(0b1));
-  for (const ClassId id : {kCar, kTruck, kWalker}) rules = rules.withFreeGain(id, kGain);
+  for (const ClassId id : {kCar, kTruck, kWalker}) rules = rules.withFreeGain(id, kGain, kStandsAfter);
   return rules;
 }
 
@@ -104,15 +105,16 @@ SemanticMap randomMap(unsigned seed) {
 
 TEST(Neighbours, DecideAsByLookingAtEachOfThem) {
   std::size_t labels[256] = {}, restored = 0, cleared = 0;
-  for (unsigned seed = 1; seed <= 8; ++seed) {
+  const std::pair<unsigned, int> cases[] = {{1, 2}, {2, 2}, {3, 2}, {4, 2}, {5, 1}, {6, 1}, {7, 3}, {8, 7}};
+  for (const auto& [seed, reach] : cases) {
     const SemanticMap map = randomMap(seed);
-    const StateRules rules = rulesOfAll(seed % 2 == 0), alone = rules.withNeighbourhood(0.0, {});
+    const StateRules rules = rulesOfAll(seed % 2 == 0, reach), alone = rules.withNeighbourhood(0.0, {});
     BlockView view;
     for (const auto& [index, block] : map.entries()) {
       readBlock(map, rules, index, *block, BlockFields::kAllButEntropy, view);
       for (int v = 0; v < kBlockVoxels; ++v) {
         const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
-        const ClassId expected = slowLabel(map, voxel, rules.neighbourhoodIsBelow());
+        const ClassId expected = slowLabel(map, voxel, rules.neighbourhoodIsBelow(), reach);
         ASSERT_EQ(view.at(v).label, expected) << seed;
         ASSERT_EQ(viewWithoutEntropy(map, rules, voxel).label, expected) << seed;
         ++labels[expected];
@@ -148,8 +150,8 @@ SemanticMap rowOfCar(const std::vector<std::pair<double, double>>& evidence) {
 
 StateRules rulesOfCars() {
   return StateRules()
-      .withFreeGain(kCar, 1000.0)
-      .withPersistence(0.05)
+      .withFreeGain(kCar, 1000.0, 0.3)
+      .withHitOfScan(0.025)  // a voxel counts for 0.4 at most
       .withNeighbourhood(2.0, ClassSet().set(kCar));
 }
 
@@ -188,7 +190,7 @@ TEST(Neighbours, DoNotKeepWhatBeamsCrossedAgainAndAgain) {
   }
 }
 
-TEST(Neighbours, CountForAtMostEightPersistences) {
+TEST(Neighbours, CountForAtMostSixteenScans) {
   // 0.05 is a quarter of the mean of 0.1 and 0.4, not of that of 0.1 and more.
   const auto kept = [](double evidence) {
     return viewAt(rowOfCar({{0.1, 0.0}, {evidence, 0.0}, {0.0625, 0.1}}), 2).state == VoxelState::kOccupied;
@@ -196,7 +198,7 @@ TEST(Neighbours, CountForAtMostEightPersistences) {
   EXPECT_TRUE(kept(0.4));
   EXPECT_TRUE(kept(40.0));
   const SemanticMap map = rowOfCar({{0.1, 0.0}, {40.0, 0.0}, {0.0625, 0.1}});
-  EXPECT_EQ(viewAt(map, 2, rulesOfCars().withPersistence(5.0)).state, VoxelState::kFree);
+  EXPECT_EQ(viewAt(map, 2, rulesOfCars().withHitOfScan(2.5)).state, VoxelState::kFree);
 }
 
 TEST(Neighbours, BelowAreNotAskedWhereFloorsVote) {

@@ -23,7 +23,7 @@ struct Kind {
   int planes;           ///< of the block, at most
   double prior;
   enum Evidence { kPlain, kSparse, kTies, kExtreme } evidence;  ///< kSparse: mostly whole rows of zeros
-  bool gains, persistence, occlusion;
+  bool gains, stays, occlusion;
   bool neighbours = false;  ///< blocks around, and a ratio of evidence
 };
 
@@ -72,8 +72,9 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
   if (kind.neighbours) {
     ClassSet asking;
     for (std::size_t id = 0; id < kind.classes; ++id) asking[id] = random() % 2 == 0;
-    rules = rules.withNeighbourhood(std::exp2(static_cast<double>(random() % 5) - 2.0), asking,
-                                    random() % 2 == 0);
+    rules =
+        rules.withNeighbourhood(std::exp2(static_cast<double>(random() % 5) - 2.0), asking, random() % 2 == 0,
+                                1 + static_cast<int>(random() % StateRules::kMostReach));
   }
   if (kind.neighbours && random() % 2 == 0) {
     rules = rules.withLatest(true);
@@ -93,14 +94,17 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
   }
   constexpr double kGains[] = {1.0, 0.1, 0.5, 2.0, 8.0, 1e-6, 1e6, 1e300};
   for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
-    rules = rules.withFreeGain(static_cast<ClassId>(id), kGains[random() % std::size(kGains)]);
+    const double gain = kGains[random() % std::size(kGains)];
+    const double stands_after = std::exp2(static_cast<double>(random() % 20) - 10.0);
+    rules = kind.stays ? rules.withFreeGain(static_cast<ClassId>(id), gain, stands_after)
+                       : rules.withFreeGain(static_cast<ClassId>(id), gain);
   }
   if (kind.gains) {
     ClassSet fixed;
     for (std::size_t id = 0; id < kind.classes; ++id) fixed[id] = random() % 2 == 0;
     rules = rules.withRemaining(random() % 4 == 0 ? 0.0 : kGains[random() % std::size(kGains)], fixed);
   }
-  if (kind.persistence) rules = rules.withPersistence(std::exp2(static_cast<double>(random() % 20) - 10.0));
+  if (kind.stays) rules = rules.withHitOfScan(std::exp2(static_cast<double>(random() % 20) - 11.0));
   return {std::move(map), rules};
 }
 
@@ -160,11 +164,11 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
   int n = 0;
   for (const auto evidence : {Kind::kPlain, Kind::kSparse, Kind::kTies, Kind::kExtreme}) {
     for (const bool gains : {false, true}) {
-      for (const bool persistence : {false, true}) {
+      for (const bool stays : {false, true}) {
         for (const double prior : {0.001, 1e-6, 1.0, 1e9}) {
           for (const auto& [classes, planes] : {std::pair{3, 0}, {1, 2}, {3, 6}, {20, 8}, {254, 1200}}) {
             const Kind kind{
-                static_cast<std::size_t>(classes), planes, prior, evidence, gains, persistence, n % 2 == 0};
+                static_cast<std::size_t>(classes), planes, prior, evidence, gains, stays, n % 2 == 0};
             const MapSnapshot made = randomMap(kind, random);
             for (const std::string& set : instructionSets())
               compare(made.map, made.rules, set, "map " + std::to_string(n));
@@ -181,17 +185,11 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOneAmongOtherBlocks) {
   std::mt19937 random(9);
   int n = 0;
   for (const auto evidence : {Kind::kPlain, Kind::kSparse, Kind::kTies, Kind::kExtreme}) {
-    for (const bool persistence : {false, true}) {
+    for (const bool stays : {false, true}) {
       for (const double prior : {0.001, 1.0}) {
         for (const auto& [classes, planes] : {std::pair{1, 2}, {3, 6}, {20, 8}}) {
-          const Kind kind{static_cast<std::size_t>(classes),
-                          planes,
-                          prior,
-                          evidence,
-                          true,
-                          persistence,
-                          n % 2 == 0,
-                          true};
+          const Kind kind{
+              static_cast<std::size_t>(classes), planes, prior, evidence, true, stays, n % 2 == 0, true};
           const MapSnapshot made = randomMap(kind, random);
           for (const std::string& set : instructionSets())
             compare(made.map, made.rules, set, "map " + std::to_string(n));

@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "kernel/sparse_kernel.h"
 #include "map/blocks_by_group.h"
 #include "rules/scan_rules.h"
 #include "update/sum_kernels.h"
@@ -26,6 +27,18 @@ std::vector<EvidenceUnits> unitsAfter(const ScanRules& rules, const std::vector<
   SumCounts counts;
   sumKernelsFor("").add(plane.values, {}, units.data(), counts);
   return units;
+}
+
+TEST(ScanRules, TheThresholdIsTheMostThatABeamAddsInTheGround) {
+  // A beam to level ground has the weight y / height at the height y, about y away from a voxel's centre.
+  const double peak = 0.3, length = 0.4, height = 1.5;
+  double most = 0.0;
+  for (double y = 0.0; y < length; y += 1e-4) {
+    most =
+        std::max(most, y / height * peak *
+                           static_cast<double>(sparseKernel(static_cast<float>(y * y / (length * length)))));
+  }
+  EXPECT_NEAR(groundThreshold(peak, length, height), most, 0.01 * most);
 }
 
 TEST(ScanRules, GiveBackWhatTheThresholdHasTakenAboveCrossedVoxels) {

@@ -89,7 +89,7 @@ TEST(VoxelState, WrongLabelsHardlyLowerTheClass) {
 struct RandomVoxel {
   std::vector<std::pair<int, float>> evidence;  ///< by class; may be empty
   std::array<double, 3> gains;
-  double persistence;
+  double stands_after;     ///< evidence
   double remaining = 0.0;  ///< gain of what remains
   ClassSet fixed;
 
@@ -99,13 +99,13 @@ struct RandomVoxel {
       if (random() % 3 != 0) evidence.emplace_back(id, std::exp(exponent(random)));
     }
     for (double& gain : gains) gain = std::exp(static_cast<double>(exponent(random)) / 3);
-    persistence = random() % 2 == 0 ? 0.0 : 2.0;
+    stands_after = random() % 2 == 0 ? std::numeric_limits<double>::infinity() : 2.0;
   }
   VoxelView view() const {
     const SemanticMap map = mapWith(evidence, 77);
-    StateRules rules = StateRules().withPersistence(persistence).withRemaining(remaining, fixed);
+    StateRules rules = StateRules().withRemaining(remaining, fixed);
     for (std::size_t id = 0; id < gains.size(); ++id) {
-      rules = rules.withFreeGain(static_cast<ClassId>(id), gains[id]);
+      rules = rules.withFreeGain(static_cast<ClassId>(id), gains[id], stands_after);
     }
     return viewPoint(map, rules, map.geometry().voxelCentre(GridGeometry::voxelOf({{0, 0, 0}}, 77)));
   }
@@ -122,7 +122,7 @@ struct RandomVoxel {
       best = each.first != kFreeClass && each.second > best.second ? each : best;
     if (best.first == kFreeClass) return 1.0;
     const auto id = static_cast<ClassId>(best.first);
-    const StateRules rules = StateRules().withFreeGain(id, gains[id]).withPersistence(persistence);
+    const StateRules rules = StateRules().withFreeGain(id, gains[id], stands_after);
     return static_cast<double>(rules.freeGain(id, best.second));
   }
 };
@@ -235,7 +235,7 @@ TEST(VoxelState, ProbabilitiesGrowWithTheirEvidence) {
   int labelled = 0;
   for (int n = 0; n < 1000; ++n) {
     RandomVoxel voxel(random);
-    voxel.persistence = 0.0;  // hits that lower a gain count twice
+    voxel.stands_after = std::numeric_limits<double>::infinity();  // hits that lower a gain count twice
     const VoxelView view = voxel.view(), crossed = voxel.with(kFreeClass, 0.5f).view();
     EXPECT_LE(crossed.occupancy, view.occupancy) << n;
     EXPECT_EQ(crossed.class_probability, view.class_probability) << n;
@@ -316,17 +316,19 @@ TEST(VoxelState, GainsDecideTheStateAndLeaveThePosterior) {
   EXPECT_EQ(view().state, VoxelState::kFree);
 }
 
-TEST(VoxelState, RepeatedHitsOutweighTheGain) {
-  // With a gain of 4, free wins with over a quarter of the hits' evidence; persistence lowers the gain.
-  const auto state = [](float hits, float free, double persistence) {
+TEST(VoxelState, WhatStandsOutweighsTheGain) {
+  // With a gain of 4, free wins with over a quarter of the hits' evidence, until the thing stands.
+  const auto state = [](float hits, float free, double stands_after) {
     const SemanticMap map = mapWith({{1, hits}, {kFreeClass, free}}, 77);
-    const StateRules rules = StateRules().withFreeGain(1, 4.0).withPersistence(persistence);
+    const StateRules rules = StateRules().withFreeGain(1, 4.0, stands_after);
     return viewVoxel(map, rules, {{0, 0, 0}}, *map.find({{0, 0, 0}}), 77).state;
   };
-  EXPECT_EQ(state(0.2f, 0.1f, 0.0), VoxelState::kFree);
-  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have been passing";  // gain 3.5
-  EXPECT_EQ(state(4.0f, 2.0f, 0.0), VoxelState::kFree);
-  EXPECT_EQ(state(4.0f, 2.0f, 1.0), VoxelState::kOccupied) << "twenty hits: it is parked";  // gain 1.05
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(state(0.2f, 0.1f, kNever), VoxelState::kFree);
+  EXPECT_EQ(state(0.2f, 0.1f, 1.0), VoxelState::kFree) << "one hit: it may have been passing";
+  EXPECT_EQ(state(4.0f, 2.0f, kNever), VoxelState::kFree);
+  EXPECT_EQ(state(4.0f, 2.0f, 4.0), VoxelState::kOccupied) << "it stands";
+  EXPECT_EQ(state(4.0f, 2.0f, 4.01), VoxelState::kFree);
   EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
 }
 

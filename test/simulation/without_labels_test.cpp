@@ -46,7 +46,7 @@ Kept map(const std::string& preset, std::size_t warnings) {
   const std::vector<std::string> said = settingWarnings(config, mapper.classes());
   EXPECT_EQ(said.size(), warnings) << preset;
   for (const std::string& sentence : said) {
-    EXPECT_NE(sentence.find("take the preset occupancy_only"), std::string::npos) << sentence;
+    EXPECT_NE(sentence.find("set sensor_model/height"), std::string::npos) << sentence;
   }
   const Scene scene = walkerBeforeAWall();
   LidarConfig lidar;
@@ -80,27 +80,23 @@ Kept map(const std::string& preset, std::size_t warnings) {
 }
 
 TEST(WithoutLabels, ThePresetForThemForgetsAWalker) {
-  const Kept kept = map("occupancy_only", 0);
+  const Kept kept = map("robot", 1);
   EXPECT_EQ(kept.person, 0.0);
   EXPECT_GT(kept.wall, 0.995);
 }
 
-// Its gains would keep him (OnlyPresetsThatNeedClassesAreWarnedOf); the latest looks need no classes.
-TEST(WithoutLabels, InAPresetThatNeedsClassesTheLatestLooksForgetAWalker) {
-  EXPECT_LT(map("robot", 1).person, 0.05);
-}
-
-TEST(WithoutLabels, OnlyPresetsThatNeedClassesAreWarnedOf) {
+TEST(WithoutLabels, OnlyTheHeightOfTheSensorIsAskedFor) {
   const ClassTable occupancy = loadClassTable(kConfig + "classes/occupancy.yaml"),
                    kitti = loadClassTable(kConfig + "classes/semantic_kitti.yaml");
-  for (const auto& [preset, needs] :
-       {std::pair("robot", true), std::pair("crowded", true), std::pair("small_cpu", true),
-        std::pair("occupancy_only", false), std::pair("paper_none", false), std::pair("paper_linear", false),
+  for (const auto& [preset, asks] :
+       {std::pair("robot", true), std::pair("paper_none", false), std::pair("paper_linear", false),
         std::pair("paper_line", false), std::pair("baseline_even", false)}) {
     MapperConfig config;
     setParameters(config, loadParameterFile(kConfig + "presets/" + preset + ".yaml"));
-    EXPECT_EQ(settingWarnings(config, occupancy).size(), needs ? 1u : 0u) << preset;
+    EXPECT_EQ(settingWarnings(config, occupancy).size(), asks ? 1u : 0u) << preset;
     EXPECT_TRUE(settingWarnings(config, kitti).empty()) << preset;
+    config.sensor_model.height = 1.73;
+    EXPECT_TRUE(settingWarnings(config, occupancy).empty()) << preset;
   }
 }
 

@@ -24,7 +24,7 @@ std::vector<Scan> stampedDrive() {
 MapperConfig robotConfig() {
   MapperConfig config = configOf();
   setParameters(config, loadParameterFile(BKI_MAPPING_SOURCE_DIR "/config/presets/robot.yaml"));
-  config.free_gain.latest = true;
+  config.rules.enabled = true;
   return config;
 }
 

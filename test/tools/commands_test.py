@@ -77,7 +77,7 @@ LEFT_OUT = {
                      'scripts/map_city drives/city.yaml --output city --scheduler tcp://FIRST_HOST:8786'),
                     'needs a cluster; city_test starts a scheduler and workers'),
     'roslaunch bki_mapping mapping.launch map_file:=~/city/ classes:=semantic_kitti': 'city_rostest starts such a node',
-    'PYTHONPATH=lab python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04 --void 0.6 2.4':
+    'PYTHONPATH=lab python3 -m figures.leave_one_out --scratch drives --sequence ~/kitti/sequences/04 --void 30 60':
         'takes long; figures_test measures a small case',
     'scripts/reproduce --scans 300': 'takes long; figures_test draws each figure on small cases',
 }

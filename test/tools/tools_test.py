@@ -176,9 +176,9 @@ class Tools(unittest.TestCase):
         self.assertLess(lines['sa'], 1.0)
         self.assertGreater(lines['sa'], 0.5)
         self.assertGreater(lines['da'], 0.0)
-        self.assertGreater(self.evaluation('free_space/hits_before_misses=true')['sa'], lines['sa'])
-        self.assertGreater(self.evaluation('free_gain/static=0.1')['sa'], lines['sa'])
-        self.assertGreater(self.evaluation('free_gain/dynamic=30')['da'], lines['da'])
+        ruled = self.evaluation('rules/enabled=true')
+        self.assertGreater(ruled['sa'], lines['sa'])
+        self.assertGreater(ruled['da'], lines['da'])
 
     def test_an_octomap_of_the_same_points_is_measured_beside(self):
         alone = self.evaluation()
@@ -195,20 +195,20 @@ class Tools(unittest.TestCase):
         self.assertIn('OctoMap of the same scans: SA ', self.table)
 
     def test_a_map_is_judged_by_other_gains(self):
-        gains = ('free_gain/dynamic=30', 'free_gain/static=0.1,free_gain/dynamic=30,free_gain/persistence=2')
-        judged = self.evaluation(more=[word for each in gains for word in ('--judge', each)])['judged']
+        gains = ('rules/stands_after=1', 'rules/stands_after=9,rules/living_stands_after=1,rules/together=0')
+        judged = self.evaluation('rules/enabled=true', more=[word for each in gains for word in ('--judge', each)])['judged']
         table = self.table
         self.assertEqual([each.pop('settings') for each in judged], list(gains))
         for given, figures in zip(gains, judged):
             self.assertIn(f'with {given}: SA ', table)
-            mapped = self.evaluation(*given.split(','))
+            mapped = self.evaluation('rules/enabled=true', *given.split(','))
             self.assertEqual(figures, {name: mapped[name] for name in figures})
         self.assertNotEqual(judged[0]['sa'], judged[1]['sa'])
         sequence = ('--sequence', self.drive)
-        self.fails('changes more than decisions', 'evaluate_map', *sequence, '--judge', 'free_gain/static=1,scan_limit/free=1')
-        self.fails("has no '='", 'evaluate_map', *sequence, '--judge', 'free_gain/static')
-        self.fails('given twice', 'evaluate_map', *sequence, '--judge', 'free_gain/static=1,free_gain/static=2')
-        self.fails('free_gain/', 'evaluate_map', *sequence, '--judge', 'free_gain/dynamics=1')
+        self.fails('changes more than decisions', 'evaluate_map', *sequence, '--judge', 'rules/stands_after=1,rules/void_outweighs=1')
+        self.fails("has no '='", 'evaluate_map', *sequence, '--judge', 'rules/stands_after')
+        self.fails('given twice', 'evaluate_map', *sequence, '--judge', 'rules/together=1,rules/together=2')
+        self.fails('rules/together only', 'evaluate_map', *sequence, '--judge', 'rules/stand_after=1')
 
     def cloud_figures(self, drive, *more):
         result = call('evaluate_map', '--sequence', drive, '--late', '1', '--cloud', '--json', self.path('figures.json'), *more)
@@ -434,8 +434,7 @@ class Tools(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             with open(self.path('figures.json')) as file:
                 figures[name[:-len('.yaml')]] = json.load(file)
-        self.assertEqual(set(figures), {'baseline_even', 'crowded', 'occupancy_only', 'paper_line', 'paper_linear',
-                                        'paper_none', 'robot', 'small_cpu'})
+        self.assertEqual(set(figures), {'baseline_even', 'paper_line', 'paper_linear', 'paper_none', 'robot'})
         self.assertEqual(figures['paper_none']['sa'], 1.0)
         for figure in ('sa', 'sa_ground', 'sa_standing', 'sa_other'):
             self.assertGreater(figures['robot'][figure], figures['paper_line'][figure], figure)
@@ -690,7 +689,7 @@ class Tools(unittest.TestCase):
     def test_inspecting(self):
         a, report, json_file = self.path('inspected.bkm'), self.path('inspected_report.json'), self.path('inspected.json')
         self.succeeds('map_sequence', '--sequence', self.drive, '--output', a, '--report', report, '--set',
-                      'free_gain/static=0.2')
+                      'rules/enabled=true')
         top, profile = self.path('top.png'), self.path('profile.png')
         printed = self.succeeds('inspect_map', a, '--json', json_file, '--top', top, '--profile', profile).stdout
         with open(report) as mapped, open(json_file) as file:
@@ -707,7 +706,7 @@ class Tools(unittest.TestCase):
         for picture in (top, profile):
             with open(picture, 'rb') as file:
                 self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
-        self.assertIn('\n  static: 0.2\n', self.succeeds('inspect_map', a, '--parameters').stdout)
+        self.assertIn('\n  enabled: true\n', self.succeeds('inspect_map', a, '--parameters').stdout)
         before = self.tiles_of(a)
         self.fails('must end in .png', 'inspect_map', a, '--top', a)
         self.assertEqual(self.tiles_of(a), before)
@@ -732,7 +731,7 @@ class Tools(unittest.TestCase):
             return file.read()
 
     def test_a_map_exports_as_its_drive_does(self):
-        gain = ('--set', 'free_gain/static=0.2')
+        gain = ('--set', 'rules/enabled=true')
         a, exported = self.mapped('exported.bkm', *gain), self.path('exported.ply')
         for states in ('occupied', 'occupied,free'):
             self.mapped('direct.ply', '--include', states, *gain)

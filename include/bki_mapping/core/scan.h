@@ -19,6 +19,9 @@ namespace bki_mapping {
 struct SensorModelConfig {
   double min_range = 0.0;   ///< hits closer than this are dropped [m]
   double max_range = -1.0;  ///< hits beyond this do not occupy voxels [m]; -1: not known
+  /// Of the sensor above level ground [m]; 0: found from the hits of classes flagged ground. Only used by
+  /// RulesConfig::enabled.
+  double height = 0.0;
 
   /// With an unknown max_range, points beyond this are taken for faults of the driver [m]: they neither
   /// occupy nor clear. Lidars see up to about 250 m, but a corrupt point may lie anywhere.

@@ -9,9 +9,6 @@ struct KernelConfig {
   KernelType type = KernelType::kSparse;
   double length = 0.0;  ///< support radius l [m]; 0: equal to the resolution
   double scale = 0.1;   ///< sigma0, the kernel's value at distance 0
-  /// Whether hits of classes that cannot move add evidence to all voxels within l, as other hits do, or all
-  /// of it to the voxel that contains them.
-  bool static_spread = true;
 
   /// The support radius that applies [m]. @param resolution edge of a voxel [m].
   double lengthFor(double resolution) const { return length > 0.0 ? length : resolution; }

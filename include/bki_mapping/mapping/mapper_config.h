@@ -10,7 +10,7 @@
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/free_space/free_space_config.h"
 #include "bki_mapping/kernel/kernel_config.h"
-#include "bki_mapping/rules/free_gain_config.h"
+#include "bki_mapping/rules/rules_config.h"
 #include "bki_mapping/rules/scan_limit_config.h"
 
 namespace bki_mapping {
@@ -26,7 +26,7 @@ struct MapperConfig {
   double memory_limit = 0.0;           ///< of the map [MB]; a scan that would exceed it is refused; 0: none
   KernelConfig kernel;
   FreeSpaceConfig free_space;
-  FreeGainConfig free_gain;
+  RulesConfig rules;
   ScanLimitConfig scan_limit;
   SensorModelConfig sensor_model;
   bool clear_beyond_max_range = true;  ///< beams of hits beyond max_range clear space up to there
@@ -35,6 +35,11 @@ struct MapperConfig {
   UnknownLabels unknown_labels = UnknownLabels::kIgnore;
   LabelValues label_values = LabelValues::kRaw;
 };
+
+/// The settings that apply, which are others than those given if rules.enabled: evidence counts scans, so
+/// that prior, kernel.scale and scan_limit follow from the rules, and down-sampling cells divide a voxel into
+/// whole parts, at least two along each edge, of about downsample_resolution.
+MapperConfig applied(const MapperConfig& config);
 
 using Parameter = NamedParameter<MapperConfig>;
 

@@ -29,7 +29,7 @@ class SemanticMapper {
   /// index. @throws ScanRefused if the scan exceeds scan_limit/blocks or memory. The map is then unchanged.
   ScanStats integrate(const ScanView& scan);
 
-  /// Withdraws a scan that was integrated with the current settings. Looks stay (free_gain/latest); otherwise
+  /// Withdraws a scan that was integrated with the current settings. Looks stay (rules/latest); otherwise
   /// the map is then the same, to the bit, as
   /// if the scan had never been integrated, regardless of later scans; voxels whose evidence had saturated
   /// are an exception (ScanStats::saturated). Withdrawing a scan that is not in the map leaves negative
@@ -94,6 +94,8 @@ class SemanticMapper {
   /// The stages that a scan passes; holds all working memory.
   struct Pipeline;
   Pipeline& pipeline();
+  /// The threshold of free space for a scan, whose hits the pipeline holds.
+  double thresholdFor(const ScanView& scan, const Pipeline& p) const;
 
   ScanStats addOrWithdraw(const ScanView& scan, bool withdraws);
   ScanStats add(const ScanView& scan, bool withdraws);

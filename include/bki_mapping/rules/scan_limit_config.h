@@ -1,15 +1,20 @@
-/// @file Settings of what one scan may add to the map; rules/scan_rules.h has the rules. The paper has none
-/// of them, and by default none applies.
+/// @file What one scan may add to the map, in units of evidence; rules/scan_rules.h has the rules.
 #pragma once
 
 #include <cstdint>
 
+#include "bki_mapping/rules/rules_config.h"
+
 namespace bki_mapping {
 
-/// What one scan may add to a voxel; by default all of it.
+/// What one scan may add to a voxel; by default all of it, as in the paper. With RulesConfig::enabled, all
+/// but `blocks` follows from RulesConfig (limitsOf).
 struct ScanLimitConfig {
   bool hits_before_misses = false;      ///< a voxel with a hit takes no evidence for `free` from its scan
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
+  /// Whether hits of classes that cannot move add evidence to all voxels within the kernel, as other hits do,
+  /// or all of it to the voxel that contains them.
+  bool static_spread = true;
   // The largest evidence that a scan adds; 0: no limit.
   double hits = 0.0;  ///< for all classes together; larger sums are scaled down
   double free = 0.0;  ///< for `free`; larger sums are cut off
@@ -25,5 +30,12 @@ struct ScanLimitConfig {
 
   static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< 0.5 GB for each class that they all hold
 };
+
+/// The limits that rules set; free_threshold is 0, because each scan has its own.
+ScanLimitConfig limitsOf(const RulesConfig& rules);
+/// ScanLimitConfig::free_threshold of a scan: the most that a beam which ends on level ground adds to a voxel
+/// whose centre is in the ground. @param peak of the kernel. @param height of the sensor above the ground
+/// [m].
+double groundThreshold(double peak, double length, double height);
 
 }  // namespace bki_mapping

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <limits>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/map/semantic_map.h"
-#include "bki_mapping/rules/free_gain_config.h"
+#include "bki_mapping/rules/rules_config.h"
 
 namespace bki_mapping {
 
@@ -17,23 +17,24 @@ namespace bki_mapping {
 /// another one.
 class StateRules {
  public:
-  StateRules() { free_gains_.fill(1.0f); }
-  StateRules(const FreeGainConfig& config, const ClassTable& classes);
+  StateRules() { free_gains_.fill(1.0f), stands_after_.fill(0.0f); }
+  /// @param resolution edge of a voxel [m].
+  StateRules(const RulesConfig& config, const ClassTable& classes, double resolution);
 
-  /// Gain on the evidence for `free`; 1 unless set. With a persistence P > 0, a gain above 1 decays towards 1
-  /// as 1 + (gain - 1) exp(-hits / P), so that an object that is hit scan after scan stays occupied even if
-  /// its class can move (Equation 12).
+  /// Gain on the evidence for `free`; 1 unless set. A gain above 1 is that of what passes; from some evidence
+  /// of hits on, the thing stands, and the gain is 1 (Equation 12).
   /// @param id of the class with the most evidence. @param hits the evidence for that class.
   float freeGain(ClassId id, float hits) const {
     const float gain = free_gains_[id];
-    if (gain <= 1.0f || persistence_ <= 0.0f) return gain;
-    return 1.0f + (gain - 1.0f) * std::exp(-hits / persistence_);
+    return gain > 1.0f && hits >= stands_after_[id] ? 1.0f : gain;
   }
+  /// Evidence of hits from which on a gain above 1 is 1; infinite if it never is.
+  float standsAfter(ClassId id) const { return stands_after_[id]; }
   /// Whether the gain of a class without hits is above 1, as that of classes that can move should be.
   bool canLeave(ClassId id) const { return free_gains_[id] > 1.0f; }
-  StateRules withFreeGain(ClassId id, double gain) const;
-  /// @param persistence in units of evidence; 0: gains do not decay.
-  StateRules withPersistence(double persistence) const;
+  /// @param stands_after evidence of hits, for a gain above 1.
+  StateRules withFreeGain(ClassId id, double gain,
+                          double stands_after = std::numeric_limits<double>::infinity()) const;
 
   /// Gain with which a fixed class, one that cannot move, keeps a voxel that its likeliest class has left; 0,
   /// the default: such a voxel is free (Equation 12a).
@@ -47,16 +48,26 @@ class StateRules {
   bool asksNeighbourhood(ClassId id) const { return asking_[id]; }
   /// Whether the neighbourhood of a voxel includes voxels below it.
   bool neighbourhoodIsBelow() const { return neighbourhood_is_below_; }
-  /// @param is_below false where floors ask, too: they would keep whatever moves on them.
-  StateRules withNeighbourhood(double ratio, const ClassSet& asking, bool is_below = true) const;
-  /// The most that one voxel counts for in a neighbourhood [units].
+  /// The voxels that are asked are those of a cube about the voxel, this far from it along each axis.
+  int neighbourhoodReach() const { return neighbourhood_reach_; }
+  static constexpr int kMostReach = 7;
+  /// @param is_below false where floors ask, too: they would keep whatever moves on them. @param reach 1 to
+  /// kMostReach [voxels].
+  StateRules withNeighbourhood(double ratio, const ClassSet& asking, bool is_below = true,
+                               int reach = 2) const;
+
+  /// @param evidence of a scan that hits a voxel; 0: not known.
+  StateRules withHitOfScan(double evidence) const;
+  /// The most that one voxel counts for in a neighbourhood [units]: the hits of kMostVotes scans; beyond
+  /// that, further hits say nothing new.
   EvidenceUnits mostVote() const {
-    constexpr float kPersistences = 8.0f, kMost = kMostVote * kEvidenceUnit;
-    if (!(persistence_ > 0.0f)) return kMostVote;
-    return std::max(unitsOf(std::min(kPersistences * persistence_, kMost)), 1);
+    if (!(hit_of_scan_ > 0.0f)) return kMostVote;
+    return std::max(unitsOf(std::min(kMostVotes * hit_of_scan_, kMostVote * kEvidenceUnit)), 1);
   }
-  /// The same without a persistence, or with one above 16; sums over a neighbourhood then still fit 32 bits.
-  static constexpr EvidenceUnits kMostVote = 1 << 23;
+  static constexpr int kMostVotes = 16;
+  /// The same where the evidence of a scan is not known or large; sums over a neighbourhood then still fit 32
+  /// bits.
+  static constexpr EvidenceUnits kMostVote = 1 << 19;
 
   /// Whether what the latest scans saw of a voxel decides, where that is clear, and not the sum (Equation
   /// 12c).
@@ -68,8 +79,9 @@ class StateRules {
   bool decidesAs(const StateRules& other) const;
 
  private:
-  std::array<float, 256> free_gains_;
-  float persistence_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
+  std::array<float, 256> free_gains_, stands_after_;
+  float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
+  int neighbourhood_reach_ = 2;
   ClassSet fixed_, asking_;
   bool neighbourhood_is_below_ = true, latest_decides_ = false;
 };

@@ -36,15 +36,11 @@ void set(Config& config, const std::string& name, const std::string& value) {
 }
 
 const std::vector<std::string> kNumbers = {"free_space_gap",
-                                           "free_gain_dynamic",
-                                           "free_gain_living",
-                                           "free_gain_static",
-                                           "free_gain_persistence",
-                                           "free_gain_remaining",
-                                           "scan_limit_hits",
-                                           "scan_limit_free",
-                                           "scan_limit_free_threshold",
-                                           "scan_limit_void",
+                                           "rules_void_outweighs",
+                                           "rules_stands_after",
+                                           "rules_living_stands_after",
+                                           "rules_together",
+                                           "sensor_model_height",
                                            "tf_timeout",
                                            "memory_limit",
                                            "sensor_model_min_range",
@@ -74,17 +70,12 @@ void setAllowed(Config& config, Dice& dice) {
   if (sometimes())
     set(config, "free_space_weight", dice.oneOf<std::string>(Words{"uniform", "linear", "bilinear"}));
   if (sometimes()) set(config, "free_space_extent", dice.oneOf<std::string>(Words{"mapped", "observed"}));
-  for (const char* name : {"kernel_static_spread", "free_space_hits_before_misses",
-                           "free_space_evidence_before_misses", "clear_beyond_max_range"}) {
-    if (sometimes()) set(config, name, dice.oneIn(2));
+  if (sometimes()) set(config, "clear_beyond_max_range", dice.oneIn(2));
+  for (const char* name : {"rules_void_outweighs", "rules_stands_after", "rules_living_stands_after"}) {
+    if (sometimes()) set(config, name, dice.oneIn(4) ? 0.0 : dice.between(0.5, 100.0));
   }
-  for (const char* name : {"free_gain_dynamic", "free_gain_static"}) {
-    if (sometimes()) set(config, name, dice.between(0.01, 100.0));
-  }
-  for (const char* name : {"free_gain_living", "free_gain_persistence", "free_gain_remaining",
-                           "scan_limit_hits", "scan_limit_free", "scan_limit_void"}) {
-    if (sometimes()) set(config, name, dice.oneIn(2) ? 0.0 : dice.between(0.01, 10.0));
-  }
+  if (sometimes()) set(config, "rules_together", dice.oneIn(4) ? 0.0 : dice.between(0.1, 3.0));
+  if (sometimes()) set(config, "sensor_model_height", dice.oneIn(4) ? 0.0 : dice.between(0.1, 3.0));
   if (sometimes()) set(config, "sensor_model_min_range", dice.between(0.0, 2.0));
   if (sometimes()) set(config, "sensor_model_max_range", dice.between(0.1, 40.0));
   if (sometimes()) set(config, "occlusion", dice.oneOf<std::string>(Words{"none", "mapped", "all"}));
@@ -167,10 +158,10 @@ const std::vector<SettingsKind>& settingsKinds() {
       {"settings/outside", "one number just beyond its limits, which clients show",
        [](Config& config, Dice& dice) {
          const auto [name, value] =
-             dice.oneOf<std::pair<std::string, double>>({{"free_gain_dynamic", -1.0},
-                                                         {"free_gain_static", 0.0},
+             dice.oneOf<std::pair<std::string, double>>({{"rules_stands_after", -1.0},
+                                                         {"rules_void_outweighs", -1e-9},
                                                          {"sensor_model_min_range", -0.1},
-                                                         {"scan_limit_hits", -1e-9},
+                                                         {"rules_together", 11.0},
                                                          {"publish_rate", 0.0}});
          set(config, name, value);
        }},

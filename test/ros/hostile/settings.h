@@ -15,17 +15,7 @@ struct Settings {
 
 inline const std::vector<Settings>& allSettings() {
   static const std::vector<Settings> all = {
-      {"robot",
-       {{"kernel/scale", "100"},
-        {"kernel/static_spread", "false"},
-        {"free_space/hits_before_misses", "true"},
-        {"free_space/evidence_before_misses", "true"},
-        {"scan_limit/hits", "0.2"},
-        {"scan_limit/free", "0.1"},
-        {"free_gain/static", "0.1"},
-        {"free_gain/dynamic", "8"},
-        {"free_gain/persistence", "0.5"},
-        {"sensor_model/max_range", "60"}}},
+      {"robot", {{"rules/enabled", "true"}, {"sensor_model/max_range", "60"}}},
       {"window_below_a_block", {{"window", "0.5"}, {"sensor_model/max_range", "20"}}},
       {"defaults", {{"window", "0"}}},
       {"coarse",

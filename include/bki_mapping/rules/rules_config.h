@@ -1,0 +1,28 @@
+/// @file Settings of the rules that the paper does not have, in scans and metres; docs/method.md has the
+/// rules.
+#pragma once
+
+namespace bki_mapping {
+
+/// With `enabled`, a scan counts once in a voxel, however many of its points and beams there are, and the
+/// rules of docs/method.md, "Ours", apply. By default none applies: the map is the paper's.
+struct RulesConfig {
+  bool enabled = false;
+  double hit_outweighs = 13.0;        ///< number of scans that cross a voxel, to outweigh one that hits it
+  double void_outweighs = 30.0;       ///< number of scans that hit a voxel, to outweigh one that sees it void
+  double stands_after = 5.0;          ///< number of scans with hits from which on what can be parked stands
+  double living_stands_after = 12.0;  ///< the same for classes flagged living
+  double together = 0.6;              ///< how far away voxels decide together [m]; 0: each by itself
+  bool latest = true;                 ///< whether what the latest scans saw of a voxel comes first
+
+  // Evidence of a scan. Only ratios matter. The kernel's peak is far above what a scan may add, so that
+  // hits count alike wherever they are in their voxel; the prior is far below.
+  static constexpr double kPeak = 0.3, kPrior = 1e-4;
+  /// Of a scan that crosses a voxel, and the least sum of its beams that counts as crossing: 1/200 of the
+  /// peak is well above what the fringe of a kernel adds.
+  static constexpr double kCrossing = kPeak / 200.0;
+  double hit() const { return hit_outweighs * kCrossing; }     ///< of a scan that hits a voxel
+  double emptiness() const { return void_outweighs * hit(); }  ///< of one that sees a voxel void
+};
+
+}  // namespace bki_mapping

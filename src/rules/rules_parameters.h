@@ -1,0 +1,60 @@
+/// @file The named parameters of RulesConfig.
+#pragma once
+
+#include <vector>
+
+#include "bki_mapping/core/named_parameter.h"
+#include "bki_mapping/rules/rules_config.h"
+
+namespace bki_mapping {
+
+inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
+  using C = RulesConfig;
+  const NumberRange scans = NumberRange::atLeast(1.0).upTo(1000.0);
+  return {
+      truthParameter(
+          "enabled", &C::enabled, Changes::kAtStart,
+          "Whether the mapper's own rules apply, which the paper does not have: a scan counts once "
+          "in a voxel, what stands is kept although beams graze it, and what has left is cleared. "
+          "The other settings of rules/ then say how."),
+      realParameter(
+          "hit_outweighs", &C::hit_outweighs, NumberRange::atLeast(1.0).upTo(100.0), "scans",
+          Changes::kAtStart,
+          "How many scans whose beams cross a voxel it takes to outweigh one that hits it, where what "
+          "can move stands. Lower it to clear what has left after a long stop sooner; raise it to keep "
+          "parked things that beams graze."),
+      realParameter(
+          "void_outweighs", &C::void_outweighs, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
+          Changes::kWhileMapping,
+          "How many scans that hit a voxel are outweighed by one that sees it void: crossed together "
+          "with all voxels around it. What stands has an inside that no beam crosses. 0 lets only "
+          "crossings count."),
+      realParameter(
+          "stands_after", &C::stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
+          Changes::kWhileMapping,
+          "How many scans must hit a voxel of 0.3 m until what can be parked stands there; before that, one "
+          "scan that crosses the voxel clears it. Larger voxels take more scans, smaller ones fewer: in "
+          "proportion to the edge plus "
+          "0.2 m. If no class is flagged dynamic, all things stand after two scans, or this many "
+          "if fewer. "
+          "Lower it to keep what stands sooner; raise it to clear slow traffic."),
+      realParameter(
+          "living_stands_after", &C::living_stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
+          Changes::kWhileMapping,
+          "The same for classes with the flag living: people, riders, animals. They take a few scans "
+          "to leave a voxel, and stop more often than they stay."),
+      realParameter(
+          "together", &C::together, NumberRange::atLeast(0.0).upTo(10.0), "m", Changes::kWhileMapping,
+          "How far away the voxels of what can be parked decide together whether it is still there. "
+          "It is rounded to whole voxels, at least one and at most seven. Set it to a part of the "
+          "things that come and go; 0 lets each voxel decide by itself."),
+      truthParameter(
+          "latest", &C::latest, Changes::kAtStart,
+          "Whether the map knows time: a voxel whose latest look was a hit is occupied, one that has "
+          "been seen void in two intervals of 0.27 s since is free, and one that was hit for long "
+          "and is crossed since stays; elsewhere all scans decide. Needs stamped scans; takes 0.5 to "
+          "1.1 kB of memory a block. False lets all scans decide alike."),
+  };
+}
+
+}  // namespace bki_mapping
