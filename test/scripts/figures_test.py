@@ -16,7 +16,7 @@ import matplotlib  # noqa: E402
 matplotlib.use('Agg')
 import matplotlib.image  # noqa: E402
 
-from figures import complexity, frontier, leave_one_out, method, plane, tradeoff  # noqa: E402
+from figures import complexity, frontier, leave_one_out, method, plane, quality, tradeoff  # noqa: E402
 from figures.programs import Programs  # noqa: E402
 
 
@@ -75,11 +75,24 @@ class Figures(unittest.TestCase):
         gains = leave_one_out.judgements()[:2]
         preset = os.path.join(SOURCE, 'config', 'presets', 'robot.yaml')
         figures_of = leave_one_out.measured(self.programs, {'drive': self.drive, 'again': self.drive}, preset,
-                                            [0.6], gains)
-        self.assertEqual(list(figures_of), ['scan_limit/void=0.6,' + gain for gain in gains])
+                                            [30.0], gains)
+        self.assertEqual(list(figures_of), ['rules/void_outweighs=30,' + gain for gain in gains])
         for figures in figures_of.values():
             self.assertEqual(figures['drive'], figures['again'])
             self.assertGreater(figures['drive']['sa'], 0.5)
+
+    def test_the_table_of_quality_replaces_that_between_its_markers(self):
+        preset = os.path.join(SOURCE, 'config', 'presets', 'robot.yaml')
+        rows = quality.measured(self.programs, {'drive': self.drive}, (0.2, 0.4), ['--config', preset])
+        self.assertEqual([row[:2] for row in rows], [['drive', '0.2'], ['drive', '0.4']])
+        for row in rows:
+            self.assertEqual(len(row), len(quality.HEADER))
+            self.assertGreater(float(row[quality.HEADER.index('SA')]), 95.0)
+        self.assertEqual(quality.replaced(f'a\n{quality.BEGIN}old\n{quality.END}b\n', 'new\n'),
+                         f'a\n{quality.BEGIN}new\n{quality.END}b\n')
+        for text in ('no markers', quality.END + quality.BEGIN, 2 * (quality.BEGIN + quality.END)):
+            with self.assertRaises(SystemExit):
+                quality.replaced(text, 'new\n')
 
     def test_tradeoff_and_views(self):
         modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}
