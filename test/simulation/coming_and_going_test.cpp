@@ -17,9 +17,9 @@ namespace {
 const std::string kTables = std::string(BKI_MAPPING_SOURCE_DIR) + "/config/";
 
 /// A place that a standing lidar of 32 rows maps ten times a second; map and world frame are one.
-class Place {
+class MappedPlace {
  public:
-  explicit Place(std::vector<Shape> shapes) {
+  explicit MappedPlace(std::vector<Shape> shapes) {
     scene_.shapes = std::move(shapes);
     lidar_ = lidarNamed("hdl32");
     lidar_.columns = 720;
@@ -68,9 +68,9 @@ TEST(ComingAndGoing, ADoorOfAClassThatCannotMoveOpensAndCloses) {
   Shape door = box(6.15, 0.0, 1.05, 0.1, 1.4, 2.1, kBuilding);
   const Eigen::Vector3d slide(0.0, 1.4, 0.0);
   door.legs = {{5.0, Eigen::Vector3d::Zero()}, {6.0, slide}, {11.0, Eigen::Vector3d::Zero()}, {12.0, -slide}};
-  Place place({door, box(6.15, 3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
-               box(6.15, -3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
-               box(10.0, 0.0, 1.2, 0.2, 12.0, 2.4, kBuilding)});
+  MappedPlace place({door, box(6.15, 3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
+                     box(6.15, -3.7, 1.2, 0.2, 6.0, 2.4, kBuilding),
+                     box(10.0, 0.0, 1.2, 0.2, 12.0, 2.4, kBuilding)});
   const auto doorway =
       place.mapUntil(5.0, {Eigen::Vector3d(6.0, -0.45, 0.35), Eigen::Vector3d(6.3, 0.45, 1.7)});
   ASSERT_GT(doorway.size(), 8u);
@@ -91,7 +91,7 @@ TEST(ComingAndGoing, APersonSitsDownOnTheGroundAndGetsUp) {
   const Eigen::Vector3d down(0.0, 0.0, -2.0);  // for half a second: onto the ground
   person.legs = {{4.0, Eigen::Vector3d::Zero()}, {4.5, down}, {9.0, Eigen::Vector3d::Zero()}, {9.5, -down}};
   shapes.push_back(person);
-  Place place(shapes);
+  MappedPlace place(shapes);
   const auto column = [](double low, double high) {
     return Eigen::AlignedBox3d(Eigen::Vector3d(3.6, -0.2, low), Eigen::Vector3d(4.4, 0.6, high));
   };
