@@ -65,7 +65,8 @@ po::options_description options() {
       "octomap", po::bool_switch(),
       "also map the same points with OctoMap, with its defaults, and measure that map")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
-      "also give SA and DA of the same map with other values of rules/stands_after, rules/living_stands_after or rules/together; repeatable")(
+      "also give SA and DA of the same map with other values of rules/stands_after, "
+      "rules/living_stands_after or rules/together; repeatable")(
       "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
       "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
@@ -259,8 +260,8 @@ std::vector<Judgement> judgements(const po::variables_map& given, const MapperCo
     for (std::string name; std::getline(names, name, ',');) {
       const std::string changed = name.substr(0, name.find('='));
       if (std::find(std::begin(kDecide), std::end(kDecide), changed) != std::end(kDecide)) continue;
-      throw std::invalid_argument("--judge " + settings + " changes more than decisions; give it " + kDecide[0] +
-                                  ", " + kDecide[1] + " or " + kDecide[2] + " only");
+      throw std::invalid_argument("--judge " + settings + " changes more than decisions; give it " +
+                                  kDecide[0] + ", " + kDecide[1] + " or " + kDecide[2] + " only");
     }
     all.push_back({settings, tools::withSettings(config, "--judge", settings)});
   }
