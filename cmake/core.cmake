@@ -71,7 +71,8 @@ bki_mapping_core_room(beams SOURCES
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
 bki_mapping_core_room(free_space SOURCES *.cpp  # each mode is a file
   LINK bki_mapping_beams bki_mapping_points)
-bki_mapping_core_room(mapping SOURCES former_parameters.cpp parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp sensor_height.cpp soft_merge.cpp
+bki_mapping_core_room(mapping SOURCES
+    former_parameters.cpp parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp sensor_height.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
 
 bki_mapping_kernels(rules limit_kernels)

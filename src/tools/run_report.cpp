@@ -101,7 +101,7 @@ std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig
   if (saturated > 0) {
     text += (text.empty() ? "" : "\n") + std::to_string(saturated) +
             " sums of voxels went beyond the greatest evidence, 32768, and were cut there; lower "
-            "kernel/scale, or set scan_limit";
+            "kernel/scale, or set rules/enabled";
   }
   return text;
 }
