@@ -113,6 +113,7 @@ struct SemanticMapper::Pipeline {
   LazyBeamField beams;
   std::unique_ptr<FreeSpaceModel> free_space;
   Occlusion occlusion;
+  SensorHeight height;
   MapUpdater updater;
 
   Pipeline(const MapperConfig& asked, const GridGeometry& geometry, const ClassTable& classes)
@@ -124,8 +125,18 @@ struct SemanticMapper::Pipeline {
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
-        occlusion(config.occlusion) {
+        occlusion(config.occlusion),
+        height(classes) {
     rules.keeps_looks = config.rules.enabled && config.rules.latest;
+  }
+
+  /// The threshold of free space for a scan, whose hits the preprocessor holds.
+  double thresholdFor(const ScanView& scan) {
+    if (!config.rules.enabled) return config.scan_limit.free_threshold;
+    double above = scan.sensor_model.value_or(config.sensor_model).height;
+    if (!(above > 0.0)) above = height.in(preprocessor.hitGroups());
+    if (!(above > 0.0)) return 0.0;
+    return groundThreshold(config.kernel.scale, config.kernel.lengthFor(config.resolution), above);
   }
 };
 
@@ -254,14 +265,6 @@ ScanStats SemanticMapper::addOrWithdraw(const ScanView& scan, bool withdraws) {
   }
 }
 
-double SemanticMapper::thresholdFor(const ScanView& scan, const Pipeline& p) const {
-  if (!p.config.rules.enabled) return p.config.scan_limit.free_threshold;
-  double height = scan.sensor_model.value_or(p.config.sensor_model).height;
-  if (!(height > 0.0)) height = heightAboveGround(p.preprocessor.hitGroups(), *classes_);
-  if (!(height > 0.0)) return 0.0;
-  return groundThreshold(p.config.kernel.scale, p.config.kernel.lengthFor(p.config.resolution), height);
-}
-
 /// Turns the hits and the free space of a scan into evidence, and adds the evidence to the map, or subtracts
 /// it.
 ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
@@ -291,7 +294,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
     evidence.occlusion = &p.occlusion;
   }
-  p.rules.free_threshold = static_cast<float>(thresholdFor(scan, p));
+  p.rules.free_threshold = static_cast<float>(p.thresholdFor(scan));
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 

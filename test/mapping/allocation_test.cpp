@@ -114,6 +114,20 @@ TEST(Allocation, NoneInTheSteadyState) {
   }
 }
 
+TEST(Allocation, NoneInTheSteadyStateWithRules) {
+  const Scan scan = everywhere();
+  for (const double height : {0.0, 1.7}) {  // found in each scan, and given
+    MapperConfig config;
+    config.free_space.extent = FreeSpaceExtent::kObserved;
+    config.rules.enabled = true;
+    config.sensor_model.height = height;
+    config.threads = 1;
+    SemanticMapper mapper(config, reference::tableWithDynamicClass());
+    for (int time = 0; time < 3; ++time) mapper.integrate(scan);
+    for (int time = 0; time < 5; ++time) EXPECT_EQ(allocationsOf(mapper, scan), 0u) << height;
+  }
+}
+
 TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {
   // Any thread may get any job, so that a thread's memory may grow late, but not forever.
   const Scan scan = everywhere();

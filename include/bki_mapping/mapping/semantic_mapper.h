@@ -94,8 +94,6 @@ class SemanticMapper {
   /// The stages that a scan passes; holds all working memory.
   struct Pipeline;
   Pipeline& pipeline();
-  /// The threshold of free space for a scan, whose hits the pipeline holds.
-  double thresholdFor(const ScanView& scan, const Pipeline& p) const;
 
   ScanStats addOrWithdraw(const ScanView& scan, bool withdraws);
   ScanStats add(const ScanView& scan, bool withdraws);
