@@ -110,9 +110,10 @@ HARMLESS = re.compile(r'rviz/glsl120/indexed_8bit_image|Failed to contact master
 
 
 def crashed_while_drawing(process):
-    """Whether this was rviz, which had started and listened before, with a segmentation fault. The software renderer that
-    it uses here (Mesa's swrast_dri.so) has one now and then."""
-    return 'rviz' in process.command and process.returncode in (-signal.SIGSEGV, 128 + signal.SIGSEGV)
+    """Whether this was rviz, which had started and listened before, with a fault of memory. With the software renderers of
+    Mesa it has one now and then, in swrast_dri.so, libLLVM or, later, in the C library."""
+    faults = signal.SIGSEGV, signal.SIGABRT
+    return 'rviz' in process.command and process.returncode in {code for n in faults for code in (-n, 128 + n)}
 
 
 def text_of(document):
@@ -197,7 +198,8 @@ class Shell:
         self.master = f'http://localhost:{self.port}'
         self.environment = {'HOME': self.home, 'PATH': '/usr/bin:/bin', 'LANG': 'C.UTF-8', 'TERM': 'dumb',
                             'ROS_MASTER_URI': self.master, 'ROS_HOSTNAME': 'localhost', 'DISPLAY': display,
-                            'LIBGL_ALWAYS_SOFTWARE': '1', 'XDG_RUNTIME_DIR': folder, **SHORT_BENCHMARKS}
+                            'LIBGL_ALWAYS_SOFTWARE': '1', 'GALLIUM_DRIVER': 'softpipe', 'XDG_RUNTIME_DIR': folder,
+                            **SHORT_BENCHMARKS}
         self.running = []
 
     def start(self, command):
