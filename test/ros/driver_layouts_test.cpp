@@ -156,9 +156,6 @@ class DriverLayouts : public testing::Test {
     return std::get<PlacedScan>(reader.read(cloud, poses));
   }
 
-  /// Where the sensor is when a beam is fired, in clouds of a moving sensor.
-  static double sensorAt(const Beam& beam) { return kSpeed * beam.time; }
-
   /// All points are on the ground or the walls, and are labelled so.
   static void expectHall(const PlacedScan& placed, std::size_t hits, bool labelled = true) {
     const Scan& scan = placed.scan;
@@ -199,13 +196,76 @@ class DriverLayouts : public testing::Test {
   std::unique_ptr<ClassTable> classes_;
 };
 
-/// The beams in the order of firing, and the number of those with a return.
+/// The beams in the order of firing.
 std::vector<Beam> fired() {
   std::vector<Beam> beams;
   for (std::size_t column = 0; column < kColumns; ++column) {
     for (std::size_t ring = 0; ring < kRings; ++ring) beams.push_back(beamAt(ring, column));
   }
   return beams;
+}
+
+/// Where the sensor is when a beam is fired.
+double moving(const Beam& beam) {
+  return kSpeed * beam.time;
+}
+double standing(const Beam&) {
+  return 0.0;
+}
+
+/// The beams with a return, in the order of firing.
+std::vector<std::pair<Beam, Hit>> returnsOf(double (*sensorAt)(const Beam&)) {
+  std::vector<std::pair<Beam, Hit>> returns;
+  for (const Beam& beam : fired()) {
+    if (const auto hit = hitOf(beam, sensorAt(beam))) returns.emplace_back(beam, *hit);
+  }
+  return returns;
+}
+
+/// An unorganised cloud of the beams with a return.
+Layout listed(const std::vector<Field>& fields, std::uint32_t point_step,
+              const std::vector<std::pair<Beam, Hit>>& returns, const std::string& label = "label") {
+  Layout layout(fields, point_step, 1, returns.size());
+  for (std::size_t n = 0; n < returns.size(); ++n) {
+    layout.set(n, returns[n].second.place.cast<float>());
+    if (!label.empty()) layout.set(n, label, returns[n].second.label);
+  }
+  return layout;
+}
+
+/// An organised cloud.
+struct Organised {
+  Layout layout;
+  std::vector<std::pair<std::size_t, Beam>> points;  ///< places of all beams, in the order of firing
+  std::size_t hits = 0;
+  std::map<std::size_t, Beam> holes;  ///< places of beams without a return
+};
+enum class Rows { kAreRings, kAreFirings };
+/// @param missing what the coordinates of a beam without a return are.
+Organised organised(const std::vector<Field>& fields, std::uint32_t point_step, Rows rows,
+                    double (*sensorAt)(const Beam&), Eigen::Vector3f (*missing)(const Beam&)) {
+  const bool rings = rows == Rows::kAreRings;
+  Organised cloud{
+      Layout(fields, point_step, rings ? kRings : kColumns, rings ? kColumns : kRings), {}, 0, {}};
+  for (const Beam& beam : fired()) {
+    const std::size_t n = rings ? beam.ring * kColumns + beam.column : beam.column * kRings + beam.ring;
+    const auto hit = hitOf(beam, sensorAt(beam));
+    cloud.points.emplace_back(n, beam);
+    cloud.hits += hit ? 1 : 0;
+    if (!hit) cloud.holes.emplace(n, beam);
+    cloud.layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : missing(beam));
+    cloud.layout.set(n, "label", hit ? hit->label : 0);
+  }
+  return cloud;
+}
+Eigen::Vector3f notANumber(const Beam&) {
+  return Eigen::Vector3f::Constant(kNan);
+}
+Eigen::Vector3f zero(const Beam&) {
+  return Eigen::Vector3f::Zero();
+}
+Eigen::Vector3f infiniteAlong(const Beam& beam) {
+  return beam.direction.cast<float>() * std::numeric_limits<float>::infinity();
 }
 
 const std::vector<Field> kVelodyne = with(kXyz, {{"intensity", PointField::FLOAT32, 12},
@@ -216,16 +276,11 @@ const std::vector<Field> kVelodyne = with(kXyz, {{"intensity", PointField::FLOAT
 TEST_F(DriverLayouts, Velodyne) {
   // Points in the order of firing, beams without a return left out. The stamp is that of the last packet, so
   // times are negative.
-  std::vector<std::pair<Beam, Hit>> hits;
-  for (const Beam& beam : fired()) {
-    if (const auto hit = hitOf(beam, sensorAt(beam))) hits.emplace_back(beam, *hit);
-  }
-  Layout layout(kVelodyne, 26, 1, hits.size());
+  const auto hits = returnsOf(moving);
+  Layout layout = listed(kVelodyne, 26, hits);
   for (std::size_t n = 0; n < hits.size(); ++n) {
-    layout.set(n, hits[n].second.place.cast<float>());
     layout.set(n, "time", hits[n].first.time - kScan);
     layout.set(n, "ring", static_cast<double>(hits[n].first.ring));
-    layout.set(n, "label", hits[n].second.label);
   }
   layout.cloud.header.stamp = ros::Time(kStamp + kScan);
   input_.time_field = "time";
@@ -237,24 +292,14 @@ TEST_F(DriverLayouts, Velodyne) {
 
 TEST_F(DriverLayouts, VelodyneOrganised) {
   // organize_cloud: a row a firing, a column a ring, NaN without a return.
-  Layout layout(kVelodyne, 26, kColumns, kRings);
-  std::size_t hits = 0;
-  std::map<std::size_t, Beam> holes;
-  for (const Beam& beam : fired()) {
-    const std::size_t n = beam.column * kRings + beam.ring;
-    const auto hit = hitOf(beam, sensorAt(beam));
-    hits += hit ? 1 : 0;
-    if (!hit) holes.emplace(n, beam);
-    layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : Eigen::Vector3f::Constant(kNan));
-    layout.set(n, "time", beam.time - kScan);
-    layout.set(n, "label", hit ? hit->label : 0);
-  }
-  layout.cloud.header.stamp = ros::Time(kStamp + kScan);
+  Organised cloud = organised(kVelodyne, 26, Rows::kAreFirings, moving, notANumber);
+  for (const auto& [n, beam] : cloud.points) cloud.layout.set(n, "time", beam.time - kScan);
+  cloud.layout.cloud.header.stamp = ros::Time(kStamp + kScan);
   input_.time_field = "time";
   input_.clear_no_returns = true;
-  const PlacedScan scan = read(layout.cloud, kStamp);
-  expectHall(scan, hits);
-  expectHoles(scan, holes);
+  const PlacedScan scan = read(cloud.layout.cloud, kStamp);
+  expectHall(scan, cloud.hits);
+  expectHoles(scan, cloud.holes);
 }
 
 TEST_F(DriverLayouts, Ouster) {
@@ -266,29 +311,21 @@ TEST_F(DriverLayouts, Ouster) {
                                   {"ambient", PointField::UINT16, 28},
                                   {"range", PointField::UINT32, 32},
                                   {"label", PointField::UINT16, 36}});
-  Layout layout(fields, 48, kRings, kColumns);
-  std::size_t hits = 0;
-  std::map<std::size_t, Beam> holes;
-  for (const Beam& beam : fired()) {
-    const std::size_t n = beam.ring * kColumns + beam.column;
-    layout.set(n, "t", 1e9 * beam.time);
-    layout.set(n, "ring", static_cast<double>(beam.ring));
-    const auto hit = hitOf(beam, sensorAt(beam));
-    if (!hit) holes.emplace(n, beam);
-    if (!hit) continue;
-    ++hits;
-    layout.set(n, hit->place.cast<float>());
-    layout.set(n, "range", 1e3 * hit->place.norm());
-    layout.set(n, "label", hit->label);
+  Organised cloud = organised(fields, 48, Rows::kAreRings, moving, zero);
+  for (const auto& [n, beam] : cloud.points) {
+    cloud.layout.set(n, "t", 1e9 * beam.time);
+    cloud.layout.set(n, "ring", static_cast<double>(beam.ring));
+    const auto hit = hitOf(beam, moving(beam));
+    if (hit) cloud.layout.set(n, "range", 1e3 * hit->place.norm());
   }
-  layout.cloud.header.stamp = ros::Time(kStamp);
-  layout.cloud.is_dense = true;
+  cloud.layout.cloud.header.stamp = ros::Time(kStamp);
+  cloud.layout.cloud.is_dense = true;
   input_.time_field = "t";
   input_.clear_no_returns = true;
-  const PlacedScan scan = read(layout.cloud, kStamp);
+  const PlacedScan scan = read(cloud.layout.cloud, kStamp);
   EXPECT_EQ(scan.times, "in ns after the stamp");
-  expectHall(scan, hits);
-  expectHoles(scan, holes);
+  expectHall(scan, cloud.hits);
+  expectHoles(scan, cloud.holes);
 }
 
 /// Unorganised points without those of no return, with absolute times.
@@ -297,7 +334,7 @@ Layout absolute(const std::vector<Field>& fields, std::uint32_t point_step, doub
   std::vector<std::pair<Beam, std::optional<Hit>>> points;
   hits = 0;
   for (const Beam& beam : fired()) {
-    const auto hit = hitOf(beam, kSpeed * beam.time);
+    const auto hit = hitOf(beam, moving(beam));
     hits += hit ? 1 : 0;
     if (hit || zeros) points.emplace_back(beam, hit);
   }
@@ -356,39 +393,22 @@ TEST_F(DriverLayouts, Robosense) {
                                   {"ring", PointField::UINT16, 16},
                                   {"timestamp", PointField::FLOAT64, 18},
                                   {"label", PointField::UINT16, 26}});
-  Layout layout(fields, 28, kColumns, kRings);
-  std::size_t hits = 0;
-  std::map<std::size_t, Beam> holes;
-  for (const Beam& beam : fired()) {
-    const std::size_t n = beam.column * kRings + beam.ring;
-    const auto hit = hitOf(beam, sensorAt(beam));
-    hits += hit ? 1 : 0;
-    if (!hit) holes.emplace(n, beam);
-    layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : Eigen::Vector3f::Constant(kNan));
-    layout.set(n, "timestamp", kStamp + beam.time);
-    layout.set(n, "label", hit ? hit->label : 0);
-  }
-  layout.cloud.header.stamp = ros::Time(kStamp + kScan);
+  Organised cloud = organised(fields, 28, Rows::kAreFirings, moving, notANumber);
+  for (const auto& [n, beam] : cloud.points) cloud.layout.set(n, "timestamp", kStamp + beam.time);
+  cloud.layout.cloud.header.stamp = ros::Time(kStamp + kScan);
   input_.time_field = "timestamp";
   input_.clear_no_returns = true;
-  const PlacedScan scan = read(layout.cloud, kStamp);
+  const PlacedScan scan = read(cloud.layout.cloud, kStamp);
   EXPECT_EQ(scan.times, "in s since 1970");
   EXPECT_NEAR(scan.scan.origin.x(), kSpeed * kScan, 1e-6);
-  expectHall(scan, hits);
-  expectHoles(scan, holes);
+  expectHall(scan, cloud.hits);
+  expectHoles(scan, cloud.holes);
 }
 
 TEST_F(DriverLayouts, GazeboVelodynePlugin) {
   // All beams at one time, which is simulated; `time` is 0. NaN are left out without organize_cloud.
-  std::vector<Hit> hits;
-  for (const Beam& beam : fired()) {
-    if (const auto hit = hitOf(beam, 0.0)) hits.push_back(*hit);
-  }
-  Layout layout(kVelodyne, 26, 1, hits.size());
-  for (std::size_t n = 0; n < hits.size(); ++n) {
-    layout.set(n, hits[n].place.cast<float>());
-    layout.set(n, "label", hits[n].label);
-  }
+  const auto hits = returnsOf(standing);
+  Layout layout = listed(kVelodyne, 26, hits);
   layout.cloud.header.stamp = ros::Time(12.0);
   expectHall(read(layout.cloud, 12.0), hits.size());
   input_.time_field = "time";  // not needed, and no harm
@@ -400,56 +420,38 @@ TEST_F(DriverLayouts, GazeboGpuLidar) {
   const auto fields = with(kXyz, {{"intensity", PointField::FLOAT32, 16},
                                   {"ring", PointField::UINT16, 20},
                                   {"label", PointField::UINT32, 24}});
-  Layout layout(fields, 32, kRings, kColumns);
-  std::size_t hits = 0;
-  std::map<std::size_t, Beam> holes;
-  for (const Beam& beam : fired()) {
-    const std::size_t n = beam.ring * kColumns + beam.column;
-    const auto hit = hitOf(beam, 0.0);
-    hits += hit ? 1 : 0;
-    if (!hit) holes.emplace(n, beam);
-    const Eigen::Vector3f infinite = beam.direction.cast<float>() * std::numeric_limits<float>::infinity();
-    layout.set(n, hit ? Eigen::Vector3f(hit->place.cast<float>()) : infinite);
-    layout.set(n, "label", hit ? hit->label : 0);
-  }
-  layout.cloud.header.stamp = ros::Time(12.0);
+  Organised cloud = organised(fields, 32, Rows::kAreRings, standing, infiniteAlong);
+  cloud.layout.cloud.header.stamp = ros::Time(12.0);
   input_.clear_no_returns = true;
-  const PlacedScan scan = read(layout.cloud, 12.0);
-  expectHall(scan, hits);
-  expectHoles(scan, holes);
+  const PlacedScan scan = read(cloud.layout.cloud, 12.0);
+  expectHall(scan, cloud.hits);
+  expectHoles(scan, cloud.holes);
 }
 
 TEST_F(DriverLayouts, CarlaSemanticLidar) {
   // Unorganised, beams without a return left out, all at one time; the label is ObjTag.
-  std::vector<Hit> hits;
-  for (const Beam& beam : fired()) {
-    if (const auto hit = hitOf(beam, 0.0)) hits.push_back(*hit);
-  }
+  const auto hits = returnsOf(standing);
   const auto fields = with(kXyz, {{"CosAngle", PointField::FLOAT32, 12},
                                   {"ObjIdx", PointField::UINT32, 16},
                                   {"ObjTag", PointField::UINT32, 20}});
-  Layout layout(fields, 24, 1, hits.size());
+  Layout layout = listed(fields, 24, hits, "");
+  const auto tagOf = [](const Hit& hit) { return hit.label == 40 ? 7u : 1u; };  // road, building
   for (std::size_t n = 0; n < hits.size(); ++n) {
-    layout.set(n, hits[n].place.cast<float>());
     layout.set(n, "ObjIdx", 4711.0);
-    layout.set(n, "ObjTag", hits[n].label == 40 ? 7.0 : 1.0);  // road, building
+    layout.set(n, "ObjTag", tagOf(hits[n].second));
   }
   layout.cloud.header.stamp = ros::Time(12.0);
   input_.label_field = "ObjTag";
   const PlacedScan scan = read(layout.cloud, 12.0, "carla");
   expectHall(scan, hits.size(), false);
   EXPECT_TRUE(scan.unlisted_labels.empty());
-  for (std::size_t n = 0; n < hits.size(); ++n) ASSERT_EQ(scan.scan.labels[n], hits[n].label == 40 ? 7u : 1u);
+  for (std::size_t n = 0; n < hits.size(); ++n) ASSERT_EQ(scan.scan.labels[n], tagOf(hits[n].second));
 }
 
 TEST_F(DriverLayouts, IsaacSim) {
   // Nothing but coordinates.
-  std::vector<Hit> hits;
-  for (const Beam& beam : fired()) {
-    if (const auto hit = hitOf(beam, 0.0)) hits.push_back(*hit);
-  }
-  Layout layout(kXyz, 12, 1, hits.size());
-  for (std::size_t n = 0; n < hits.size(); ++n) layout.set(n, hits[n].place.cast<float>());
+  const auto hits = returnsOf(standing);
+  Layout layout = listed(kXyz, 12, hits, "");
   layout.cloud.header.stamp = ros::Time(12.0);
   input_.label_field = "";
   expectHall(read(layout.cloud, 12.0, "occupancy"), hits.size(), false);
