@@ -230,7 +230,7 @@ bki_mapping_unit_tests(settings class_table label_watch yaml_file LINK yaml-cpp)
 bki_mapping_unit_tests(sequence sequence)
 bki_mapping_unit_tests(sequence pcd_file LINK pcl_io)
 bki_mapping_unit_tests(city tiled_map)
-bki_mapping_unit_tests(export display_colors grid_export html_export map_picture
+bki_mapping_unit_tests(export display_colors grid_export html_export map_picture mesh_export
   LINK nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB)
 bki_mapping_unit_tests(export cleaned_points map_export LINK pcl_io)
 bki_mapping_unit_tests(export octomap_export LINK ${OCTOMAP_LIBRARIES})

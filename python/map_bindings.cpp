@@ -237,8 +237,9 @@ void addMap(py::module& m) {
            "Write a file for other programs: .ply or .pcd, the voxels in `states` as points (default: "
            "occupied); .html, a page for browsers with the voxels in `states` (default: all); .ot or .bt, an "
            "OctoMap; .yaml, with an image .pgm beside it, for map_server, with obstacles from min_z to max_z "
-           "[m] above the origin of the map frame (height 'map') or the ground (height 'ground').\n\nRaises "
-           "ValueError for another ending, RuntimeError if the file cannot be written.")
+           "[m] above the origin of the map frame (height 'map') or the ground (height 'ground'); .glb, a "
+           "mesh of the occupied voxels.\n\nRaises ValueError for another ending, RuntimeError if the file "
+           "cannot be written.")
       .def("__repr__", &mapDescription);
   addQueries(m, map);
 }

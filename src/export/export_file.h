@@ -14,14 +14,16 @@ struct ExportOptions {
   VoxelStates states{VoxelState::kOccupied};  ///< of the voxels in .ply and .pcd files
   ColumnRules columns;                        ///< of .yaml files
   HtmlOptions html;                           ///< of .html files
+  bool mesh = false;                          ///< .ply files hold faces, not points
 };
 
 /// Checks a name before long work. @throws std::invalid_argument if it has none of the endings .ply, .pcd,
-/// .ot, .bt, .yaml and .html; std::runtime_error if the file, or the image of a .yaml, cannot be written, or
-/// three.js for a .html is missing.
+/// .ot, .bt, .yaml, .glb and .html; std::runtime_error if the file, or the image of a .yaml, cannot be
+/// written, or three.js for a .html is missing.
 void checkExport(const std::string& path, const ExportOptions& options = {});
 
-/// Writes a map by exportMap, exportOctoMap, exportGrid or exportHtml. @throws as these and checkExport().
+/// Writes a map by exportMap, exportOctoMap, exportGrid, exportMesh or exportHtml. @throws as these and
+/// checkExport().
 void exportFile(const std::string& path, const SemanticMap& map, const StateRules& rules,
                 const ClassTable& classes, const ExportOptions& options);
 

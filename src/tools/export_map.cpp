@@ -23,8 +23,9 @@ po::options_description options() {
       "output", tools::textOption("FILE"),
       "file to write; its extension chooses the format: .ply or .pcd, voxels as points; .ot, OctoMap with "
       "the colours of classes; .bt, OctoMap of occupied and free; .yaml, with an image .pgm beside it, "
-      "for map_server; .html, a page for browsers, which needs libjs-three")(
+      "for map_server; .glb, a mesh for Blender; .html, a page for browsers (needs libjs-three)")(
       "html", tools::textOption("FILE.html"), "the same as --output FILE.html")(
+      "mesh", po::bool_switch(), "write the faces of occupied voxels to a .ply file, not points")(
       "include", tools::textOption("STATES"),
       "voxels in a .ply, .pcd or .html file: occupied,free,occluded; default: occupied, in a .html file all")(
       "box", tools::textOption("\"X0 Y0 Z0 X1 Y1 Z1\""),
@@ -67,6 +68,7 @@ std::string outputOf(const po::variables_map& given) {
 ExportOptions exportOptions(const po::variables_map& given) {
   ExportOptions options;
   options.columns = columnRules(given);
+  options.mesh = given["mesh"].as<bool>();
   if (given.count("include")) {
     options.states = options.html.states = parseStates(given["include"].as<std::string>());
   }

@@ -158,7 +158,7 @@ class CityReading(City):
         three = self.folder / 'three.js'
         three.write_text('var THREE = {};\n')
         for box in ((), ('--box', '-20 -30 -inf 40 8.1 inf')):
-            for name in ('map.ply', 'map.pcd', 'map.ot', 'map.bt', 'map.yaml', 'map.html'):
+            for name in ('map.ply', 'map.pcd', 'map.ot', 'map.bt', 'map.yaml', 'map.glb', 'map.html'):
                 made = []
                 for source in (self.city + '/', self.whole):
                     output = self.folder / name

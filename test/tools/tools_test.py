@@ -741,11 +741,19 @@ class Tools(unittest.TestCase):
     def test_the_ending_chooses_the_format(self):
         a = self.mapped('formats.bkm')
         for name, begin in (('map.ot', b'# Octomap OcTree file\n'), ('map.bt', b'# Octomap OcTree binary file\n'),
-                            ('map.pcd', b'# .PCD v0.7'), ('map.yaml', b'image: "map.pgm"\n'), ('map.pgm', b'P5\n')):
+                            ('map.pcd', b'# .PCD v0.7'), ('map.glb', b'glTF'), ('map.yaml', b'image: "map.pgm"\n'), ('map.pgm', b'P5\n')):
             if name != 'map.pgm':
                 result = self.succeeds('export_map', a, '--output', self.path(name))
                 self.assertEqual((result.stderr, result.stdout), ('', f'{self.path(name)}: written, in frame map\n'))
             self.assertEqual(self.content(name)[:len(begin)], begin)
+
+    def test_a_ply_file_holds_points_or_a_mesh(self):
+        a = self.mapped('meshes.bkm')
+        self.succeeds('export_map', a, '--output', self.path('map.ply'), '--mesh')
+        self.assertIn(b'property list uchar uint vertex_indices', self.content('map.ply')[:400])
+        self.succeeds('export_map', a, '--output', self.path('map.ply'))
+        self.assertNotIn(b'element face', self.content('map.ply')[:400])
+        self.fails('must end in .glb or .ply', 'export_map', a, '--output', self.path('map.pcd'), '--mesh')
 
     def test_heights_above_the_ground_hide_what_is_low(self):
         a = self.mapped('heights.bkm')
@@ -767,7 +775,7 @@ class Tools(unittest.TestCase):
         a, exported = self.mapped('refused.bkm'), self.path('refused.ply')
         self.fails('name one map file', 'export_map', '--output', exported)
         self.fails('--output FILE is missing', 'export_map', a)
-        self.fails('must end in .ply, .pcd, .ot, .bt, .yaml or .html', 'export_map', a, '--output', self.path('map.bkm'))
+        self.fails('must end in .ply, .pcd, .ot, .bt, .yaml, .glb or .html', 'export_map', a, '--output', self.path('map.bkm'))
         self.fails("must be map or ground", 'export_map', a, '--output', self.path('map.yaml'), '--height', 'sea')
         self.fails('--min-z must not be above', 'export_map', a, '--output', self.path('map.yaml'), '--min-z', '1', '--max-z', '0')
         self.fails("state 'busy' is unknown", 'export_map', a, '--output', exported, '--include', 'busy')
