@@ -264,6 +264,7 @@ function(bki_mapping_script_test room name)
 endfunction()
 bki_mapping_script_test(house layering_test)
 bki_mapping_script_test(house links_test)
+bki_mapping_script_test(house foxglove_test)
 if(NOT CMAKE_CROSSCOMPILING)  # for which this machine may lack packages
   bki_mapping_script_test(house without_lab_test)
 endif()
