@@ -7,8 +7,10 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "free_space/registry.h"
+#include "other_value.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"
+#include "rules/rules_parameters.h"
 
 namespace bki_mapping {
 namespace {
@@ -251,6 +253,21 @@ TEST_P(EveryScene, TheRulesOfRobotEqualBruteForce) {
     config.sensor_model.height = height;
     expectEqualsBruteForce(scan, config, scene_.name + ", rules", classes);
     expectEqualsBruteForce(withSoftLabels(scan), config, scene_.name + ", soft, rules", classes);
+  }
+}
+
+TEST_P(EveryScene, EveryParameterOfTheRulesEqualsBruteForce) {
+  if (scene_.name == "near the sensor") return;  // nothing is left to clear there
+  for (const auto& parameter : rulesParameters()) {
+    MapperConfig config = withMode("line");
+    config.rules.enabled = true;
+    config.sensor_model.height = 1.7;
+    if (parameter.name == "enabled") continue;
+    parameter.set(config.rules, otherValue(parameter, config.rules));
+    Scan scan = scene_.scan;
+    if (scan.sensor_model) scan.sensor_model->height = 1.7;
+    expectEqualsBruteForce(scan, config, scene_.name + ", other rules/" + parameter.name,
+                           reference::tableWithDynamicClass());
   }
 }
 
