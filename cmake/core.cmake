@@ -69,7 +69,7 @@ bki_mapping_core_room(beams SOURCES
     raster/group_sums.cpp raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)
-bki_mapping_core_room(free_space SOURCES *.cpp  # each mode is a file
+bki_mapping_core_room(free_space SOURCES *.cpp  # a new mode is a new file
   LINK bki_mapping_beams bki_mapping_points)
 bki_mapping_core_room(mapping SOURCES
     former_parameters.cpp parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp sensor_height.cpp soft_merge.cpp

@@ -7,7 +7,7 @@
 
 namespace bki_mapping {
 
-// Each mode is in a file of its own.
+// Each is in the file of its kind of evidence.
 std::unique_ptr<FreeSpaceModel> makeNoFreeSpace(const FreeSpaceSetup& setup);
 std::unique_ptr<FreeSpaceModel> makeEvenSamples(const FreeSpaceSetup& setup);
 std::unique_ptr<FreeSpaceModel> makeUniformSamples(const FreeSpaceSetup& setup);

@@ -176,8 +176,10 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
           "view_max_z", &C::view_max_z, height, "m", Changes::kWhileMapping,
           "Greatest height in the map frame that the markers and voxel_cloud show. Lower it to look "
           "under ceilings and trees."),
-      truthParameter("latch", &C::latch, Changes::kAtStart,
-                     "Latch the map topics: a new subscriber receives the last message at once."),
+      truthParameter(
+          "latch", &C::latch, Changes::kAtStart,
+          "Latch voxel_cloud, occupancy, trajectory and distance_section: a new subscriber receives the "
+          "last message at once."),
       choiceParameter("color_mode", &C::color_mode, {"semantics", "probability", "variance", "height"},
                       Changes::kWhileMapping,
                       "Property of a voxel that the colours of occupied_cells_vis_array show."),

@@ -8,7 +8,7 @@
 namespace bki_mapping {
 
 /// What one scan may add to a voxel; by default all of it, as in the paper. With RulesConfig::enabled, all
-/// but `blocks` follows from RulesConfig (limitsOf).
+/// but `blocks` follows from RulesConfig (limitsOf) and, for free_threshold, from the scan.
 struct ScanLimitConfig {
   bool hits_before_misses = false;      ///< a voxel with a hit takes no evidence for `free` from its scan
   bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
