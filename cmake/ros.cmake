@@ -16,6 +16,7 @@ bki_mapping_room(ros SOURCES
     live_settings.cpp
     reconfigure_server.cpp
     load_advice.cpp
+    map_cloud.cpp
     map_file_settings.cpp
     publisher_set.cpp
     mapping_diagnostics.cpp

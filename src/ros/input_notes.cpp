@@ -4,6 +4,34 @@
 
 namespace bki_mapping::ros_interface {
 
+std::string InputNotes::ofSettings(const InputConfig& input, const ClassTable& classes) const {
+  if (input.label_encoding != LabelEncoding::kNumber || !input.label_field.empty() || classes.size() <= 1) {
+    return "";
+  }
+  return "Clouds of " + topic_ +
+         " are taken without labels (label_field is empty), so all points get label 0 of class table '" +
+         classes.name() + "'; set classes to occupancy";
+}
+
+InputSentences InputNotes::ofScan(const sensor_msgs::PointCloud2& cloud, const PlacedScan& placed,
+                                  const PointCounts& counts, const ScanReader& reader,
+                                  const ClassTable& classes, const MapperConfig& config) {
+  InputSentences sentences;
+  const auto add = [](std::vector<std::string>& list, const std::string& sentence) {
+    if (!sentence.empty()) list.push_back(sentence);
+  };
+  add(sentences.warnings, ofLabels(placed, counts, reader.input(), classes, config));
+  add(sentences.warnings, ofOrigin(reader.originDoubtful(cloud), reader.mapFrame()));
+  add(sentences.warnings, ofFarPoints(counts.beyond_max, reader.input()));
+  add(sentences.notes, ofTimes(placed.times));
+  if (placed.no_direction) {
+    const bool usual = *placed.no_direction == NoDirection::kFewReturns;
+    add(usual ? sentences.notes : sentences.warnings,
+        ofNoDirection(*placed.no_direction, counts.no_direction));
+  }
+  return sentences;
+}
+
 std::string InputNotes::ofOrigin(bool doubtful, const std::string& map_frame) {
   if (!doubtful || said_of_origin_) return "";
   said_of_origin_ = true;

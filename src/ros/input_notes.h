@@ -4,6 +4,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/mapping/mapper_config.h"
@@ -12,6 +13,11 @@
 #include "settings/label_watch.h"
 
 namespace bki_mapping::ros_interface {
+
+/// What there is to say of an input.
+struct InputSentences {
+  std::vector<std::string> warnings, notes;
+};
 
 /// Each function returns a sentence for the log, or "" if there is nothing to say, or nothing new.
 class InputNotes {
@@ -22,6 +28,12 @@ class InputNotes {
   /// Says everything again, as is right when settings have changed.
   void restart() { *this = InputNotes(topic_); }
 
+  /// The settings take clouds without labels, but the class table has several classes.
+  std::string ofSettings(const InputConfig& input, const ClassTable& classes) const;
+  /// All of the following, after one of the input's clouds was mapped.
+  InputSentences ofScan(const sensor_msgs::PointCloud2& cloud, const PlacedScan& placed,
+                        const PointCounts& counts, const ScanReader& reader, const ClassTable& classes,
+                        const MapperConfig& config);
   /// The beams of clouds in the map frame start at its origin. @param doubtful see ScanReader.
   std::string ofOrigin(bool doubtful, const std::string& map_frame);
   /// Points are left out because the maximum range of the sensor is not known. @param count of one cloud.

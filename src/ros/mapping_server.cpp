@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <new>
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
 #include "ros/cloud_frame.h"
+#include "ros/map_cloud.h"
 #include "ros/map_file_settings.h"
 #include "ros/pose_conversion.h"
 #include "ros/queued_call.h"
@@ -17,14 +17,6 @@ namespace {
 
 /// How long the thread waits for a callback [s]: with an empty queue, and while clouds wait for transforms.
 constexpr double kScanWait = 0.1, kTransformWait = 0.005;
-
-void warn(const std::string& sentence) {
-  if (!sentence.empty()) ROS_WARN("%s", sentence.c_str());
-}
-
-void inform(const std::string& sentence) {
-  if (!sentence.empty()) ROS_INFO("%s", sentence.c_str());
-}
 
 }  // namespace
 
@@ -106,15 +98,10 @@ void MappingServer::subscribe() {
     ROS_INFO("Mapping %s into frame '%s' with free_space/mode %s, %g m voxels",
              cloud_subscribers_.back().getTopic().c_str(), config_.frame_id.c_str(),
              mapper_->config().free_space.mode.c_str(), mapper_->config().resolution);
-    if (input.label_encoding == LabelEncoding::kNumber && input.label_field.empty() &&
-        mapper_->classes().size() > 1) {
-      ROS_WARN(
-          "Clouds of %s are taken without labels (label_field is empty), so all points get label 0 of class "
-          "table '%s'; set classes to occupancy",
-          cloud_subscribers_.back().getTopic().c_str(), mapper_->classes().name().c_str());
-    }
+    notes_.emplace_back(cloud_subscribers_.back().getTopic());
+    const std::string unlabelled = notes_.back().ofSettings(input, mapper_->classes());
+    if (!unlabelled.empty()) ROS_WARN("%s", unlabelled.c_str());
   }
-  for (const ros::Subscriber& subscriber : cloud_subscribers_) notes_.emplace_back(subscriber.getTopic());
   points_.resize(readers_.size());
 }
 
@@ -182,36 +169,12 @@ void MappingServer::processQueue() {
 }
 
 void MappingServer::map(const WaitingCloud& waiting) {
-  const sensor_msgs::PointCloud2& cloud = *waiting.cloud;
-  if (cloud.width == 0 || cloud.height == 0) {
-    return drop(waiting, DropReason::kEmpty, "it has no points; check the sensor");
-  }
-  try {
-    const auto placed = readers_[waiting.input].read(cloud, *poses_, ros::Time::now());
-    if (const auto* missing = std::get_if<MissingPose>(&placed)) {
-      return drop(waiting, missing->reason,
-                  missing->why + " (waited tf_timeout " + numberText(config_.tf_timeout) + " s)");
-    }
-    const auto& scan = std::get<PlacedScan>(placed);
-    if (!mapper_->map().geometry().contains(scan.scan.origin)) {
-      return drop(waiting, DropReason::kBadTransform,
-                  "tf puts the sensor so far from the origin of '" + config_.frame_id + "' (" +
-                      numberText(scan.scan.origin.norm()) + " m) that the map cannot hold it; correct the " +
-                      "publisher of the transforms from '" + config_.frame_id + "' to '" +
-                      shortText(cloud.header.frame_id) + "'");
-    }
-    integrate(waiting, scan);
-  } catch (const ScanRefused& refused) {
-    const bool memory = refused.reason() == ScanRefused::Reason::kMemory;
-    drop(waiting, memory ? DropReason::kMemory : DropReason::kTooLarge,
-         refused.what() + std::string(memory ? "; or set window or map_file, or call ~reset" : ""));
-  } catch (const std::bad_alloc&) {
-    drop(waiting, DropReason::kMemory,
-         "the computer's memory does not hold it; set memory_limit, or send smaller clouds");
-  } catch (const std::exception& fault) {
-    drop(waiting, DropReason::kBadCloud,
-         std::string(fault.what()) + "; check the cloud's source and the settings of the input");
-  }
+  const Remedies remedies{" (waited tf_timeout " + numberText(config_.tf_timeout) + " s)",
+                          "; or set window or map_file, or call ~reset"};
+  const auto refused =
+      mapCloud(*waiting.cloud, readers_[waiting.input], *poses_, ros::Time::now(), mapper_->map().geometry(),
+               remedies, [&](const PlacedScan& placed) { integrate(waiting, placed); });
+  if (refused) drop(waiting, refused->reason, refused->why);
 }
 
 void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
@@ -238,16 +201,12 @@ void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& pla
 
 void MappingServer::sayOfInput(const WaitingCloud& waiting, const PlacedScan& placed,
                                const PointCounts& counts) {
-  const ScanReader& reader = readers_[waiting.input];
   InputNotes& notes = notes_[waiting.input];
-  warn(notes.ofLabels(placed, counts, reader.input(), mapper_->classes(), mapper_->config()));
+  const InputSentences sentences = notes.ofScan(*waiting.cloud, placed, counts, readers_[waiting.input],
+                                                mapper_->classes(), mapper_->config());
+  for (const std::string& sentence : sentences.warnings) ROS_WARN("%s", sentence.c_str());
+  for (const std::string& sentence : sentences.notes) ROS_INFO("%s", sentence.c_str());
   points_[waiting.input].label_remedy = notes.labelRemedy();
-  warn(notes.ofOrigin(reader.originDoubtful(*waiting.cloud), config_.frame_id));
-  warn(notes.ofFarPoints(counts.beyond_max, reader.input()));
-  inform(notes.ofTimes(placed.times));
-  if (!placed.no_direction) return;
-  const std::string sentence = notes.ofNoDirection(*placed.no_direction, counts.no_direction);
-  *placed.no_direction == NoDirection::kFewReturns ? inform(sentence) : warn(sentence);
 }
 
 void MappingServer::warnOfFarPlace() {
@@ -261,15 +220,8 @@ void MappingServer::warnOfFarPlace() {
 void MappingServer::reportTfJumps() {
   for (const TfJump& jump : poses_->takeJumps()) {
     ledger_.tfJumped();
-    const std::string frames =
-        "the transform from '" + shortText(jump.parent) + "' to '" + shortText(jump.child) + "'";
-    if (!throttle_.allow(frames, Clock::now())) continue;
-    ROS_WARN(
-        "tf jumped: %s moved the sensor by %.2f m and turned it by %.1f degrees at once at time %.3f, as "
-        "when a loop closes. The map keeps what was mapped before, so that walls may be doubled; call "
-        "~reset, or "
-        "map a recording with the corrected poses",
-        frames.c_str(), jump.distance, jump.angle, jump.stamp.toSec());
+    if (!throttle_.allow(jump.parent + " " + jump.child, Clock::now())) continue;
+    ROS_WARN("%s; call ~reset, or map a recording with the corrected poses", sentenceOf(jump).c_str());
   }
 }
 

@@ -61,6 +61,7 @@ class ScanReader {
     return frameName(input_.sensor_frame_id.empty() ? cloud.header.frame_id : input_.sensor_frame_id);
   }
   const InputConfig& input() const { return input_; }
+  const std::string& mapFrame() const { return map_frame_; }
 
  private:
   /// The time at which the poses of a cloud are looked up: its stamp, or, for a stamp of 0, the latest time

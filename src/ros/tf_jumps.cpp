@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "bki_mapping/core/named_parameter.h"
 #include "core/frame_name.h"
 #include "ros/pose_conversion.h"
 
@@ -21,6 +23,16 @@ struct Velocity {
 };
 
 }  // namespace
+
+std::string sentenceOf(const TfJump& jump) {
+  char numbers[200];
+  std::snprintf(numbers, sizeof numbers,
+                " moved the sensor by %.2f m and turned it by %.1f degrees at once at time %.3f, ",
+                jump.distance, jump.angle, jump.stamp.toSec());
+  return "tf jumped: the transform from '" + shortText(jump.parent) + "' to '" + shortText(jump.child) + "'" +
+         numbers +
+         "as when a loop closes. The map keeps what was mapped before, so that walls may be doubled";
+}
 
 bool TfJumpWatch::watch(const std::string& child, const Eigen::Vector3d& sensor) {
   if (const auto known = edges_.find(child); known != edges_.end()) {

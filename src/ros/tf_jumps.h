@@ -19,6 +19,9 @@ struct TfJump {
   double angle;     ///< [degrees]
 };
 
+/// What has jumped, how far, and what that means for the map; without the remedy.
+std::string sentenceOf(const TfJump& jump);
+
 /// Watches transforms on the way from the sensor to the map. A step between two consecutive transforms is a
 /// jump if the sensor moves in it by kLeastDistance or kLeastAngle more than the velocities before and after
 /// it explain. A motion that goes on is therefore none, however suddenly it begins, nor is a slow correction.

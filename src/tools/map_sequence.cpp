@@ -6,17 +6,16 @@
 #include <iostream>
 #include <sstream>
 
-#include "bki_mapping/export/map_export.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/sequence/sequence.h"
 #include "bki_mapping/settings/yaml.h"
-#include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "export/cleaned_points.h"
 #include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 #include "tools/interruption.h"
+#include "tools/map_output.h"
 #include "tools/run_report.h"
 #include "tools/sequence_options.h"
 
@@ -30,9 +29,8 @@ constexpr char kFrame[] = "map";
 
 po::options_description options() {
   po::options_description options("Options");
-  options.add_options()("output", tools::textOption("FILE.bkm|FILE.ply|FILE.pcd"),
-                        "file for the map: .bkm holds all of it, .ply or .pcd its voxels as points")(
-      "resume", tools::textOption("FILE.bkm"), "continue the map in this file")(
+  tools::addMapOutput(options);
+  options.add_options()("resume", tools::textOption("FILE.bkm"), "continue the map in this file")(
       "drive", tools::textOption("ID"),
       "id of these scans in the map file (default: name of the sequence's folder, first and last scan)")(
       "allow-overlap", po::bool_switch(),
@@ -40,8 +38,6 @@ po::options_description options() {
       "poses", tools::textOption("FILE"),
       "poses in the frame of the map, as matrices or with stamps; "
       "default: poses.txt, relative to its first pose")(
-      "include", tools::textOption("STATES")->default_value("occupied"),
-      "voxels in a .ply or .pcd file: occupied,free,occluded")(
       "points", tools::textOption("FILE.pcd"),
       "file for the points of the scans that lie in occupied voxels of the final map")(
       "report", tools::textOption("FILE.json"), "report of the run")(
@@ -119,7 +115,7 @@ std::string stoppedText(const po::variables_map& given, const Sequence& sequence
                         std::size_t end, std::size_t last) {
   std::string text = "stopped after scan " + sequence.name(end - 1) + ", " + std::to_string(end - first) +
                      " of " + counted(last - first, "scan");
-  if (!given.count("output") || !isMapFileName(given["output"].as<std::string>())) return text;
+  if (!tools::writesMapFile(given)) return text;
   return text + "; to map the rest, say --first " + std::to_string(sequence.number(end)) +
          (given.count("scans") ? " --scans " + std::to_string(last - end) : "") + " --resume " +
          given["output"].as<std::string>() +
@@ -137,10 +133,9 @@ int mapSequence(const po::variables_map& given) {
     std::cout << std::ifstream(classTableFile(given["classes"].as<std::string>())).rdbuf();
     return 0;
   }
-  const auto states = parseStates(given["include"].as<std::string>());
-  if (given.count("output")) checkMapName(given["output"].as<std::string>());
+  tools::checkMapOutput(given);
   if (given.count("points")) checkPointFileName(given["points"].as<std::string>());
-  for (const char* file : {"output", "points", "report"}) {
+  for (const char* file : {"points", "report"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
   }
   const tools::Interruption interruption;
@@ -186,15 +181,8 @@ int mapSequence(const po::variables_map& given) {
     throw tools::Stopped("stopped before the first scan; nothing was written");
   }
   if (stopped) drive.id = idOfPart(sequence, first, end, drives, drive.id);
-  if (given.count("output")) {
-    const std::string output = given["output"].as<std::string>();
-    if (isMapFileName(output)) {
-      if (drive.scans > 0) drives.push_back(drive);
-      saveMap(output, mapInfoOf(mapper, kFrame), drives, mapper.map());
-    } else {
-      exportMap(output, mapper.map(), mapper.rules(), mapper.classes(), states);
-    }
-  }
+  if (tools::writesMapFile(given) && drive.scans > 0) drives.push_back(drive);
+  tools::writeMap(given, mapper, kFrame, drives);
   std::size_t cleaned = mapped.size();
   if (given.count("points")) {
     const std::string path = given["points"].as<std::string>();

@@ -152,9 +152,7 @@ void addSetting(const std::string& option, const std::string& setting,
 
 }  // namespace
 
-MapperConfig mapperConfig(const po::variables_map& given) {
-  MapperConfig config;
-  if (given.count("config")) setParameters(config, loadParameterFile(given["config"].as<std::string>()));
+std::map<std::string, std::string> givenSettings(const po::variables_map& given) {
   std::map<std::string, std::string> values;
   if (given.count("set")) {
     for (const std::string& setting : given["set"].as<std::vector<std::string>>()) {
@@ -164,7 +162,13 @@ MapperConfig mapperConfig(const po::variables_map& given) {
   if (given.count("threads") && !values.emplace("threads", given["threads"].as<std::string>()).second) {
     throw std::invalid_argument("parameter threads is given by --threads and by --set; keep one");
   }
-  setParameters(config, values);
+  return values;
+}
+
+MapperConfig mapperConfig(const po::variables_map& given) {
+  MapperConfig config;
+  if (given.count("config")) setParameters(config, loadParameterFile(given["config"].as<std::string>()));
+  setParameters(config, givenSettings(given));
   for (const std::string& warning : settingWarnings(config, *classTable(given))) warn(warning);
   return config;
 }

@@ -60,6 +60,9 @@ po::options_description mapperOptions();
 /// The configuration that these options give. Prints a warning to standard error for questionable settings.
 /// @throws std::invalid_argument.
 MapperConfig mapperConfig(const po::variables_map& given);
+/// The parameters, by name, that --set and --threads give. @throws std::invalid_argument if one is given
+/// twice.
+std::map<std::string, std::string> givenSettings(const po::variables_map& given);
 /// Replaces some of the settings. @param option that gives them, for errors. @param settings NAME=VALUE,...
 /// @throws std::invalid_argument.
 MapperConfig withSettings(MapperConfig config, const std::string& option, const std::string& settings);
