@@ -33,6 +33,7 @@ bki_mapping_room(ros SOURCES
     queries/*.cpp
     query_services.cpp
     recent_map.cpp
+    recording_mapper.cpp
     ring_axis.cpp
     scan_ledger.cpp
     scan_reader.cpp
@@ -68,6 +69,8 @@ target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
 bki_mapping_warnings(mapping_node)
 bki_mapping_uses_ros(mapping_node)
 
+add_executable(map_bag src/tools/map_bag.cpp src/tools/bag_files.cpp src/tools/bag_reading.cpp)
+bki_mapping_tool(map_bag bki_mapping_ros bki_mapping_export nlohmann_json::nlohmann_json)
 add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
 add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp src/tools/sequence_messages.cpp)
@@ -75,7 +78,7 @@ bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 add_executable(print_parameters src/tools/print_parameters.cpp)
 bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
-foreach(name play_sequence sequence_to_bag print_parameters)
+foreach(name map_bag play_sequence sequence_to_bag print_parameters)
   bki_mapping_uses_ros(${name})
 endforeach()
 
@@ -83,7 +86,7 @@ install(TARGETS bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS mapping_node play_sequence print_parameters sequence_to_bag
+install(TARGETS map_bag mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

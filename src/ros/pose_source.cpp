@@ -214,7 +214,7 @@ MissingPose PoseSource::explain(const std::string& target, const std::string& so
   if (stamp > latest && ahead <= kSlowest) {
     return {DropReason::kTransformLate,
             "the latest of " + transforms + " is " + numberText(std::round(1e3 * ahead)) +
-                " ms older than the cloud; raise tf_timeout, or make the localisation publish sooner"};
+                " ms older than the cloud; " + timeout_remedy_ + "make the localisation publish sooner"};
   }
   if (stamp > latest && !now.isZero() && std::abs(now.toSec() - stamp.toSec()) <= kSlowest) {
     return {

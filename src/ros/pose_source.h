@@ -40,6 +40,9 @@ class PoseSource {
   /// Subscribes to /tf and /tf_static on the node handle's callback queue.
   explicit PoseSource(ros::NodeHandle node);
 
+  /// Says that clouds do not wait for tf_timeout, so that explain() does not advise to raise it.
+  void ignoreTimeout() { timeout_remedy_.clear(); }
+
   /// Adds a transform. Refuses one between no two frames, that is not finite, or whose quaternion is not of
   /// norm 1; explain() names it.
   void add(const geometry_msgs::TransformStamped& transform, bool is_static = false);
@@ -92,6 +95,7 @@ class PoseSource {
   std::vector<std::string> lineage(const std::string& frame) const;
 
   tf2_ros::Buffer buffer_;
+  std::string timeout_remedy_ = "raise tf_timeout, or ";
   std::deque<geometry_msgs::TransformStamped> latest_;  ///< of /tf, in order of reception
   std::deque<Refused> refused_;  ///< the last one per child frame, until a newer one is valid
   TfJumpWatch jumps_;

@@ -1,23 +1,28 @@
 #!/usr/bin/env python3
 """A simulated drive played by play_sequence, and the same drive replayed from a bag, give the same bytes as
-map_sequence, through the launch files that users start, with paths relative to the shell. What cannot be played ends
-the launch."""
+map_sequence and map_bag, through the launch files that users start, with paths relative to the shell. What cannot be
+played ends the launch."""
+import contextlib
+import math
 import os
 import resource
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
 import unittest
 
+import numpy
 import rosbag
 import roslib.packages
 import rospy
 import rostest
 from bki_mapping.msg import MappingStatus
 from bki_mapping.srv import SaveMap
-from sensor_msgs.msg import PointCloud2
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -52,14 +57,14 @@ class Replay(unittest.TestCase):
         with open(path, 'rb') as file:
             return file.read()
 
-    def map_of_launch(self, *launch):
-        """The map after a launch in the drive's folder; HOME is that folder, PWD is not."""
+    def map_of_launch(self, *launch, scans=SCANS, name='map.ply'):
+        """The file of the map after a launch in the drive's folder; HOME is that folder, PWD is not."""
         status = Listener('/mapping/status', MappingStatus)
         server = subprocess.Popen(['roslaunch', '--wait', 'bki_mapping', *launch, 'rviz:=false'], cwd=self.folder,
                                   env={**os.environ, 'HOME': self.folder, 'PWD': '/'})
         try:
-            status.wait_for(lambda m: m.integrated == SCANS, f'mapping {SCANS} scans with {launch[0]}')
-            path = os.path.join(self.folder, 'map.ply')
+            status.wait_for(lambda m: m.integrated == scans, f'mapping {scans} scans with {launch[0]}')
+            path = os.path.join(self.folder, name)
             answer = rospy.ServiceProxy('/mapping/save_map', SaveMap)(path, 'occupied,free')
             self.assertTrue(answer.success, answer.message)
         finally:
@@ -82,6 +87,63 @@ class Replay(unittest.TestCase):
             run('sequence_to_bag', '--sequence', self.drive, '--output', bag, '--compression', compression)
             replayed = self.map_of_launch('replay.launch', f'bag:={bag}', 'rate:=0.5')
             self.assertTrue(replayed == self.expected_map('--config', PRESET), 'the maps differ')
+            read = self.path('read.ply')
+            run('map_bag', bag, '--cloud-topic', '/velodyne_points', '--config', PRESET, '--include', 'occupied,free',
+                '--output', read)
+            with open(read, 'rb') as file:
+                self.assertTrue(file.read() == replayed, 'the map of map_bag differs')
+
+    def write_spinning_bag(self):
+        """A bag of a lidar on a vehicle in a curve: each point has a time, some are not finite, transforms come late and in
+        between, and the first cloud is older than all of them."""
+        path = self.path('spinning.bag')
+
+        def pose(stamp, parent, child, x=0.0, y=0.0, z=0.0, yaw=0.0):
+            made = TransformStamped()
+            made.header.frame_id, made.child_frame_id, made.header.stamp = parent, child, rospy.Time.from_sec(stamp)
+            made.transform.translation.x, made.transform.translation.y, made.transform.translation.z = x, y, z
+            made.transform.rotation.z, made.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+            return TFMessage([made])
+        messages = [('/tf_static', pose(0.0, 'base', 'velodyne', 0.3, 0.1, 1.7, 0.2), 1000.0)]
+        for n in range(50):
+            stamp = 1000.07 + 0.019 * n
+            messages.append(('/tf', pose(stamp, 'city', 'base', 3.0 * 0.019 * n, 0.001 * n * n, 0.0, 0.01 * n), stamp + 0.06))
+        with rosbag.Bag(self.bag) as bag:
+            clouds = [cloud for _, cloud, _ in bag.read_messages(['/velodyne_points'])]
+        for n, cloud in enumerate(clouds):
+            stamp = 1000.0 + 0.1 * n
+            rows = numpy.frombuffer(cloud.data, 'u1').reshape(-1, cloud.point_step)
+            times = numpy.linspace(0.0, 0.09, len(rows), dtype='<f4')
+            rows = numpy.concatenate([rows, times.view('u1').reshape(-1, 4)], 1)
+            rows[n::97, :4] = numpy.array([numpy.nan], '<f4').view('u1')
+            cloud.fields.append(PointField('t', cloud.point_step, PointField.FLOAT32, 1))
+            cloud.point_step += 4
+            cloud.row_step, cloud.data = cloud.width * cloud.point_step, rows.tobytes()
+            cloud.header.stamp = rospy.Time.from_sec(stamp)
+            messages.append(('/points', cloud, stamp + 0.1))
+        with rosbag.Bag(path, 'w') as bag:
+            for topic, message, stamp in sorted(messages, key=lambda each: each[2]):
+                bag.write(topic, message, rospy.Time.from_sec(stamp))
+        return path
+
+    def test_map_bag_makes_the_map_of_the_node(self):
+        def tiles(path):
+            with contextlib.closing(sqlite3.connect(path)) as database:
+                return sorted(database.execute('SELECT z, y, x, content FROM tile WHERE part = 0'))
+        bag = self.write_spinning_bag()
+        for extra in ('', 'time_field: t\n'):
+            config = self.path('spinning.yaml')
+            with open(PRESET) as preset, open(config, 'w') as file:
+                file.write(preset.read() + extra)
+            self.map_of_launch('replay.launch', f'bag:={bag}', 'rate:=0.5', 'cloud_topic:=/points', 'frame_id:=city',
+                               f'config:={config}', scans=SCANS - 1, name='of_node.bkm')
+            ours = self.path('of_bag.bkm')
+            result = subprocess.run([program('map_bag'), bag, '--cloud-topic', '/points', '--frame', 'city', '--config', config,
+                                     '--output', ours], check=True, timeout=60, capture_output=True, text=True)
+            self.assertIn(f'Mapped {SCANS - 1} of {SCANS} clouds; dropped: 1 too old; used', result.stdout)
+            self.assertGreater(len(tiles(ours)), 5)
+            self.assertEqual('time_field' in extra, 'Times of points of /points are read' in result.stderr)
+            self.assertTrue(tiles(ours) == tiles(self.path('of_node.bkm')), f'the maps differ with {extra or "no times"}')
 
     def test_paths_are_those_of_the_shell(self):
         shutil.copy(os.path.join(PACKAGE, 'config/presets/paper_line.yaml'), os.path.join(self.folder, 'lines.yaml'))
