@@ -24,7 +24,7 @@ endforeach()
 install(FILES ${files} DESTINATION ${BKI_MAPPING_PYTHON_DESTINATION})
 # Maps of cities: Python alone, and programs of this package.
 set(files)
-foreach(name __init__ bags build description plan report work)
+foreach(name __init__ build description plan report work)
   list(APPEND files python/${PROJECT_NAME}/city/${name}.py)
   configure_file(python/${PROJECT_NAME}/city/${name}.py ${BKI_MAPPING_PYTHON_BUILD}/city/${name}.py COPYONLY)
 endforeach()

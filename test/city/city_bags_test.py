@@ -2,21 +2,17 @@
 """Bags as drives of a city."""
 import json
 import math
-import pathlib
 import sys
-import time
 import unittest
 
-from harness import SCANS, MadeCity
+from harness import SCANS, MadeCity, program, tiles_of
 
 import numpy
-from bki_mapping.city import bags
-from bki_mapping.city.description import Bag, CityError
+from bki_mapping.city import report
 
 try:
     import rosbag
     import rospy
-    import tf2_ros  # noqa: F401
     from geometry_msgs.msg import TransformStamped
     from sensor_msgs.msg import PointCloud2, PointField
     from tf2_msgs.msg import TFMessage
@@ -62,72 +58,76 @@ class Bags(MadeCity):
                 bag.write('/points', cloud, rospy.Time.from_sec(stamp))
         return poses
 
+    def describe_drives(self, *drives, **more):
+        path = self.describe([])
+        path.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': drives, **more}))
+        return path
+
     def test_bags_are_drives(self):
         path = self.folder / 'monday.bag'
         poses = self.write_bag(path, 'd2')
-        city = self.describe([])
-        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
-            {'sequence': 'd1'}, {'bag': 'monday.bag', 'cloud_topic': '/points', 'frame': 'city'}]}))
+        bag = {'bag': 'monday.bag', 'cloud_topic': '/points', 'frame': 'city'}
+        city = self.describe_drives({'sequence': 'd1'}, bag)
         text = self.finish(self.start(city, '--workers', '2'))
-        self.assertIn(f"drive 'monday': 1 of {SCANS} clouds have no transform to 'city' and are left out", text)
+        self.assertIn(f"drive 'monday': 1 of {SCANS} clouds are left out: 1 transform late", text)
+        self.assertIn('dropped the cloud of /points of time 104.000: the latest of the transforms', text)
         index = json.loads((self.output / 'index.json').read_text())
         drive = index['drives'][1]
-        self.assertEqual((drive['name'], drive['bag']), ('monday', str(path)))
-        written = pathlib.Path(drive['sequence'])
-        for number in range(SCANS - 1):
-            for each in (f'velodyne/{number:06d}.bin', f'labels/{number:06d}.label'):
-                self.assertEqual((written / each).read_bytes(), (self.folder / 'd2' / each).read_bytes(), each)
-        found = numpy.loadtxt(written / 'poses.txt').reshape(-1, 3, 4)
-        numpy.testing.assert_allclose(found, poses[:SCANS - 1], atol=1e-9)
-        self.assertEqual((written / 'times.txt').read_text(), ''.join(f'{n}.000000000\n' for n in range(SCANS - 1)))
-        # The city is that of the sequence d1 and of the written one.
-        (self.folder / 'written').symlink_to(written)
-        self.expect_equal(['d1', 'written'])
-        # Nothing is written or mapped again.
+        self.assertEqual((drive['name'], drive['bag'], drive['cloud_topic'], drive['frame']),
+                         ('monday', str(path), '/points', 'city'))
+        self.assertEqual([(piece['first'], piece['scans']) for piece in drive['pieces']], [(0, 2), (2, 2), (4, 1)])
+        numpy.testing.assert_allclose(report.way_of(drive, self.output), poses[:SCANS - 1, :, 3], atol=1e-6)
+        # The city is that of the sequence d1 and of the whole bag.
+        self.whole(['d1'])
+        program('map_bag', path, '--cloud-topic', '/points', '--frame', 'city', '--frame-in-file', 'map', '--output',
+                self.folder / 'monday.bkm')
+        program('merge_maps', self.folder / 'whole-d1.bkm', self.folder / 'monday.bkm', '--output', self.folder / 'both.bkm')
+        whole = tiles_of(self.folder / 'both.bkm')
+        self.expect_equal([], whole=whole)
+        # Nothing is mapped again, unless the account of a piece is lost.
         self.finish(self.start(city, '--workers', '2', '--resume'))
-        self.assertIn('| write bags as sequences | 1 | 0 | ', (self.output / 'report.md').read_text())
-        self.assertIn('| 0 | 0.0 |', (self.output / 'report.md').read_text())
-
-    def test_labels_are_read_as_the_node_reads_them(self):
-        none = 2**32 - 1
-        for dtype, values, expected in (
-                ('<u4', [10, 10 | 300 << 16, none], [10, 10 | 300 << 16, none]), ('>i4', [10, -1, -2**31 | 10], [10, none, 2**31 | 10]),
-                ('i1', [-1, 40], [none, 40]),
-                ('<f4', [39.9, 40.5, -0.4, -0.5, -1, math.nan, math.inf], [40, 41, 0, none, none, none, none]),
-                # As in Labels.OfSinglePrecisionAreUnknownWhereThatSkipsNumbers.
-                ('<f4', [2.0**24, 2.0**24 + 4, 3.0 * 2**30, -2.0**24, -2.0**24 - 4], [2**24, none, none, 0xff000000, none]),
-                ('<f8', [0.49999999999999994, 2.0**24 + 4, -2.0**24 - 4], [0, 2**24 + 4, 0xfefffffc]),
-                ('<f8', [10 + 300 * 65536.0, 2.0**32, -2.0**31 - 1, math.nan], [10 | 300 << 16, none, none, none])):
-            self.assertEqual(bags.labels_of(numpy.array(values, dtype)).tolist(), expected, dtype)
+        self.assertIn('| map pieces | 6 | 0 | 0.0 |', (self.output / 'report.md').read_text())
+        (self.output / drive['pieces'][1]['file']).with_suffix('.json').unlink()
+        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.assertIn('| map pieces | 6 | 1 | ', (self.output / 'report.md').read_text())
+        self.expect_equal([], whole=whole)
+        self.assertEqual([path for path in self.output.rglob('.*') if path.name != '.run'], [], 'nothing is left over')
+        # Other pieces make the same city; without labels, it is that of such a map.
+        self.finish(self.start(self.describe_drives({'sequence': 'd1'}, bag, piece_scans=3), '--workers', '2', '--resume'))
+        self.expect_equal([], whole=whole)
+        program('map_bag', path, '--cloud-topic', '/points', '--frame', 'city', '--set', 'label_field=', '--classes', 'occupancy',
+                '--output', self.folder / 'unlabelled.bkm')
+        city = self.describe_drives({**bag, 'labelled': False}, classes='occupancy')
+        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.expect_equal([], whole=tiles_of(self.folder / 'unlabelled.bkm'))
 
     def test_wrong_bags_are_left_out_with_a_sentence(self):
-        path = self.folder / 'wrong.bag'
-        self.write_bag(path, 'd2', label=9)
-
-        def refused(sentence, bag=Bag(path, '/points', 'city', 'label', True)):
-            with self.assertRaisesRegex(CityError, sentence):
-                bags.extract(bag, self.folder / f'out{time.monotonic_ns()}')
-        refused("the field 'x' of /points is no number")
-        self.write_bag(path, 'd2')
-        good = Bag(path, '/points', 'city', 'label', True)
-        refused('wrong.bag has no clouds at /cloud; it has clouds at: /points', good._replace(cloud_topic='/cloud'))
-        refused("no cloud of /points has a transform to 'earth' .*; record tf", good._replace(frame='earth'))
-        refused("have no field 'class', but intensity, label, x, y, z; give label_field, or labelled: false",
-                good._replace(label_field='class'))
-        bags.extract(good._replace(label_field='class', labelled=False), self.folder / 'unlabelled')
-        self.assertEqual(set((self.folder / 'unlabelled/labels/000000.label').read_bytes()), {0})
-        content = path.read_bytes()
-        for length in (0, 5, 5000, len(content) // 2):
-            path.write_bytes(content[:length])
-            refused('wrong.bag (cannot be read|has no index)')
-        path.write_bytes(b'#ROSBAG V2.0\n' + bytes(range(256)) * 50)
-        refused('wrong.bag (cannot be read|has no index)')
-        city = self.describe([])
-        city.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': [
-            {'sequence': 'd1'}, *({'bag': name, 'cloud_topic': '/points'} for name in ('wrong.bag', 'missing.bag'))]}))
+        good = {'cloud_topic': '/points', 'frame': 'city'}
+        self.write_bag(self.folder / 'typed.bag', 'd2', label=9)
+        self.write_bag(self.folder / 'good.bag', 'd2')
+        content = (self.folder / 'good.bag').read_bytes()
+        for name, some in (('cut', content[:len(content) // 2]), ('none', b''), ('text', b'no bag'),
+                           ('garbage', b'#ROSBAG V2.0\n' + bytes(range(256)) * 50)):
+            (self.folder / f'{name}.bag').write_bytes(some)
+        wrong = {
+            'typed': ({'bag': 'typed.bag', **good}, "field 'x'"),
+            'topic': ({'bag': 'good.bag', **good, 'cloud_topic': '/cloud'},
+                      'good.bag has no clouds at /cloud; it has clouds at: /points'),
+            'frame': ({'bag': 'good.bag', **good, 'frame': 'earth'},
+                      "no cloud of /points has a transform to 'earth' (5 unknown frame); record tf"),
+            'label': ({'bag': 'good.bag', **good, 'label_field': 'class'}, "'class'"),
+            'cut': ({'bag': 'cut.bag', **good}, 'run: rosbag reindex'),
+            'none': ({'bag': 'none.bag', **good}, "is no bag"),
+            'text': ({'bag': 'text.bag', **good}, "is no bag"),
+            'garbage': ({'bag': 'garbage.bag', **good}, 'run: rosbag reindex'),
+            'missing': ({'bag': 'missing.bag', **good}, 'missing.bag does not exist')}
+        city = self.describe_drives({'sequence': 'd1'}, *({**bag, 'name': name} for name, (bag, _) in wrong.items()))
         text = self.finish(self.start(city, '--workers', '2'), 1)
-        self.assertRegex(text, "drive 'wrong' is left out: .*wrong.bag (cannot be read|has no index)")
-        self.assertRegex(text, "drive 'missing' is left out: .*missing.bag does not exist")
+        left_out = dict(line[len("drive '"):].split("' is left out: ", 1) for line in text.splitlines()
+                        if "' is left out: " in line)
+        self.assertEqual(set(left_out), set(wrong))
+        for name, (_, words) in wrong.items():
+            self.assertIn(words, left_out[name], name)
         self.expect_equal(['d1'])
 
 

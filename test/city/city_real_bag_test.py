@@ -1,14 +1,12 @@
 #!/usr/bin/env python3
 """A real bag, without labels and tf, as a drive of a city."""
+import json
 import os
 import pathlib
 import sys
 import unittest
 
-from harness import MadeCity, program, tiles_of
-
-from bki_mapping.city import bags
-from bki_mapping.city.description import Bag, CityError
+from harness import MadeCity, tiles_of
 
 if 'BKI_MAPPING_TEST_DATA' not in os.environ:
     print('SKIPPED: needs BKI_MAPPING_TEST_DATA', file=sys.stderr)
@@ -18,14 +16,19 @@ if 'BKI_MAPPING_TEST_DATA' not in os.environ:
 class RealBag(MadeCity):
     def test_a_real_bag_without_labels_and_tf(self):
         path = pathlib.Path(os.environ['BKI_MAPPING_TEST_DATA']) / 'bags/luminar_no_label_no_tf.bag'
-        bag = Bag(path, '/luminar_pointcloud', 'map', 'label', False)
-        with self.assertRaisesRegex(CityError, "no cloud of /luminar_pointcloud has a transform to 'map'"):
-            bags.extract(bag, self.folder / 'real1')
+
+        def city(**more):
+            bag = {'bag': str(path), 'name': 'real', 'cloud_topic': '/luminar_pointcloud', 'labelled': False, **more}
+            made = self.describe([])
+            made.write_text(json.dumps({'drives': [bag], 'classes': 'occupancy', 'piece_scans': 2}))
+            return made
+        text = self.finish(self.start(city(), '--workers', '2'), 1)
+        self.assertIn("no cloud of /luminar_pointcloud has a transform to 'map' (5 unknown frame)", text)
         # In the frame of its clouds, no tf is needed.
-        self.assertEqual(bags.extract(bag._replace(frame='luminar_lidar'), self.folder / 'real2'), (5, 0))
-        program('map_sequence', '--sequence', self.folder / 'real2', '--classes', 'occupancy',
-                '--output', self.folder / 'real.bkm')
-        self.assertGreater(len(tiles_of(self.folder / 'real.bkm')), 10)
+        self.finish(self.start(city(frame='luminar_lidar'), '--workers', '2', '--resume'))
+        index = json.loads((self.output / 'index.json').read_text())
+        self.assertEqual([piece['scans'] for piece in index['drives'][0]['pieces']], [2, 2, 1])
+        self.assertGreater(len(tiles_of(*(self.output / region['file'] for region in index['regions']))), 10)
 
 
 if __name__ == '__main__':

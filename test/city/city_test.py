@@ -237,7 +237,7 @@ class Made(MadeCity):
             work.prepare(setup._replace(programs=str(self.folder)))
         self.assertTrue(raised.exception.of_worker)
         bag = self.folder / 'unseen.bag'
-        found = work.write_bag(setup, Drive('unseen', bag, 'labels', bag, Bag(bag, '/points', 'map', 'label', True)))
+        found = work.count_clouds(setup, Drive('unseen', bag, 'labels', bag, Bag(bag, '/points', 'map', 'label', True)))
         self.assertIn(f'{socket.gethostname()} does not see {bag}; mount it', found['fault'])
         self.assertTrue(found['of_worker'])
         self.addCleanup(setattr, work, 'SIGHT', work.SIGHT)
@@ -313,7 +313,7 @@ class Made(MadeCity):
         # The ways are where the sensor was.
         index = json.loads((self.output / 'index.json').read_text())
         poses = [[float(word) for word in line.split()] for line in (self.folder / 'd1/poses.txt').read_text().splitlines()]
-        self.assertEqual([list(at) for at in report.way_of(index['drives'][0])], [[p[3], p[7], p[11]] for p in poses])
+        self.assertEqual([list(at) for at in report.way_of(index['drives'][0], self.output)], [[p[3], p[7], p[11]] for p in poses])
         again = self.finish(self.start(self.describe(['d1', 'd2', 'd3']), '--workers', '2', '--resume', '--no-picture'))
         self.assertIn('9 of 9', again)
         self.assertIn('| map pieces | 9 | 0 | 0.0 |', (self.output / 'report.md').read_text())

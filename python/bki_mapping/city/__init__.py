@@ -6,8 +6,7 @@ names of files pass through it. docs/city.md explains the program map_city; the 
 
     description.py   what a city is made of: a YAML file
     plan.py          its pieces and regions, and the files that they are in
-    bags.py          bags, written as sequences
-    work.py          the tasks: write a bag, map a piece, sum a region, check it
+    work.py          the tasks: count the clouds of a bag, map a piece, sum a region, check it
     build.py         gives the tasks to Dask, and follows them
     report.py        what people read: progress, a report and a picture
 """

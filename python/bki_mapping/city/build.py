@@ -1,4 +1,5 @@
 """Gives the tasks of a city to Dask, and follows them. Only names of files and figures pass through Dask."""
+import collections
 import contextlib
 import errno
 import fcntl
@@ -118,7 +119,7 @@ class Builder:
             raise CityError(str(fault)) from None
 
     def make(self):
-        pieces = self.map_drives(self.write_bags())
+        pieces = self.map_drives(self.count_clouds())
         mapped = {drive.name: drive for drive in self.city.drives if drive.name not in self.broken}
         if not mapped:
             reasons = '; '.join(f'{name}: {why}' for name, why in sorted(self.broken.items()))
@@ -154,10 +155,10 @@ class Builder:
     @staticmethod
     def drive_entry(drive, pieces):
         """What the index says of a drive."""
-        source = {'bag': str(drive.bag.path)} if drive.bag else {}
-        folder = pieces[0].drive.folder
-        return {'name': drive.name, 'sequence': str(folder), **source, 'poses': str(pieces[0].drive.poses),
-                'poses_in': drive.poses_in,
+        source = {'sequence': str(drive.folder), 'poses': str(drive.poses), 'poses_in': drive.poses_in}
+        if drive.bag:
+            source = {'bag': str(drive.bag.path), 'cloud_topic': drive.bag.cloud_topic, 'frame': drive.bag.frame}
+        return {'name': drive.name, **source,
                 'pieces': [dict(file=piece.file, id=piece.id, first=piece.first, scans=piece.scans) for piece in pieces]}
 
     def leave_out(self, drive, why):
@@ -165,23 +166,18 @@ class Builder:
             self.broken[drive.name] = why
             self.say(f"drive '{drive.name}' is left out: {why}")
 
-    def write_bags(self):
-        """Writes bags as sequences, unless it was done before. Returns the drives, all with sequences."""
+    def count_clouds(self):
+        """Returns the drives, with the number of clouds of each bag."""
         bags = []
         for drive in self.city.drives:
             if drive.bag and drive.bag.path.exists():
-                bags.append((drive, (work.write_bag, self.setup, drive)))
+                bags.append((drive, (work.count_clouds, self.setup, drive)))
             elif drive.bag:
                 self.leave_out(drive, f'{drive.bag.path} does not exist; give the path of a bag')
         drives = {drive.name: drive for drive in self.city.drives if not drive.bag}
         for drive, found in self.follow('bag', 'bags', bags, drive_of=lambda drive: drive):
-            if 'fault' in found:
-                continue
-            if found['without_pose']:
-                self.say(f"drive '{drive.name}': {found['without_pose']} of {found['clouds'] + found['without_pose']} clouds "
-                         f"have no transform to '{drive.bag.frame}' and are left out")
-            folder = self.folder / found['file']
-            drives[drive.name] = drive._replace(folder=folder, poses=folder / 'poses.txt')
+            if 'fault' not in found:
+                drives[drive.name] = drive._replace(clouds=found['clouds'])
         return [drive for _, drive in sorted(drives.items())]
 
     def map_drives(self, drives):
@@ -194,7 +190,24 @@ class Builder:
             except CityError as error:
                 self.leave_out(drive, str(error))
         done = self.follow('map', 'pieces', tasks, drive_of=lambda piece: piece.drive)
-        return sorted((pair for pair in done if 'fault' not in pair[1]), key=lambda pair: pair[0].id)
+        pieces = sorted((pair for pair in done if 'fault' not in pair[1]), key=lambda pair: pair[0].id)
+        for drive in drives:
+            if drive.bag and drive.name not in self.broken:
+                self.report_clouds(drive, [found for piece, found in pieces if piece.drive.name == drive.name])
+        return pieces
+
+    def report_clouds(self, drive, found):
+        """Says how many clouds of a bag could not be mapped, and leaves it out if none could."""
+        clouds, dropped = sum(each['clouds'] for each in found), collections.Counter()
+        for each in found:
+            dropped.update(each['dropped'])
+        missing = sum(dropped.values())
+        reasons = ', '.join(f'{count} {reason}' for reason, count in sorted(dropped.items()))
+        if missing == clouds:
+            self.leave_out(drive, f'{drive.bag.path}: no cloud of {drive.bag.cloud_topic} has a transform to '
+                           f"'{drive.bag.frame}' ({reasons}); record tf with the clouds, or give another frame")
+        elif missing:
+            self.say(f"drive '{drive.name}': {missing} of {clouds} clouds are left out: {reasons}")
 
     def follow(self, stage, what, tasks, must=False, drive_of=None, count_of=None):
         """Lets workers do tasks. Returns each task with its result. must: a fault ends the whole, as one of a worker
@@ -238,7 +251,7 @@ class Builder:
 
     def remove_old(self, index):
         """Removes what earlier cities left, and what killed tasks did, once the new index names all that is needed. Pieces and
-        written bags stay: they make changes of the city cheap."""
+        their accounts stay: they make changes of the city cheap."""
         kept = {each['file'] for each in index['regions']}
         for path in (self.folder / 'regions').iterdir():
             if f'regions/{path.name}' not in kept:
@@ -249,12 +262,11 @@ class Builder:
                 path.unlink()
         shutil.rmtree(self.folder / 'sums', ignore_errors=True)
         own = pathlib.Path(self.setup.token)
-        for pattern in ('pieces/*/.*.bkm*', 'regions/.*.bkm*', '.*.json*', 'bags/.*', 'pictures/.*', '.run.*', '.report.md.*'):
+        for pattern in ('pieces/*/.*', 'regions/.*.bkm*', '.*.json*', 'pictures/.*', '.run.*', '.report.md.*'):
             for path in self.folder.glob(pattern):
-                if path.is_dir():
-                    shutil.rmtree(path)
-                elif path != own:
+                if path != own:
                     path.unlink()
+        shutil.rmtree(self.folder / 'bags', ignore_errors=True)  # of earlier versions
 
 
 def unfit_process(client):

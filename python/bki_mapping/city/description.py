@@ -20,11 +20,12 @@ class Bag(NamedTuple):
 
 class Drive(NamedTuple):
     name: str
-    folder: pathlib.Path  # of the sequence; of a bag, where it is written as a sequence
+    folder: pathlib.Path  # of the sequence; of a bag, its path
     labels: str
     poses: pathlib.Path  # in the frame of the city
     bag: Optional[Bag] = None
     poses_in: str = ''  # the sensor that the poses are of, one of SENSORS; '': as map_sequence finds it
+    clouds: int = 0  # of a bag, how many it has on its topic, once it has been asked
 
 
 class City(NamedTuple):

@@ -50,27 +50,35 @@ def stamps_of(paths: Iterable[pathlib.Path]) -> List:
     return stamps
 
 
-def written_bag(drive: Drive) -> str:
-    """Where a bag is written as a sequence, below the folder of the city."""
-    return f'bags/{drive.name}-{digest(str(drive.bag.path), *drive.bag[1:], stamps_of([drive.bag.path]))}'
-
-
 def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     """identity: what the programs say of themselves, because other versions may make other pieces. Raises CityError if the
     drive has no scans."""
+    settings = [city.classes, stamps_of([pathlib.Path(city.classes)]),
+                stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings, identity]
+    if drive.bag:
+        source = [str(drive.bag.path), drive.bag[1:], stamps_of([drive.bag.path])]
+        counts = {first: min(city.piece_scans, drive.clouds - first) for first in range(0, drive.clouds, city.piece_scans)}
+        return [piece_of(drive, first, count, source, settings, count) for first, count in counts.items()]
     files = scans_of(drive)
     numbers = list(files)
     shared = [str(drive.poses), *filter(None, [drive.poses_in]), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
-    settings = [city.classes, stamps_of([pathlib.Path(city.classes)]),
-                stamps_of([pathlib.Path(city.config)]) if city.config else None, city.settings, identity]
     pieces = []
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
         scans = stamps_of(files[number] for number in some)
         labels = stamps_of(drive.folder / drive.labels / f'{files[number].stem}.label' for number in some)
-        key = digest(drive.name, str(drive.folder), drive.labels, shared, settings, scans, labels)
-        pieces.append(Piece(drive, some[0], len(some), f'pieces/{drive.name}/{some[0]:06d}-{key}.bkm'))
+        pieces.append(piece_of(drive, some[0], len(some), str(drive.folder), drive.labels, shared, settings, scans, labels))
     return pieces
+
+
+def piece_of(drive: Drive, first, scans, *parts) -> Piece:
+    """parts: what the content depends on, beside the drive's name."""
+    return Piece(drive, first, scans, f'pieces/{drive.name}/{first:06d}-{digest(drive.name, *parts)}.bkm')
+
+
+def account_of(piece_file: str) -> str:
+    """The file that says what became of the clouds of a bag's piece, and where the sensor was."""
+    return f'{piece_file[:-len(".bkm")]}.json'
 
 
 def columns_of(path) -> List[Tuple[int, int]]:

@@ -1,5 +1,6 @@
 """What people read of a city: progress while it is made, a report, and a picture from above."""
 import collections
+import json
 import os
 import pathlib
 import re
@@ -97,7 +98,7 @@ class Cost:
         self.core_seconds += found['core_seconds']
 
 
-STAGES = {'bag': 'write bags as sequences', 'map': 'map pieces', 'sum': 'sum regions', 'check': 'check and draw regions'}
+STAGES = {'bag': 'count clouds of bags', 'map': 'map pieces', 'sum': 'sum regions', 'check': 'check and draw regions'}
 
 
 def write(folder, index, costs, elapsed, picture, warnings):
@@ -175,7 +176,7 @@ def draw(folder, index):
                 interpolation='antialiased')
     colors = pyplot.get_cmap('tab20')
     for number, drive in enumerate(index['drives'][:DRAWN]):
-        way = way_of(drive)
+        way = way_of(drive, folder)
         if len(way):
             axes.plot(way[:, 0], way[:, 1], color='white', linewidth=1.8)
             axes.plot(way[:, 0], way[:, 1], color=colors(number % 20), linewidth=1.0, label=drive['name'])
@@ -192,9 +193,12 @@ def draw(folder, index):
     return ''
 
 
-def way_of(drive):
-    """Where the sensor was in each scan of a drive of the index, (N, 3), in the frame of the city [m]."""
+def way_of(drive, city):
+    """Where the sensor was in each scan of a drive of the index, (N, 3), in the frame of the city [m]. city: its folder."""
     import numpy
+    if 'bag' in drive:
+        accounts = [json.loads((city / plan.account_of(piece['file'])).read_text()) for piece in drive['pieces']]
+        return numpy.array([at for account in accounts for at in account['way']], float).reshape(-1, 3)
     folder = pathlib.Path(drive['sequence'])
     try:
         if not (folder / 'velodyne').is_dir():

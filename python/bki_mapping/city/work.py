@@ -18,11 +18,11 @@ import time
 import uuid
 from typing import NamedTuple
 
-from bki_mapping.city import bags, plan
-from bki_mapping.city.description import CityError
+from bki_mapping.city import plan
 
-VERSION = 4  # of the tasks: a worker whose modules have another cannot do them
+VERSION = 5  # of the tasks: a worker whose modules have another cannot do them
 STOPPED = 130  # status of programs that SIGTERM or SIGINT has ended early
+FRAME = 'map'  # of the maps of map_sequence, with which those of bags are added
 TRIES = 3  # of a program that a signal ends, as when memory is short
 SIGHT = 10.0  # how long a worker may take to see what another machine has written [s]
 LIBC, PR_SET_PDEATHSIG = ctypes.CDLL(None), 1
@@ -46,6 +46,7 @@ class Ran(NamedTuple):
     """What is known of a program that has done its work."""
     core_seconds: float
     warnings: tuple  # what it has warned of, without a repetition
+    printed: str  # on its standard output
 
 
 class Fault(Exception):
@@ -180,6 +181,7 @@ def run(setup, name, arguments, log):
         with open(path, 'a') as file, tempfile.TemporaryFile() as errors:
             file.write(f'$ {" ".join(command)}\n')
             file.flush()
+            printed = file.tell()
             try:
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors,
                                            preexec_fn=dies_with(os.getpid()))
@@ -190,6 +192,9 @@ def run(setup, name, arguments, log):
                 status = -signal.SIGTERM
             errors.seek(0)
             text = errors.read().decode(errors='replace')
+            with open(path, errors='replace') as written:
+                written.seek(printed)
+                output = written.read()
             spent += seconds
             file.seek(0, os.SEEK_END)
             file.write(f'{text}status {status}, {time.time() - begin:.1f} s\n')
@@ -197,7 +202,7 @@ def run(setup, name, arguments, log):
             break
     if status == 0:
         warnings = dict.fromkeys(line[len(WARNING):] for line in text.splitlines() if line.startswith(WARNING))
-        return Ran(spent, tuple(warnings)[:MOST_WARNINGS])
+        return Ran(spent, tuple(warnings)[:MOST_WARNINGS], output)
     lines = [line for line in text.strip().splitlines() if line]
     if status in (126, 127):
         raise not_started(command[0], lines[-1] if lines else f'status {status}')
@@ -237,50 +242,85 @@ def result_of(setup, file, ran, **more):
 
 
 @task
-def write_bag(setup, drive):
-    """Writes a bag as a sequence."""
+def count_clouds(setup, drive):
+    """Asks a bag how many clouds it has on its topic."""
     if not drive.bag.path.exists():
         raise unseen(drive.bag.path)  # map_city has seen it
-    begin = time.process_time()
-    try:
-        made = produce(setup, plan.written_bag(drive), lambda own: bags.extract(drive.bag, own))
-    except CityError as error:
-        raise Fault(str(error)) from None
-    except ImportError as error:
-        raise Fault(f'drive {drive.name} is a bag, which needs ROS on {socket.gethostname()} ({error}); install '
-                    'python3-rosbag and python3-tf2-ros there', of_worker=True) from None
-    folder = pathlib.Path(setup.folder) / plan.written_bag(drive)
-    known = json.loads((folder / 'bag.json').read_text())
-    return {'file': plan.written_bag(drive), 'bytes': sum(each.stat().st_size for each in folder.rglob('*') if each.is_file()),
-            'made': made is not None, 'core_seconds': time.process_time() - begin, 'clouds': known['clouds'],
-            'without_pose': known['without_pose']}
+    ran = run(setup, 'map_bag', [drive.bag.path, '--print-topics'], f'{drive.name}-topics.log')
+    topics = dict(line.rsplit(' ', 1) for line in ran.printed.splitlines())
+    for name in (drive.bag.cloud_topic, '/' + drive.bag.cloud_topic):
+        if name in topics:
+            return {'file': str(drive.bag.path), 'bytes': 0, 'made': False, 'core_seconds': ran.core_seconds,
+                    'clouds': int(topics[name])}
+    raise Fault(f'{drive.bag.path} has no clouds at {drive.bag.cloud_topic}; it has clouds at: '
+                + (', '.join(topics) or 'no topic'))
 
 
 @task
 def map_piece(setup, piece):
     drive = piece.drive
-    arguments = ['--sequence', drive.folder, '--labels', drive.labels, '--first', piece.first, '--scans', piece.scans,
-                 '--drive', piece.id, '--threads', 1, *setup.settings]
-    if (drive.folder / 'velodyne').is_dir():
-        arguments += ['--poses', drive.poses]
-        if drive.poses_in:
-            arguments += ['--poses-in', drive.poses_in]
     path = pathlib.Path(setup.folder) / piece.file
+    account = path.parent / pathlib.PurePath(plan.account_of(piece.file)).name
     while True:
+        if drive.bag and path.exists() and not account.exists():  # which were written in the other order
+            path.unlink()
         try:
-            ran = produce(setup, piece.file, lambda own: run(setup, 'map_sequence', arguments + ['--output', own],
-                                                             f'{drive.name}-{piece.first:06d}.log'))
+            ran = produce(setup, piece.file, lambda own: (map_bag if drive.bag else map_sequence)(setup, piece, own))
         except Fault as fault:
-            if not drive.folder.is_dir():
+            if not drive.folder.exists():
                 raise unseen(drive.folder) from None
             raise fault
         try:
-            return result_of(setup, piece.file, ran, columns=plan.columns_of(path))
+            known = json.loads(account.read_text()) if drive.bag else {}
+            known.pop('way', None)
+            return result_of(setup, piece.file, ran, columns=plan.columns_of(path), **known)
         except sqlite3.DatabaseError as error:
             if ran is not None:  # it is new, so the disk is to blame
                 raise Fault(f'{path} is damaged on {socket.gethostname()} ({error}); remove it', of_worker=True) from None
             with contextlib.suppress(FileNotFoundError):  # another worker may have removed it
                 path.unlink()
+
+
+def of_piece(setup, piece, own):
+    """Arguments that both programs take."""
+    return ['--first', piece.first, '--scans', piece.scans, '--drive', piece.id, '--threads', 1, *setup.settings,
+            '--output', own]
+
+
+def log_of_piece(piece):
+    return f'{piece.drive.name}-{piece.first:06d}.log'
+
+
+def map_sequence(setup, piece, own):
+    drive = piece.drive
+    arguments = ['--sequence', drive.folder, '--labels', drive.labels]
+    if (drive.folder / 'velodyne').is_dir():
+        arguments += ['--poses', drive.poses]
+        if drive.poses_in:
+            arguments += ['--poses-in', drive.poses_in]
+    return run(setup, 'map_sequence', arguments + of_piece(setup, piece, own), log_of_piece(piece))
+
+
+def map_bag(setup, piece, own):
+    """Also writes the account of the piece."""
+    bag = piece.drive.bag
+    report, trajectory, written = (own.with_suffix(end) for end in ('.report.json', '.trajectory.txt', '.json'))
+    arguments = [bag.path, '--cloud-topic', bag.cloud_topic, '--frame', bag.frame, '--frame-in-file', FRAME, '--set',
+                 f'label_field={bag.label_field if bag.labelled else ""}', '--allow-empty', '--report', report,
+                 '--trajectory', trajectory]
+    try:
+        ran = run(setup, 'map_bag', arguments + of_piece(setup, piece, own), log_of_piece(piece))
+        clouds = json.loads(report.read_text())['clouds']
+        way = [[float(word) for word in line.split()[1:4]] for line in trajectory.read_text().splitlines()]
+        written.write_text(json.dumps({'clouds': clouds['read'], 'dropped': clouds.get('dropped', {}), 'way': way}) + '\n')
+        if is_over(setup):
+            raise Fault(OVER, of_worker=True)
+        os.replace(written, own.parent / pathlib.PurePath(plan.account_of(piece.file)).name)
+        return ran
+    finally:
+        for file in (report, trajectory, written):
+            with contextlib.suppress(FileNotFoundError):
+                file.unlink()
 
 
 @task
