@@ -11,8 +11,8 @@ bki_mapping_room(simulation FOLDER lab/simulation SOURCES
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp
-    occupants.cpp octomap_mapper.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp reliability.cpp
-    semantic_evaluation.cpp truth_evaluation.cpp
+    occupants.cpp octomap_mapper.cpp octomap_settings.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp
+    reliability.cpp semantic_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation bki_mapping_beams)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
@@ -22,8 +22,8 @@ bki_mapping_join(bki_mapping_simulation bki_mapping_evaluation)
 foreach(name simulate_city simulate_drive)
   bki_mapping_program(lab/tools ${name} bki_mapping_simulation)
 endforeach()
-bki_mapping_program(lab/tools evaluate_map bki_mapping_evaluation)
-target_sources(evaluate_map PRIVATE lab/tools/draw.cpp)
+bki_mapping_program(lab/tools evaluate_map bki_mapping_evaluation pcl_filters)
+target_sources(evaluate_map PRIVATE lab/tools/draw.cpp lab/tools/yardstick.cpp)
 
 # bki_mapping_benchmark(NAME file... [LINK library...]): built and installed only with the long tests.
 set(BKI_MAPPING_BENCHMARKS)
@@ -33,7 +33,7 @@ function(bki_mapping_benchmark name)
   bki_mapping_tool(${name} bki_mapping_simulation ${arg_LINK})
   set(BKI_MAPPING_BENCHMARKS ${BKI_MAPPING_BENCHMARKS} ${name} PARENT_SCOPE)
 endfunction()
-bki_mapping_benchmark(benchmark_sequence lab/benchmark/curves.cpp lab/tools/draw.cpp LINK pcl_filters)
+bki_mapping_benchmark(benchmark_sequence lab/benchmark/curves.cpp lab/tools/draw.cpp lab/tools/yardstick.cpp LINK pcl_filters)
 bki_mapping_benchmark(benchmark_store)
 find_package(benchmark QUIET)  # Google Benchmark: for developers
 if(benchmark_FOUND)

@@ -1,8 +1,5 @@
 // Times the integration of a sequence in every mode, against pcl::VoxelGrid on the same scans in the same
 // run.
-#include <pcl/filters/voxel_grid.h>
-#include <pcl/point_types.h>
-
 #include <cstdio>
 
 #include "bki_mapping/mapping/mapper_config.h"
@@ -15,6 +12,7 @@
 #include "curves.h"
 #include "tools/run_report.h"
 #include "tools/sequence_options.h"
+#include "tools/yardstick.h"
 
 namespace {
 
@@ -64,23 +62,10 @@ po::options_description options() {
   return options;
 }
 
-/// Times pcl::VoxelGrid with leaves of 0.1 m on raw scans, on one thread.
 void timeYardstick(const std::vector<SequenceFrame>& frames, std::size_t warm_up, Timing& timing) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
-    for (std::size_t p = 0; p < frames[i].points.size(); ++p) {
-      pcl::PointXYZL point;
-      point.getVector3fMap() = frames[i].points[p];
-      point.label = frames[i].labels[p];
-      cloud->push_back(point);
-    }
-    pcl::VoxelGrid<pcl::PointXYZL> grid;
-    pcl::PointCloud<pcl::PointXYZL> output;
-    Stopwatch watch;
-    grid.setInputCloud(cloud);
-    grid.setLeafSize(0.1f, 0.1f, 0.1f);
-    grid.filter(output);
-    if (i >= warm_up) timing.yardstick.push_back(watch.lap());
+    const double ms = tools::yardstickMs(frames[i]);
+    if (i >= warm_up) timing.yardstick.push_back(ms);
   }
 }
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "bki_mapping/rules/voxel_state.h"
-
 namespace bki_mapping {
 
 void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
@@ -77,14 +75,13 @@ bool DynamicsEvaluation::isStillThere(const VoxelIndex& index, const Taken& take
   return n != kNoPosition && voxels_[n].moved && voxels_[n].last_moved + 1 == added_;
 }
 
-std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(const SemanticMap& map,
-                                                                        const StateRules& rules,
+std::vector<std::pair<VoxelIndex, VoxelFate>> DynamicsEvaluation::fates(Occupants& map,
                                                                         const Taken& taken) const {
   const std::vector<std::uint32_t> early_moving_points = earlyMovingPoints();
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates;
   for (std::size_t n = 0; n < voxels_.size(); ++n) {
     const Voxel& voxel = voxels_[n];
-    const bool occupied = viewWithoutEntropy(map, rules, voxel.index).state == VoxelState::kOccupied;
+    const bool occupied = map.at(voxel.index).has_value();
     if (voxel.isShared()) {
       fates.emplace_back(voxel.index, occupied ? VoxelFate::kKept : VoxelFate::kLost);
     } else if (early_moving_points[n] > 0 && !mayBeOccupied(voxel, taken)) {

@@ -1,6 +1,5 @@
 #include "evaluation/occupancy_evaluation.h"
 
-#include "bki_mapping/rules/voxel_state.h"
 #include "evaluation/crossed_voxels.h"
 
 namespace bki_mapping {
@@ -23,14 +22,14 @@ void OccupancyEvaluation::add(const Scan& scan) {
   forEachCrossedVoxel(scan, geometry_, [this](const VoxelIndex& index) { seen(index); });
 }
 
-Reliability OccupancyEvaluation::compare(const SemanticMap& map, const StateRules& rules,
+Reliability OccupancyEvaluation::compare(const Occupants& map,
                                          const std::function<bool(const VoxelIndex&)>& left) const {
   Reliability reliability;
   for (const Seen& voxel : voxels_) {
-    const VoxelView view = viewWithoutEntropy(map, rules, voxel.index);
-    if (!(view.evidence > 0.0f)) continue;
+    const std::optional<double> occupancy = map.occupantOf(voxel.index).occupancy;
+    if (!occupancy) continue;
     if (voxel.moving && !voxel.standing && !left(voxel.index)) continue;
-    reliability.add(static_cast<double>(view.occupancy), 1, voxel.standing ? 1 : 0);
+    reliability.add(*occupancy, 1, voxel.standing ? 1 : 0);
   }
   return reliability;
 }

@@ -10,6 +10,7 @@
 #include "bki_mapping/core/grid_table.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/rules/state_rules.h"
+#include "evaluation/occupants.h"
 #include "evaluation/reliability.h"
 #include "simulation/truth_cloud.h"
 
@@ -30,8 +31,11 @@ class OccupancyEvaluation {
 
   /// How often something is in a voxel, by its occupancy, over the known voxels that were hit or crossed.
   /// @param left whether what moved through a voxel has left it by the end.
+  Reliability compare(const Occupants& map, const std::function<bool(const VoxelIndex&)>& left) const;
   Reliability compare(const SemanticMap& map, const StateRules& rules,
-                      const std::function<bool(const VoxelIndex&)>& left) const;
+                      const std::function<bool(const VoxelIndex&)>& left) const {
+    return compare(MapOccupants(map, rules), left);
+  }
 
  private:
   struct Seen {

@@ -1,6 +1,15 @@
 #include "evaluation/occupants.h"
 
 namespace bki_mapping {
+namespace {
+
+Occupant occupantOfView(const VoxelView& view) {
+  Occupant occupant{view.state, view.label, std::nullopt};
+  if (view.evidence > 0.0f) occupant.occupancy = static_cast<double>(view.occupancy);
+  return occupant;
+}
+
+}  // namespace
 
 std::optional<ClassId> MapOccupants::at(const VoxelIndex& voxel) {
   const BlockIndex index = GridGeometry::blockOf(voxel);
@@ -15,6 +24,16 @@ std::optional<ClassId> MapOccupants::at(const VoxelIndex& voxel) {
   const auto offset = static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel));
   if (views_[n].state[offset] != VoxelState::kOccupied) return std::nullopt;
   return views_[n].label[offset];
+}
+
+Occupant MapOccupants::occupantOf(const VoxelIndex& voxel) const {
+  return occupantOfView(viewWithoutEntropy(map_, rules_, voxel));
+}
+
+void MapOccupants::forEachKnown(const Visit& visit) const {
+  forEachKnownVoxel(map_, rules_, [&](const VoxelIndex& voxel, const VoxelView& view) {
+    visit(voxel, occupantOfView(view));
+  });
 }
 
 }  // namespace bki_mapping

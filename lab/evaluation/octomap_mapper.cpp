@@ -5,13 +5,42 @@
 #include "core/stopwatch.h"
 
 namespace bki_mapping {
+namespace {
+
+constexpr int kKeyOfZero = 1 << 15;
+
+octomap::OcTreeKey keyOf(const VoxelIndex& voxel) {
+  const auto key = [](int coordinate) { return static_cast<octomap::key_type>(coordinate + kKeyOfZero); };
+  return {key(voxel.x), key(voxel.y), key(voxel.z)};
+}
+
+octomap::point3d pointOf(const Eigen::Vector3d& point) {
+  const Eigen::Vector3f p = point.cast<float>();
+  return {p.x(), p.y(), p.z()};
+}
+
+}  // namespace
 
 struct OctomapMapper::Tree {
-  explicit Tree(double resolution) : octree(resolution) {}
+  Tree(double resolution, const OctomapSettings& given) : octree(resolution), settings(given) {
+    octree.setProbHit(settings.hit);
+    octree.setProbMiss(settings.miss);
+    octree.setClampingThresMin(settings.min);
+    octree.setClampingThresMax(settings.max);
+    octree.setOccupancyThres(settings.threshold);
+  }
+
+  Occupant occupantOf(const octomap::OcTreeNode& node) const {
+    const bool occupied = octree.isNodeOccupied(node);
+    return {occupied ? VoxelState::kOccupied : VoxelState::kFree, kFreeClass, node.getOccupancy()};
+  }
+
   octomap::OcTree octree;
+  OctomapSettings settings;
 };
 
-OctomapMapper::OctomapMapper(double resolution) : tree_(std::make_unique<Tree>(resolution)) {}
+OctomapMapper::OctomapMapper(double resolution, const OctomapSettings& settings)
+    : tree_(std::make_unique<Tree>(resolution, settings)) {}
 
 OctomapMapper::~OctomapMapper() = default;
 
@@ -19,23 +48,46 @@ double OctomapMapper::integrate(const Scan& scan) {
   octomap::Pointcloud cloud;
   cloud.reserve(scan.points.size());
   for (const Eigen::Vector3f& point : scan.points) {
-    if (!point.allFinite()) continue;
-    const Eigen::Vector3f at = (scan.origin + point.cast<double>()).cast<float>();
-    cloud.push_back(at.x(), at.y(), at.z());
+    if (point.allFinite()) cloud.push_back(pointOf(scan.origin + point.cast<double>()));
   }
-  const Eigen::Vector3f origin = scan.origin.cast<float>();
+  const octomap::point3d origin = pointOf(scan.origin);
+  const OctomapSettings& settings = tree_->settings;
+  octomap::OcTree& octree = tree_->octree;
   Stopwatch watch;
-  tree_->octree.insertPointCloud(cloud, octomap::point3d(origin.x(), origin.y(), origin.z()));
+  if (settings.rays) {
+    octree.insertPointCloudRays(cloud, origin, -1.0, settings.lazy);
+  } else {
+    octree.insertPointCloud(cloud, origin, settings.max_range, settings.lazy, settings.discretize);
+  }
+  if (settings.compress_map) octree.prune();
   return watch.lap();
 }
 
 std::optional<ClassId> OctomapMapper::at(const VoxelIndex& voxel) {
-  constexpr int kKeyOfZero = 1 << 15;
-  const auto key = [](int coordinate) { return static_cast<octomap::key_type>(coordinate + kKeyOfZero); };
-  const octomap::OcTreeNode* const node =
-      tree_->octree.search(octomap::OcTreeKey(key(voxel.x), key(voxel.y), key(voxel.z)));
+  const octomap::OcTreeNode* const node = tree_->octree.search(keyOf(voxel));
   if (!node || !tree_->octree.isNodeOccupied(node)) return std::nullopt;
   return kFreeClass;
+}
+
+Occupant OctomapMapper::occupantOf(const VoxelIndex& voxel) const {
+  const octomap::OcTreeNode* const node = tree_->octree.search(keyOf(voxel));
+  return node ? tree_->occupantOf(*node) : Occupant{};
+}
+
+void OctomapMapper::forEachKnown(const Visit& visit) const {
+  const octomap::OcTree& octree = tree_->octree;
+  for (auto leaf = octree.begin_leafs(), end = octree.end_leafs(); leaf != end; ++leaf) {
+    const Occupant occupant = tree_->occupantOf(*leaf);
+    const octomap::OcTreeKey first = leaf.getIndexKey();  // of the corner of a pruned leaf
+    const int edge = 1 << (octree.getTreeDepth() - leaf.getDepth());
+    for (int x = 0; x < edge; ++x) {
+      for (int y = 0; y < edge; ++y) {
+        for (int z = 0; z < edge; ++z) {
+          visit({first[0] + x - kKeyOfZero, first[1] + y - kKeyOfZero, first[2] + z - kKeyOfZero}, occupant);
+        }
+      }
+    }
+  }
 }
 
 std::size_t OctomapMapper::bytes() const {

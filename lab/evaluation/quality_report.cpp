@@ -50,20 +50,26 @@ Json reliabilityJson(const Reliability& reliability) {
   return bins;
 }
 
-Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
+/// What needs no classes.
+Json trueSpaceJson(const TruthQuality& truth) {
   Json figures = spaceJson(truth.all);
-  figures["voxel_miou"] = truth.meanIou(classes);
-  figures["voxel_occupied_iou"] = truth.occupiedIou(classes);
   figures["occupancy_calibration_error"] = truth.occupancy.error();
   figures["occupancy_reliability"] = reliabilityJson(truth.occupancy);
-  figures["movable_voxels"] = truth.movable;
-  figures["ghost_voxels"] = truth.ghosts;
-  figures["mean_ghost_voxels"] = truth.mean_ghosts;
   for (std::size_t bin = 0; bin < truth.by_distance.size(); ++bin) {
     Json at = spaceJson(truth.by_distance[bin]);
     if (bin < TruthQuality::kDistances.size()) at["up_to"] = TruthQuality::kDistances[bin];
     figures["by_distance"].push_back(std::move(at));
   }
+  return figures;
+}
+
+Json truthJson(const TruthQuality& truth, const ClassTable& classes) {
+  Json figures = trueSpaceJson(truth);
+  figures["voxel_miou"] = truth.meanIou(classes);
+  figures["voxel_occupied_iou"] = truth.occupiedIou(classes);
+  figures["movable_voxels"] = truth.movable;
+  figures["ghost_voxels"] = truth.ghosts;
+  figures["mean_ghost_voxels"] = truth.mean_ghosts;
   for (const SemanticClass& c : classes.classes()) {
     if (truth.voxels.points(c.id) > 0) figures["voxel_iou"][c.name] = truth.voxels.iou(c.id);
   }
@@ -123,9 +129,13 @@ Json presenceJson(const PresenceQuality& p) {
 
 Json octomapJson(const OctomapQuality& octomap) {
   Json figures = dynamicsJson(octomap.dynamics);
+  figures["settings"] = octomap.settings;
   figures["presence"] = presenceJson(octomap.presence);
+  figures["occupancy_calibration_error"] = octomap.occupancy.error();
+  figures["occupancy_reliability"] = reliabilityJson(octomap.occupancy);
+  if (octomap.truth) figures["truth"] = trueSpaceJson(*octomap.truth);
   figures["median_ms"] = octomap.median_ms;
-  figures["bytes"] = octomap.bytes;
+  figures["map_bytes"] = octomap.bytes;
   return figures;
 }
 
@@ -191,13 +201,18 @@ void addPresence(const PresenceQuality& presence, Table& table) {
 void addOctomap(const OctomapQuality& octomap, Table& table) {
   const DynamicsQuality& d = octomap.dynamics;
   const auto percent = [](double fraction) { return figureText(100.0 * fraction); };
-  table.text("OctoMap of the same scans: SA " + percent(d.staticAccuracy()) + ", standing " +
-             percent(d.standingAccuracy()) + ", holes " + percent(d.holes()) + ", DA " +
+  table.text("OctoMap of the same scans, " + octomap.settings + ": SA " + percent(d.staticAccuracy()) +
+             ", standing " + percent(d.standingAccuracy()) + ", holes " + percent(d.holes()) + ", DA " +
              percent(d.dynamicAccuracy()) + ", AA " + percent(d.accuracy()) + ", PA moving within 50 m " +
              percent(octomap.presence.moving.back().accuracy()) + ", PA stayed " +
              percent(octomap.presence.stayedShare()) + "; to appear: " + delayText(octomap.presence.appear) +
-             "; to clear: " + delayText(octomap.presence.clear) + "; median " +
-             figureText(octomap.median_ms) + " ms a scan");
+             "; to clear: " + delayText(octomap.presence.clear) + "; ECE occupancy " +
+             percent(octomap.occupancy.error()) +
+             (octomap.truth ? "; free_precision " + percent(octomap.truth->all.free_precision.fraction()) +
+                                  ", free_recall " + percent(octomap.truth->all.free_recall.fraction())
+                            : "") +
+             "; " + std::to_string(octomap.bytes) + " bytes; median " + figureText(octomap.median_ms) +
+             " ms a scan");
 }
 
 void addCloud(const CloudQuality& cloud, Table& table) {
@@ -287,8 +302,9 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   if (quality.truth) addTruth(*quality.truth, classes, table);
   if (quality.cloud) addCloud(*quality.cloud, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
-             " of moving objects; median " + figureText(quality.median_ms) + " ms a scan");
-  if (quality.octomap) addOctomap(*quality.octomap, table);
+             " of moving objects; " + std::to_string(quality.bytes) + " bytes; median " +
+             figureText(quality.median_ms) + " ms a scan");
+  for (const OctomapQuality& octomap : quality.octomaps) addOctomap(octomap, table);
   for (const JudgedMap& judged : quality.judged) {
     const DynamicsQuality& with = judged.dynamics;
     table.text("with " + judged.settings + ": SA " + figureText(100.0 * with.staticAccuracy()) +
@@ -326,6 +342,8 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"occupancy_calibration_error", quality.occupancy.error()},
                   {"sparsification_error", s.sparsification_error},
                   {"median_ms", quality.median_ms},
+                  {"yardstick_ms", quality.yardstick_ms},
+                  {"map_bytes", quality.bytes},
                   {"labels_not_in_table", quality.unknown_labels},
                   {"classes", Json::array()}});
   for (const SemanticClass& c : classes.classes()) {
@@ -345,7 +363,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
     figures["judged"].push_back(dynamicsJson(judged.dynamics));
     figures["judged"].back()["settings"] = judged.settings;
   }
-  if (quality.octomap) figures["octomap"] = octomapJson(*quality.octomap);
+  for (const OctomapQuality& octomap : quality.octomaps) figures["octomap"].push_back(octomapJson(octomap));
   if (quality.cloud) figures["cloud"] = cloudJson(*quality.cloud);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);
   return figures.dump(2) + "\n";

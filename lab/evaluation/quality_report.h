@@ -22,10 +22,13 @@ struct JudgedMap {
 
 /// The same scans in an OctoMap.
 struct OctomapQuality {
+  std::string settings;  ///< as given
   DynamicsQuality dynamics;
   PresenceQuality presence;
-  double median_ms = 0.0;  ///< median time of a scan [ms]
-  std::size_t bytes = 0;   ///< of memory
+  Reliability occupancy;
+  std::optional<TruthQuality> truth;  ///< what needs no classes
+  double median_ms = 0.0;             ///< median time of a scan [ms]
+  std::size_t bytes = 0;              ///< of memory
 };
 
 struct MapQuality {
@@ -35,10 +38,12 @@ struct MapQuality {
   SemanticQuality semantics;
   Reliability occupancy;              ///< by the points, see OccupancyEvaluation
   std::optional<CloudQuality> cloud;  ///< compared with a ground-truth cloud
-  std::optional<OctomapQuality> octomap;
+  std::vector<OctomapQuality> octomaps;
   std::optional<TruthQuality> truth;               ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   double median_ms = 0.0;                          ///< median time of a scan [ms]
+  double yardstick_ms = 0.0;                       ///< median time of the yardstick on the same scans [ms]
+  std::size_t bytes = 0;                           ///< of memory
   bool labels_are_ids = false;                     ///< so that it is unknown what moves
   std::size_t labels = 0, unknown_labels = 0;      ///< labels of all points; those not in the class table
   std::uint32_t unknown_label = 0;                 ///< an example of the latter

@@ -101,6 +101,13 @@ void TruthEvaluation::countGhosts(const SemanticMap& map, const StateRules& rule
 }
 
 TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& rules, double time) const {
+  TruthQuality quality = compare(MapOccupants(map, rules), time);
+  quality.ghosts = ghosts(map, rules, time).size();
+  quality.mean_ghosts = static_cast<double>(ghosts_) / static_cast<double>(moments_);
+  return quality;
+}
+
+TruthQuality TruthEvaluation::compare(const Occupants& map, double time) const {
   TruthQuality quality;
   const auto add = [&](Proportion SpaceQuality::*figure, std::size_t bin, bool correct) {
     (quality.all.*figure).add(correct);
@@ -109,34 +116,30 @@ TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& 
   for (const Seen& voxel : voxels_) {
     const std::size_t bin = distanceBin(voxel.index);
     const ClassId truth = classOf(truth_.contentAt(voxel.index, time));
-    const VoxelView view = viewWithoutEntropy(map, rules, voxel.index);
-    quality.voxels.add(truth, view.label);
-    if (view.evidence > 0.0f) {
-      quality.occupancy.add(static_cast<double>(view.occupancy), 1, truth == kFreeClass ? 0 : 1);
-    }
+    const Occupant occupant = map.occupantOf(voxel.index);
+    quality.voxels.add(truth, occupant.label);
+    if (occupant.occupancy) quality.occupancy.add(*occupant.occupancy, 1, truth == kFreeClass ? 0 : 1);
     if (voxel.crossed && truth == kFreeClass) {
-      add(&SpaceQuality::free_recall, bin, view.state == VoxelState::kFree);
+      add(&SpaceQuality::free_recall, bin, occupant.state == VoxelState::kFree);
     }
     if (voxel.hit && truth != kFreeClass) {
-      add(&SpaceQuality::occupied_recall, bin, view.state == VoxelState::kOccupied);
+      add(&SpaceQuality::occupied_recall, bin, occupant.state == VoxelState::kOccupied);
     }
   }
-  forEachKnownVoxel(map, rules, [&](const VoxelIndex& index, const VoxelView& view) {
-    if (view.state != VoxelState::kFree && view.state != VoxelState::kOccupied) return;
+  map.forEachKnown([&](const VoxelIndex& index, const Occupant& occupant) {
+    if (occupant.state != VoxelState::kFree && occupant.state != VoxelState::kOccupied) return;
     const std::size_t bin = distanceBin(index);
     const simulation::VoxelContent content = truth_.contentAt(index, time);
     const ClassId truth = classOf(content);
-    if (view.state == VoxelState::kFree) {
+    if (occupant.state == VoxelState::kFree) {
       add(&SpaceQuality::free_precision, bin, content.filled < kMostlyEmpty);
       return add(&SpaceQuality::free_empty, bin, !content.label);
     }
     add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
     add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
-    if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, view.label);
-    quality.movable += classes_.find(view.label)->dynamic;
+    if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, occupant.label);
+    quality.movable += occupant.label != kFreeClass && classes_.find(occupant.label)->dynamic;
   });
-  quality.ghosts = ghosts(map, rules, time).size();
-  quality.mean_ghosts = static_cast<double>(ghosts_) / static_cast<double>(moments_);
   return quality;
 }
 

@@ -8,6 +8,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/rules/state_rules.h"
+#include "evaluation/occupants.h"
 #include "evaluation/semantic_evaluation.h"
 #include "simulation/voxel_truth.h"
 
@@ -67,6 +68,8 @@ class TruthEvaluation {
   /// Counts the ghosts in the map at a time. @param time since the start of the drive [s].
   void countGhosts(const SemanticMap& map, const StateRules& rules, double time);
   TruthQuality compare(const SemanticMap& map, const StateRules& rules, double time) const;
+  /// The same without ghosts, of a map of any kind. Without classes, `voxels` and `movable` mean nothing.
+  TruthQuality compare(const Occupants& map, double time) const;
   /// The voxels occupied in the map by a class that can move, although nothing of such a class has been near
   /// for 0.5 s.
   std::vector<VoxelIndex> ghosts(const SemanticMap& map, const StateRules& rules, double time) const;

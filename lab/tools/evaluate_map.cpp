@@ -2,6 +2,7 @@
 // calibration.
 #include <filesystem>
 #include <iostream>
+#include <list>
 #include <sstream>
 
 #include "bki_mapping/core/named_parameter.h"
@@ -23,6 +24,7 @@
 #include "tools/draw.h"
 #include "tools/interruption.h"
 #include "tools/sequence_options.h"
+#include "tools/yardstick.h"
 
 namespace {
 
@@ -62,8 +64,9 @@ po::options_description options() {
       "cloud-distance",
       tools::realOption("--cloud-distance", 0.0, 10.0)->value_name("M")->default_value(0.05),
       "distance within which points of the two clouds match [m]")(
-      "octomap", po::bool_switch(),
-      "also map the same points with OctoMap, with its defaults, and measure that map")(
+      "octomap", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
+      "also map the same points with OctoMap, with these settings or the default ones of octomap_server, "
+      "called default, and measure that map; repeatable")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
       "also give SA and DA of the same map with other values of rules/stands_after, "
       "rules/living_stands_after or rules/together; repeatable")(
@@ -73,10 +76,16 @@ po::options_description options() {
   return options;
 }
 
+std::string voxelRow(const GridGeometry& geometry, const VoxelIndex& voxel, const std::string& what) {
+  const Eigen::Vector3d p = geometry.voxelCentre(voxel);
+  return numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
+}
+
 /// An OctoMap of the same scans, and what only it has.
 struct OctomapRun {
-  OctomapRun(const GridGeometry& geometry, const KittiLabels& moving)
-      : mapper(geometry.resolution()), presence(geometry, moving) {}
+  OctomapRun(const std::string& given, const GridGeometry& geometry, const KittiLabels& moving)
+      : settings(given), mapper(geometry.resolution(), octomapSettings(given)), presence(geometry, moving) {}
+  std::string settings;  ///< as given
   OctomapMapper mapper;
   PresenceEvaluation presence;
   std::vector<double> times;  ///< of the scans [ms]
@@ -90,7 +99,7 @@ struct Evaluation {
   OccupancyEvaluation occupancy;
   std::optional<TruthEvaluation> truth;
   std::optional<CloudEvaluation> cloud;
-  std::optional<OctomapRun> octomap;
+  std::list<OctomapRun> octomaps;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
 
   std::size_t labels = 0, unknown_labels = 0;
@@ -145,16 +154,20 @@ struct Evaluation {
     quality.dynamics = dynamics.compare(map, rules, taken());
     MapOccupants occupants(map, rules);
     quality.presence = presence.quality(occupants, takenFor());
-    if (octomap) {
-      quality.octomap = {dynamics.compare(octomap->mapper, taken()),
-                         octomap->presence.quality(octomap->mapper, takenFor()),
-                         quantile(octomap->times, 0.5), octomap->mapper.bytes()};
-    }
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
     quality.semantics = semantics.compare(map, rules, still_there);
     quality.occupancy = occupancy.compare(map, rules, left);
     if (truth) quality.truth = truth->compare(map, rules, end);
+    for (OctomapRun& octomap : octomaps) {
+      std::optional<TruthQuality> space;
+      if (truth) space = truth->compare(octomap.mapper, end);
+      quality.octomaps.push_back({octomap.settings, dynamics.compare(octomap.mapper, taken()),
+                                  octomap.presence.quality(octomap.mapper, takenFor()),
+                                  occupancy.compare(octomap.mapper, left), space,
+                                  quantile(octomap.times, 0.5), octomap.mapper.bytes()});
+    }
+    quality.bytes = map.bytes();
     if (cloud) quality.cloud = cloud->compare(map, rules);
     quality.labels = labels;
     quality.unknown_labels = unknown_labels;
@@ -165,18 +178,24 @@ struct Evaluation {
     return quality;
   }
 
-  /// One row per voxel: its centre and its outcome. Errors come last, so that they are drawn on top.
+  /// One row per voxel with points: its centre and its outcome.
+  std::string fateRows(const GridGeometry& geometry, Occupants& map) const {
+    std::string csv = "x,y,z,what\n";
+    constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
+    for (const auto& [voxel, fate] : dynamics.fates(map, taken()))
+      csv += voxelRow(geometry, voxel, kNames[static_cast<int>(fate)]);
+    return csv;
+  }
+
+  /// The same with all other errors, which come last, so that they are drawn on top.
   std::string errorRows(const SemanticMapper& mapper) const {
     const SemanticMap& map = mapper.map();
     const StateRules& rules = mapper.rules();
-    std::string csv = "x,y,z,what\n";
+    MapOccupants occupants(map, rules);
+    std::string csv = fateRows(map.geometry(), occupants);
     const auto add = [&](const VoxelIndex& voxel, const char* what) {
-      const Eigen::Vector3d p = map.geometry().voxelCentre(voxel);
-      csv += numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
+      csv += voxelRow(map.geometry(), voxel, what);
     };
-    constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
-    for (const auto& [voxel, fate] : dynamics.fates(map, rules, taken()))
-      add(voxel, kNames[static_cast<int>(fate)]);
     for (const VoxelIndex& voxel : semantics.wrongVoxels(map, rules)) add(voxel, "wrong class");
     if (!truth) return csv;
     for (const VoxelIndex& voxel : truth->ghosts(map, rules, end)) add(voxel, "ghost");
@@ -303,8 +322,11 @@ int evaluate(const po::variables_map& given) {
                         OccupancyEvaluation(geometry, moving),
                         std::nullopt,
                         cloudEvaluation(given, sequence, mapper.config()),
-                        std::nullopt};
-  if (given["octomap"].as<bool>()) evaluation.octomap.emplace(geometry, moving);
+                        {}};
+  if (given.count("octomap")) {
+    for (const std::string& settings : given["octomap"].as<std::vector<std::string>>())
+      evaluation.octomaps.emplace_back(settings, geometry, moving);
+  }
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   // A map that drifts is in no frame of the true scene.
@@ -312,12 +334,13 @@ int evaluate(const po::variables_map& given) {
     drive.emplace(*config);
     evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
   }
-  std::vector<double> times;
+  std::vector<double> times, yardstick;
   LabelWatch watch;
   bool ends = interruption.requested();
   if (ends) throw tools::Stopped("stopped before the first scan; nothing was written");
   for (std::size_t i = first; !ends; ++i) {
     SequenceFrame frame = sequence.read(i);
+    yardstick.push_back(tools::yardstickMs(frame));
     Scan scan = frame.scan();
     if (pose_noise) frame.T_map_sensor = pose_noise->next(frame.T_map_sensor);
     Scan input = frame.scan();
@@ -328,8 +351,7 @@ int evaluate(const po::variables_map& given) {
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
     const ScanStats stats = mapper.integrate(input);
     times.push_back(stats.totalMs());
-    if (evaluation.octomap) {
-      OctomapRun& octomap = *evaluation.octomap;
+    for (OctomapRun& octomap : evaluation.octomaps) {
       octomap.times.push_back(octomap.mapper.integrate(input));
       if (sequence.labelled()) octomap.presence.add(scan, mapper.classes(), octomap.mapper);
     }
@@ -358,6 +380,7 @@ int evaluate(const po::variables_map& given) {
   }
   MapQuality quality = evaluation.compare(mapper);
   quality.median_ms = quantile(times, 0.5);
+  quality.yardstick_ms = quantile(yardstick, 0.5);
   quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
   const std::string errors = given.count("errors") ? evaluation.errorRows(mapper) : "";
   for (const Judgement& other : others) {
@@ -370,7 +393,15 @@ int evaluate(const po::variables_map& given) {
     writeTextFile(given["json"].as<std::string>(), qualityJson(quality, mapper.classes()));
   }
   if (given.count("errors")) {
-    drawErrors(given["errors"].as<std::string>(), errors);
+    const std::string picture = given["errors"].as<std::string>();
+    drawErrors(picture, errors);
+    int number = 0;
+    for (OctomapRun& octomap : evaluation.octomaps) {
+      const std::string name =
+          std::filesystem::path(picture).stem().string() + "_octomap_" + std::to_string(++number) + ".csv";
+      writeTextFile(std::filesystem::path(picture).replace_filename(name).string(),
+                    evaluation.fateRows(geometry, octomap.mapper));
+    }
   }
   if (stopped) {
     throw tools::Stopped("stopped after scan " + sequence.name(first + times.size() - 1) +

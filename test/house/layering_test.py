@@ -45,7 +45,8 @@ LIBRARIES = {
     'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
     'costmap/semantic_layer.cpp': ('costmap_2d/', 'dynamic_reconfigure/', 'pluginlib/', 'ros/', 'tf2/', 'tf2_ros/'),
     'tools': ('boost/program_options', 'nlohmann/', 'ros/', 'rosbag/', 'bki_mapping/'),
-    'lab/benchmark': ('benchmark/', 'pcl/', 'ros/', 'bki_mapping/', 'topic_tools/'),
+    'lab/tools/yardstick.cpp': ('pcl/',),
+    'lab/benchmark': ('benchmark/', 'ros/', 'bki_mapping/', 'topic_tools/'),
 }
 MESSAGES = re.compile(r'\w+_msgs/|std_srvs/')
 POSIX = ('dlfcn.h', 'fcntl.h', 'sys/', 'unistd.h')

@@ -59,7 +59,7 @@ class Tools(unittest.TestCase):
     def test_scripts_are_documented_with_all_options(self):
         source = os.environ['BKI_MAPPING_SOURCE_DIR']
         rows = self.rows_of_document()
-        for script in ('demo', 'reproduce', 'soak', 'test', 'test_on'):
+        for script in ('compare', 'demo', 'reproduce', 'soak', 'test', 'test_on'):
             with open(os.path.join(source, 'scripts', script)) as file:
                 options = set(re.findall(r'^ +(--[a-z-]+)\)', file.read(), re.MULTILINE)) - {'--help'}
             self.assertTrue(options, script)
@@ -182,17 +182,29 @@ class Tools(unittest.TestCase):
 
     def test_an_octomap_of_the_same_points_is_measured_beside(self):
         alone = self.evaluation()
-        both = self.evaluation(more=('--octomap',))
-        octomap = both.pop('octomap')
+        both = self.evaluation(more=('--octomap', 'default', '--octomap', 'max_range=10,discretize=true'))
+        octomap, near = both.pop('octomap')
         self.assertNotIn('octomap', alone)
+        self.assertEqual([octomap['settings'], near['settings']], ['default', 'max_range=10,discretize=true'])
         for figure in ('sa', 'da', 'floor_holes', 'presence'):
             self.assertEqual(both[figure], alone[figure], figure)
         for count in ('static_points', 'moving_points', 'floor_voxels'):
             self.assertEqual(octomap[count], alone[count], count)
         self.assertGreater(octomap['sa'], 0.5)
         self.assertNotEqual(octomap['sa'], alone['sa'])
-        self.assertGreater(octomap['bytes'], 0)
-        self.assertIn('OctoMap of the same scans: SA ', self.table)
+        self.assertGreater(octomap['map_bytes'], 2 * near['map_bytes'])
+        self.assertGreater(near['map_bytes'], 0)
+        self.assertGreater(octomap['sa'], near['sa'])
+        for figures in (both, octomap, near):
+            self.assertGreater(figures['truth']['free_precision'], 0.5)
+            self.assertGreater(figures['truth']['free_recall'], 0.01)
+            self.assertGreater(figures['occupancy_calibration_error'], 0.0)
+            self.assertLess(figures['truth']['occupancy_calibration_error'], 0.5)
+        self.assertGreater(octomap['truth']['free_recall'], 2 * near['truth']['free_recall'])
+        self.assertGreater(both['yardstick_ms'], 0.0)
+        self.assertGreater(both['map_bytes'], 0)
+        self.assertIn('OctoMap of the same scans, default: SA ', self.table)
+        self.fails("'maxrange' is unknown; did you mean 'max_range'?", 'evaluate_map', '--sequence', self.drive, '--octomap', 'maxrange=10')
 
     def test_a_map_is_judged_by_other_gains(self):
         gains = ('rules/stands_after=1', 'rules/stands_after=9,rules/living_stands_after=1,rules/together=0')
@@ -416,7 +428,7 @@ class Tools(unittest.TestCase):
     def test_errors_are_drawn(self):
         picture = self.path('errors.png')
         self.fails('must end in .png', 'evaluate_map', '--sequence', self.drive, '--errors', self.path('errors.jpg'))
-        result = call('evaluate_map', '--sequence', self.drive, '--errors', picture)
+        result = call('evaluate_map', '--sequence', self.drive, '--errors', picture, '--octomap', 'default', '--octomap', 'max_range=5')
         self.assertEqual(result.returncode, 0, result.stderr)
         with open(picture, 'rb') as file:
             self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
@@ -424,6 +436,13 @@ class Tools(unittest.TestCase):
             kinds = [row['what'] for row in csv.DictReader(file)]
         self.assertGreater(kinds.count('kept'), kinds.count('lost'))
         self.assertGreater(kinds.count('lost'), 0)
+        lost = []
+        for number in (1, 2):
+            with open(self.path(f'errors_octomap_{number}.csv'), newline='') as file:
+                rows = [row['what'] for row in csv.DictReader(file)]
+            self.assertEqual(len(rows), sum(kinds.count(kind) for kind in ('kept', 'lost', 'forgotten', 'left')))
+            lost.append(rows.count('lost'))
+        self.assertGreater(lost[1], 2 * lost[0])
 
     def test_presets(self):
         folder = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets')
