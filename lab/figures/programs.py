@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 VOXEL = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('red', 'u1'), ('green', 'u1'), ('blue', 'u1'),
                   ('label', '<u2'), ('state', 'u1'), ('probability', '<f4'), ('occupancy', '<f4'),
                   ('class_probability', '<f4'), ('variance', '<f4'), ('entropy', '<f4'), ('evidence', '<f4')])
@@ -66,6 +67,13 @@ class Programs:
             words = [word for key, value in options.items() for word in ('--' + key.replace('_', '-'), str(value))]
             self.run('simulate_drive', '--output', folder, *words)
         return folder
+
+
+def commit():
+    """Short name of the commit of this tree; with a plus if tracked files have changed since."""
+    def git(*arguments):
+        return subprocess.run(['git', '-C', ROOT, *arguments], capture_output=True, text=True, check=True).stdout.strip()
+    return git('rev-parse', '--short', 'HEAD') + ('+' if git('status', '--porcelain', '--untracked-files=no') else '')
 
 
 def median_samples(report):

@@ -6,12 +6,10 @@ simulated drive has. scripts/reproduce --quality calls it.
 import argparse
 import datetime
 import os
-import subprocess
 
-from .programs import Programs
+from .programs import ROOT, Programs, commit
 from .tables import markdown
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # By how much each drive is longer than --scans: the robot in rooms is slow.
 SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'rooms': 5}
 RESOLUTIONS = (0.1, 0.2, 0.3, 0.6)
@@ -38,13 +36,6 @@ def replaced(text, table):
     if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
         raise SystemExit(f'the document must have the lines {BEGIN.strip()} and {END.strip()}, once and in this order')
     return text[:text.index(BEGIN)] + BEGIN + table + text[text.index(END):]
-
-
-def commit():
-    """Short name of the commit of this tree; with a plus if tracked files have changed since."""
-    def git(*arguments):
-        return subprocess.run(['git', '-C', ROOT, *arguments], capture_output=True, text=True, check=True).stdout.strip()
-    return git('rev-parse', '--short', 'HEAD') + ('+' if git('status', '--porcelain', '--untracked-files=no') else '')
 
 
 def measured(programs, sequences, resolutions, more=()):
