@@ -2,8 +2,6 @@
 
 #include <octomap/OcTree.h>
 
-#include "core/stopwatch.h"
-
 namespace bki_mapping {
 namespace {
 
@@ -44,7 +42,7 @@ OctomapMapper::OctomapMapper(double resolution, const OctomapSettings& settings)
 
 OctomapMapper::~OctomapMapper() = default;
 
-double OctomapMapper::integrate(const Scan& scan) {
+ScanTime OctomapMapper::integrate(const Scan& scan) {
   octomap::Pointcloud cloud;
   cloud.reserve(scan.points.size());
   for (const Eigen::Vector3f& point : scan.points) {
@@ -53,14 +51,14 @@ double OctomapMapper::integrate(const Scan& scan) {
   const octomap::point3d origin = pointOf(scan.origin);
   const OctomapSettings& settings = tree_->settings;
   octomap::OcTree& octree = tree_->octree;
-  Stopwatch watch;
+  ScanTimer timer;
   if (settings.rays) {
     octree.insertPointCloudRays(cloud, origin, -1.0, settings.lazy);
   } else {
     octree.insertPointCloud(cloud, origin, settings.max_range, settings.lazy, settings.discretize);
   }
   if (settings.compress_map) octree.prune();
-  return watch.lap();
+  return timer.elapsed();
 }
 
 std::optional<ClassId> OctomapMapper::at(const VoxelIndex& voxel) {

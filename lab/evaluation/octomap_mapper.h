@@ -6,6 +6,7 @@
 #include "bki_mapping/core/scan.h"
 #include "evaluation/occupants.h"
 #include "evaluation/octomap_settings.h"
+#include "evaluation/scan_timer.h"
 
 namespace bki_mapping {
 
@@ -17,8 +18,8 @@ class OctomapMapper : public Occupants {
   explicit OctomapMapper(double resolution, const OctomapSettings& settings = {});
   ~OctomapMapper() override;
 
-  /// Adds all finite points of a scan, whatever their labels. @return time that took [ms].
-  double integrate(const Scan& scan);
+  /// Adds all finite points of a scan, whatever their labels. @return how long that took.
+  ScanTime integrate(const Scan& scan);
   std::optional<ClassId> at(const VoxelIndex& voxel) override;
   Occupant occupantOf(const VoxelIndex& voxel) const override;
   void forEachKnown(const Visit& visit) const override;

@@ -134,7 +134,8 @@ Json octomapJson(const OctomapQuality& octomap) {
   figures["occupancy_calibration_error"] = octomap.occupancy.error();
   figures["occupancy_reliability"] = reliabilityJson(octomap.occupancy);
   if (octomap.truth) figures["truth"] = trueSpaceJson(*octomap.truth);
-  figures["median_ms"] = octomap.median_ms;
+  figures["median_ms"] = octomap.median.wall;
+  figures["processor_ms"] = octomap.median.processor;
   figures["map_bytes"] = octomap.bytes;
   return figures;
 }
@@ -211,7 +212,7 @@ void addOctomap(const OctomapQuality& octomap, Table& table) {
              (octomap.truth ? "; free_precision " + percent(octomap.truth->all.free_precision.fraction()) +
                                   ", free_recall " + percent(octomap.truth->all.free_recall.fraction())
                             : "") +
-             "; " + std::to_string(octomap.bytes) + " bytes; median " + figureText(octomap.median_ms) +
+             "; " + std::to_string(octomap.bytes) + " bytes; median " + figureText(octomap.median.wall) +
              " ms a scan");
 }
 
@@ -303,7 +304,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   if (quality.cloud) addCloud(*quality.cloud, table);
   table.text(std::to_string(d.static_points) + " points of static and " + std::to_string(d.moving_points) +
              " of moving objects; " + std::to_string(quality.bytes) + " bytes; median " +
-             figureText(quality.median_ms) + " ms a scan");
+             figureText(quality.median.wall) + " ms a scan");
   for (const OctomapQuality& octomap : quality.octomaps) addOctomap(octomap, table);
   for (const JudgedMap& judged : quality.judged) {
     const DynamicsQuality& with = judged.dynamics;
@@ -341,8 +342,10 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                   {"class_probability_calibration_error", s.class_probability.error()},
                   {"occupancy_calibration_error", quality.occupancy.error()},
                   {"sparsification_error", s.sparsification_error},
-                  {"median_ms", quality.median_ms},
-                  {"yardstick_ms", quality.yardstick_ms},
+                  {"median_ms", quality.median.wall},
+                  {"processor_ms", quality.median.processor},
+                  {"yardstick_ms", quality.yardstick.wall},
+                  {"yardstick_processor_ms", quality.yardstick.processor},
                   {"map_bytes", quality.bytes},
                   {"labels_not_in_table", quality.unknown_labels},
                   {"classes", Json::array()}});

@@ -9,6 +9,7 @@
 #include "evaluation/dynamics_evaluation.h"
 #include "evaluation/occupancy_evaluation.h"
 #include "evaluation/presence_evaluation.h"
+#include "evaluation/scan_timer.h"
 #include "evaluation/semantic_evaluation.h"
 #include "evaluation/truth_evaluation.h"
 
@@ -27,7 +28,7 @@ struct OctomapQuality {
   PresenceQuality presence;
   Reliability occupancy;
   std::optional<TruthQuality> truth;  ///< what needs no classes
-  double median_ms = 0.0;             ///< median time of a scan [ms]
+  ScanTime median;                    ///< of a scan
   std::size_t bytes = 0;              ///< of memory
 };
 
@@ -41,8 +42,7 @@ struct MapQuality {
   std::vector<OctomapQuality> octomaps;
   std::optional<TruthQuality> truth;               ///< only for simulated drives
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
-  double median_ms = 0.0;                          ///< median time of a scan [ms]
-  double yardstick_ms = 0.0;                       ///< median time of the yardstick on the same scans [ms]
+  ScanTime median, yardstick;                      ///< of a scan, and of the yardstick on the same scans
   std::size_t bytes = 0;                           ///< of memory
   bool labels_are_ids = false;                     ///< so that it is unknown what moves
   std::size_t labels = 0, unknown_labels = 0;      ///< labels of all points; those not in the class table

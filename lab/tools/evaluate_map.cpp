@@ -11,7 +11,6 @@
 #include "bki_mapping/sequence/sequence.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "core/quantile.h"
 #include "evaluation/cloud_evaluation.h"
 #include "evaluation/label_noise.h"
 #include "evaluation/octomap_mapper.h"
@@ -88,7 +87,7 @@ struct OctomapRun {
   std::string settings;  ///< as given
   OctomapMapper mapper;
   PresenceEvaluation presence;
-  std::vector<double> times;  ///< of the scans [ms]
+  ScanTimes times;
 };
 
 /// The measures of one run.
@@ -164,8 +163,8 @@ struct Evaluation {
       if (truth) space = truth->compare(octomap.mapper, end);
       quality.octomaps.push_back({octomap.settings, dynamics.compare(octomap.mapper, taken()),
                                   octomap.presence.quality(octomap.mapper, takenFor()),
-                                  occupancy.compare(octomap.mapper, left), space,
-                                  quantile(octomap.times, 0.5), octomap.mapper.bytes()});
+                                  occupancy.compare(octomap.mapper, left), space, octomap.times.median(),
+                                  octomap.mapper.bytes()});
     }
     quality.bytes = map.bytes();
     if (cloud) quality.cloud = cloud->compare(map, rules);
@@ -334,13 +333,14 @@ int evaluate(const po::variables_map& given) {
     drive.emplace(*config);
     evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
   }
-  std::vector<double> times, yardstick;
+  ScanTimes times, yardstick;
+  std::size_t done = 0;  // scans
   LabelWatch watch;
   bool ends = interruption.requested();
   if (ends) throw tools::Stopped("stopped before the first scan; nothing was written");
   for (std::size_t i = first; !ends; ++i) {
     SequenceFrame frame = sequence.read(i);
-    yardstick.push_back(tools::yardstickMs(frame));
+    yardstick.add(tools::yardstick(frame));
     Scan scan = frame.scan();
     if (pose_noise) frame.T_map_sensor = pose_noise->next(frame.T_map_sensor);
     Scan input = frame.scan();
@@ -349,10 +349,12 @@ int evaluate(const po::variables_map& given) {
     if (predictions) input.labels = predictions->read(i).labels;
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
+    ScanTimer timer;
     const ScanStats stats = mapper.integrate(input);
-    times.push_back(stats.totalMs());
+    times.add({stats.totalMs(), timer.elapsed().processor});
+    ++done;
     for (OctomapRun& octomap : evaluation.octomaps) {
-      octomap.times.push_back(octomap.mapper.integrate(input));
+      octomap.times.add(octomap.mapper.integrate(input));
       if (sequence.labelled()) octomap.presence.add(scan, mapper.classes(), octomap.mapper);
     }
     tools::warn(watch.report(mapper, input, stats.counts));
@@ -366,12 +368,12 @@ int evaluate(const po::variables_map& given) {
     ends = i + 1 == last || interruption.requested();
     if (drive) {
       evaluation.end = drive->timeOf(sequence.number(i));
-      const bool count = times.size() % kGhostsEvery == 0 || ends;
+      const bool count = done % kGhostsEvery == 0 || ends;
       if (count) evaluation.truth->countGhosts(mapper.map(), mapper.rules(), evaluation.end);
     }
-    tools::showProgress(times.size(), last - first, "");
+    tools::showProgress(done, last - first, "");
   }
-  const bool stopped = times.size() < last - first;
+  const bool stopped = done < last - first;
   if (stopped) evaluation.dynamics.end();
   if (stopped && sequence.layout() == SequenceLayout::kDynamicMap && evaluation.cloud) {
     evaluation.cloud.reset();
@@ -379,8 +381,8 @@ int evaluate(const po::variables_map& given) {
                  "with it\n";
   }
   MapQuality quality = evaluation.compare(mapper);
-  quality.median_ms = quantile(times, 0.5);
-  quality.yardstick_ms = quantile(yardstick, 0.5);
+  quality.median = times.median();
+  quality.yardstick = yardstick.median();
   quality.labels_are_ids = mapper.config().label_values == LabelValues::kId;
   const std::string errors = given.count("errors") ? evaluation.errorRows(mapper) : "";
   for (const Judgement& other : others) {
@@ -404,8 +406,8 @@ int evaluate(const po::variables_map& given) {
     }
   }
   if (stopped) {
-    throw tools::Stopped("stopped after scan " + sequence.name(first + times.size() - 1) +
-                         "; all figures are of the first " + std::to_string(times.size()) + " of " +
+    throw tools::Stopped("stopped after scan " + sequence.name(first + done - 1) +
+                         "; all figures are of the first " + std::to_string(done) + " of " +
                          counted(last - first, "scan"));
   }
   return 0;

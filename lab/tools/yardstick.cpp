@@ -3,11 +3,9 @@
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_types.h>
 
-#include "core/stopwatch.h"
-
 namespace bki_mapping::tools {
 
-double yardstickMs(const SequenceFrame& frame) {
+ScanTime yardstick(const SequenceFrame& frame) {
   const auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZL>>();
   for (std::size_t p = 0; p < frame.points.size(); ++p) {
     pcl::PointXYZL point;
@@ -17,11 +15,11 @@ double yardstickMs(const SequenceFrame& frame) {
   }
   pcl::VoxelGrid<pcl::PointXYZL> grid;
   pcl::PointCloud<pcl::PointXYZL> output;
-  Stopwatch watch;
+  ScanTimer timer;
   grid.setInputCloud(cloud);
   grid.setLeafSize(0.1f, 0.1f, 0.1f);
   grid.filter(output);
-  return watch.lap();
+  return timer.elapsed();
 }
 
 }  // namespace bki_mapping::tools

@@ -19,7 +19,7 @@ TEST(OctomapMapper, HasTheVoxelsOfTheMap) {
   const std::vector<Eigen::Vector3d> hits = {{5.05, 0.1, 0.2}, {-4.1, -3.3, 1.0}, {0.2, 7.7, -0.4}};
   for (const Eigen::Vector3d& hit : hits) scan.points.push_back((hit - scan.origin).cast<float>());
   scan.points.emplace_back(std::numeric_limits<float>::quiet_NaN(), 0.0f, 0.0f);
-  EXPECT_GE(mapper.integrate(scan), 0.0);
+  EXPECT_GT(mapper.integrate(scan).wall, 0.0);
   for (const Eigen::Vector3d& hit : hits) {
     const VoxelIndex voxel = geometry.voxelAt(hit);
     EXPECT_TRUE(mapper.at(voxel)) << hit.transpose();
