@@ -115,6 +115,11 @@ class DynamicsEvaluation {
   }
   /// The outcome for each voxel that has points of static or of early moving objects.
   std::vector<std::pair<VoxelIndex, VoxelFate>> fates(Occupants& map, const Taken& taken = {}) const;
+  std::vector<std::pair<VoxelIndex, VoxelFate>> fates(const SemanticMap& map, const StateRules& rules,
+                                                      const Taken& taken = {}) const {
+    MapOccupants occupants(map, rules);
+    return fates(occupants, taken);
+  }
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffff;

@@ -95,7 +95,7 @@ def main(arguments=None):
     parser.add_argument('--programs', required=True, help='folder with the programs of the package')
     parser.add_argument('--output', required=True, help='output folder')
     parser.add_argument('--sequence', help="sequence in SemanticKITTI's layout; default: a simulated drive")
-    parser.add_argument('--scans', type=int, help='number of scans; default: 60 simulated ones, or all of the sequence')
+    parser.add_argument('--scans', type=int, help='number of scans; default: 40 simulated ones, or all of the sequence')
     parser.add_argument('--resolution', type=float, default=0.3, help='edge of the voxels [m]')
     parser.add_argument('--commit', help='commit of the programs; default: that of this tree')
     given = parser.parse_args(arguments)
@@ -108,7 +108,7 @@ def main(arguments=None):
             more += ['--scans', str(given.scans)]
             data += f', {given.scans} scans'
     else:
-        scans = given.scans or 60
+        scans = given.scans or 40
         sequence, data = programs.simulate(f'street{scans}', scans=scans), f'a simulated drive of {scans} scans'
     compared = Comparison(programs, sequence, more)
     text = INTRODUCTION.format(date=datetime.date.today(), commit=given.commit or commit(), data=data,

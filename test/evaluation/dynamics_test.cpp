@@ -34,9 +34,7 @@ TEST(DynamicsQuality, CountsPointByPoint) {
   evaluation.add(scanOf({{{9.5f, 0, 0}, 10}}), *classes);
   const SemanticMap map = mapOf({{0.5, 0, 0}, {7.5, 0, 0}, {9.5, 0, 0}});
   std::map<int, VoxelFate> fates;
-  const StateRules rules;
-  MapOccupants occupants(map, rules);
-  for (const auto& [voxel, fate] : evaluation.fates(occupants)) fates[voxel.x] = fate;
+  for (const auto& [voxel, fate] : evaluation.fates(map, StateRules())) fates[voxel.x] = fate;
   EXPECT_EQ(fates, (std::map<int, VoxelFate>{{0, VoxelFate::kKept},
                                              {2, VoxelFate::kLost},
                                              {5, VoxelFate::kForgotten},
