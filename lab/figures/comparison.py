@@ -27,8 +27,10 @@ OCTOMAP = (
     'hit=0.97',
     'hit=0.97,miss=0.3,min=0.3',
 )
-PRESETS = ('paper_none', 'baseline_even', 'paper_linear', 'paper_line', 'robot')
-OURS = 'robot'  # takes turns with OctoMap, scan by scan
+# Presets with further arguments of evaluate_map.
+OURS = {preset: ['--config', preset] for preset in ('paper_none', 'baseline_even', 'paper_linear', 'paper_line', 'robot')}
+OURS['robot without labels'] = ['--config', 'robot', '--classes', 'occupancy']
+BESIDE = 'robot'  # takes turns with OctoMap, scan by scan
 THREADS = (1, 2)
 TIMES = (('processor_ms', 'yardstick_processor_ms'), ('median_ms', 'yardstick_ms'))  # by number of threads
 HEADER = ['map', 'ms, 1 thread', 'Y, 1 thread', 'Y, 2 threads', 'MB', 'SA', 'holes', 'DA', 'PA to 50 m', 'free precision',
@@ -59,16 +61,16 @@ class Comparison:
     def __init__(self, programs, sequence, more):
         """Measures. @param more arguments of evaluate_map."""
         self.rows, self.figures, self.errors = [], {}, {}
-        of_preset = {}
-        for name in PRESETS:
-            of_preset[name] = [self._evaluate(programs, sequence, more, name, threads) for threads in THREADS]
-        one = of_preset[OURS][0]
+        ours = {}
+        for name, words in OURS.items():
+            ours[name] = [self._evaluate(programs, sequence, [*more, *words], name, threads) for threads in THREADS]
+        one = ours[BESIDE][0]
         self.yardstick_ms = one['yardstick_processor_ms']
         for number, figures in enumerate(one.pop('octomap', []), 1):
             name = f'OctoMap, {figures["settings"]}'
-            self.errors[name] = self._errors_file(programs, f'{OURS}_octomap_{number}')
+            self.errors[name] = self._errors_file(programs, f'{BESIDE}_octomap_{number}')
             self._add(name, figures, {1: figures['processor_ms'] / self.yardstick_ms, 2: None})
-        for name, runs in of_preset.items():
+        for name, runs in ours.items():
             # Of one thread by processor time, which other work on the machine does not lengthen; of two by the clock.
             ratios = [run[time] / run[yardstick] for run, (time, yardstick) in zip(runs, TIMES)]
             self._add(name, runs[0], dict(zip(THREADS, ratios)))
@@ -77,11 +79,11 @@ class Comparison:
         return os.path.join(programs.scratch, f'{name}.csv')
 
     def _evaluate(self, programs, sequence, more, name, threads):
-        words = [*more, '--config', name, '--threads', str(threads)]
+        words = [*more, '--threads', str(threads)]
         if threads == 1:  # the map is the same with two
             self.errors[name] = self._errors_file(programs, name)
             words += ['--errors', os.path.join(programs.scratch, f'{name}.png')]
-            if name == OURS:
+            if name == BESIDE:
                 words += [word for settings in OCTOMAP for word in ('--octomap', settings)]
         return programs.evaluate(sequence, {}, words)
 
@@ -118,7 +120,7 @@ def main(arguments=None):
         with open(os.path.join(output, name), 'w') as file:
             file.write(content)
     comparison_pictures.draw_times(compared.figures, output)
-    comparison_pictures.draw_left(compared.errors, OURS, given.resolution, output)
+    comparison_pictures.draw_left(compared.errors, BESIDE, given.resolution, output)
     print(text, flush=True)
 
 

@@ -19,6 +19,7 @@ from figures import comparison, comparison_pictures  # noqa: E402
 from figures.programs import Programs  # noqa: E402
 
 SETTINGS = ['default', 'max_range=10', 'hit=0.9,discretize=true']
+OURS = ['paper_none', 'paper_line', 'robot', 'robot without labels']
 
 
 def colors(path):
@@ -34,7 +35,8 @@ class Comparison(unittest.TestCase):
         cls.output = cls.folder.name
         programs = Programs(os.environ['BKI_MAPPING_BIN'], cls.output)
         drive = programs.simulate('drive', scans=8, beams=24, columns=600, scene='crowd')
-        with unittest.mock.patch.multiple(comparison, PRESETS=('paper_none', 'paper_line', 'robot'), OCTOMAP=SETTINGS):
+        ours = {name: comparison.OURS[name] for name in OURS}
+        with unittest.mock.patch.multiple(comparison, OURS=ours, OCTOMAP=SETTINGS):
             comparison.main(['--programs', os.environ['BKI_MAPPING_BIN'], '--output', cls.output, '--sequence', drive,
                              '--scans', '6', '--resolution', '0.4', '--commit', 'abc'])
         with open(os.path.join(cls.output, 'comparison.json')) as file:
@@ -49,14 +51,15 @@ class Comparison(unittest.TestCase):
     def test_every_map_has_a_row_of_sensible_figures(self):
         rows = [line.strip('| ').split(' | ') for line in self.table.splitlines() if line.startswith('| ')]
         self.assertEqual(rows[0], comparison.HEADER)
-        names = [f'OctoMap, {each}' for each in SETTINGS] + ['paper_none', 'paper_line', 'robot']
+        names = [f'OctoMap, {each}' for each in SETTINGS] + OURS
         self.assertEqual([row[0] for row in rows[1:]], names)
         self.assertEqual(list(self.figures), names)
         for row in rows[1:]:
             self.assertEqual(len(row), len(comparison.HEADER), row)
             for name, cell in zip(comparison.HEADER[5:], row[5:]):
-                if cell == '' and row[0] == 'paper_none' and name == 'free precision':
-                    continue  # without free space, nothing is free
+                if (row[0], name) in (('paper_none', 'free precision'), ('robot without labels', 'holes')):
+                    self.assertEqual(cell, '', 'nothing is free without free space, nor a floor without labels')
+                    continue
                 self.assertTrue(0.0 <= float(cell) <= 100.0, (row[0], name, cell))
             self.assertGreater(float(row[1]), 0.0)
             self.assertGreater(float(row[2]), 0.0)
@@ -75,6 +78,7 @@ class Comparison(unittest.TestCase):
         self.assertEqual(self.figures['paper_none']['sa'], 1.0)
         self.assertEqual(self.figures['paper_none']['truth']['free_recall'], 0.0)
         self.assertGreater(self.figures['robot']['sa'], self.figures['OctoMap, default']['sa'])
+        self.assertNotEqual(self.figures['robot']['da'], self.figures['robot without labels']['da'])
         seen = colors(os.path.join(self.output, 'comparison_left.png'))
         for color, meaning in (*comparison_pictures.KINDS.values(), comparison_pictures.HAS_LEFT):
             self.assertIn(color, seen, meaning)
