@@ -55,6 +55,12 @@ def row_of(name, figures, times):
     return [name, f'{figures["processor_ms"]:.1f}', *ratios, f'{figures["map_bytes"] / 1e6:.1f}', *map(percent, shares)]
 
 
+def without_empty_columns(header, rows):
+    """The table without columns that have no figure, as those of free space where the truth is not known."""
+    kept = [n for n in range(len(header)) if any(row[n] for row in rows)]
+    return [header[n] for n in kept], [[row[n] for n in kept] for row in rows]
+
+
 class Comparison:
     """The figures of all maps of one sequence."""
 
@@ -115,7 +121,7 @@ def main(arguments=None):
     compared = Comparison(programs, sequence, more)
     text = INTRODUCTION.format(date=datetime.date.today(), commit=given.commit or commit(), data=data,
                                resolution=given.resolution, yardstick=compared.yardstick_ms)
-    text += markdown(HEADER, compared.rows)
+    text += markdown(*without_empty_columns(HEADER, compared.rows))
     for name, content in (('comparison.md', text), ('comparison.json', json.dumps(compared.figures, indent=2) + '\n')):
         with open(os.path.join(output, name), 'w') as file:
             file.write(content)

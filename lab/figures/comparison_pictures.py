@@ -29,7 +29,7 @@ def draw_times(figures_of, output):
             if figures[key] is None:
                 continue
             time, share = figures['yardsticks'][1], 100 * figures[key]
-            label = f'{number} {name}' if axis is axes[0] else None
+            label = f'{number} {name}' if key == 'sa' else None  # a drive may lack points of what moved
             axis.scatter(time, share, color=color_of(name), marker='s' if name.startswith('OctoMap') else 'o', label=label)
             axis.annotate(str(number), (time, share), xytext=(4, 4), textcoords='offset points', fontsize=8)
         axis.set_xscale('log')

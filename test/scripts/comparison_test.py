@@ -86,6 +86,10 @@ class Comparison(unittest.TestCase):
         for color in (*comparison_pictures.COLORS.values(), comparison_pictures.PAPER):
             self.assertIn(color, seen)
 
+    def test_columns_without_figures_are_left_out(self):
+        self.assertEqual(comparison.without_empty_columns(['a', 'b', 'c'], [['x', '', ''], ['y', '', '0']]),
+                         (['a', 'c'], [['x', ''], ['y', '0']]))
+
     def test_the_window_is_where_most_has_left(self):
         width, height = comparison_pictures.WINDOW
         crowd = [(101.0 + 0.1 * n, -51.0) for n in range(9)]
