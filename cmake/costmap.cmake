@@ -11,7 +11,7 @@ if(costmap_2d_FOUND)
   bki_mapping_warnings(bki_mapping_costmap_layer)
   install(TARGETS bki_mapping_costmap_layer
     ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
-    LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+    LIBRARY DESTINATION ${BKI_MAPPING_PLUGIN_DESTINATION}
     RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 else()
   message(STATUS "costmap_2d was not found: bki_mapping/SemanticLayer, a layer for costmaps, is left out")

@@ -3,10 +3,15 @@ if(BKI_MAPPING_ROS)
   set(BKI_MAPPING_BIN_DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   set(BKI_MAPPING_LIB_DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
   set(BKI_MAPPING_SHARE_DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+  set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
+  if(CMAKE_INSTALL_PREFIX STREQUAL "/usr" AND CMAKE_LIBRARY_ARCHITECTURE)  # where Debian's catkin puts its own, too
+    set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_LIB_DESTINATION}/cmake/${PROJECT_NAME})
+  endif()
 else()
   set(BKI_MAPPING_BIN_DESTINATION bin)
   set(BKI_MAPPING_LIB_DESTINATION lib)
   set(BKI_MAPPING_SHARE_DESTINATION share/${PROJECT_NAME})
+  set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
 endif()
 
 get_property(bki_mapping_rooms GLOBAL PROPERTY BKI_MAPPING_ROOMS)
@@ -16,8 +21,11 @@ list(FILTER bki_mapping_private_rooms INCLUDE REGEX "_(simulation|evaluation|too
 set(bki_mapping_public_rooms ${bki_mapping_rooms})
 list(REMOVE_ITEM bki_mapping_public_rooms ${bki_mapping_private_rooms})
 
-# Libraries find each other wherever the installation is moved to, and without setup.bash.
-set_target_properties(${bki_mapping_rooms} PROPERTIES INSTALL_RPATH "$ORIGIN")
+# Libraries find each other wherever the installation is moved to, and without setup.bash. Those of another minor version have
+# another name, so that a program never meets an interface that it was not compiled for.
+string(REGEX MATCH "^[0-9]+\\.[0-9]+" bki_mapping_minor_version ${BKI_MAPPING_VERSION})
+set_target_properties(${bki_mapping_rooms} PROPERTIES INSTALL_RPATH "$ORIGIN"
+  VERSION ${BKI_MAPPING_VERSION} SOVERSION ${bki_mapping_minor_version})
 foreach(target ${bki_mapping_public_rooms})
   string(REPLACE "bki_mapping_" "" room ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${room})
@@ -30,7 +38,7 @@ install(TARGETS ${bki_mapping_private_rooms}
   ARCHIVE DESTINATION ${BKI_MAPPING_LIB_DESTINATION}
   LIBRARY DESTINATION ${BKI_MAPPING_LIB_DESTINATION}
   RUNTIME DESTINATION ${BKI_MAPPING_BIN_DESTINATION})
-install(EXPORT bki_mapping-targets NAMESPACE bki_mapping:: DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
+install(EXPORT bki_mapping-targets NAMESPACE bki_mapping:: DESTINATION ${BKI_MAPPING_CMAKE_DESTINATION})
 
 get_property(bki_mapping_programs GLOBAL PROPERTY BKI_MAPPING_PROGRAMS)
 file(RELATIVE_PATH bki_mapping_from_bin /prefix/${BKI_MAPPING_BIN_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})
@@ -53,5 +61,5 @@ else()
   configure_file(cmake/bki_mapping-extras.cmake ${CMAKE_BINARY_DIR}/bki_mappingConfig.cmake COPYONLY)
   #catkin_lint: ignore_once missing_file
   install(FILES ${CMAKE_BINARY_DIR}/bki_mappingConfig.cmake ${CMAKE_BINARY_DIR}/bki_mappingConfigVersion.cmake
-    DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
+    DESTINATION ${BKI_MAPPING_CMAKE_DESTINATION})
 endif()

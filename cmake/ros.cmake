@@ -82,25 +82,32 @@ foreach(name map_bag play_sequence sequence_to_bag print_parameters)
   bki_mapping_uses_ros(${name})
 endforeach()
 
+# Where pluginlib looks without setup.bash, which sets the paths where it looks otherwise.
+set(BKI_MAPPING_PLUGIN_DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+  set(BKI_MAPPING_PLUGIN_DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}/ros)
+endif()
 install(TARGETS bki_mapping_nodelets
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
-  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  LIBRARY DESTINATION ${BKI_MAPPING_PLUGIN_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS map_bag mapping_node play_sequence print_parameters sequence_to_bag
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py scripts/play_bag.py
-  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py
+  scripts/play_bag.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 
 # pcl_ros serves at run time: launch files load its nodelets, nothing is linked with it. Debian's describes them as being in
-# lib/libpcl_ros_filters.so, but puts that into lib/<architecture>; a link in our own lib leads pluginlib there.
+# lib/libpcl_ros_filters.so, but puts that into lib/<architecture>; a link of ours leads pluginlib there.
 find_library(BKI_MAPPING_PCL_ROS_FILTERS pcl_ros_filters PATHS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE} NO_DEFAULT_PATH)
 mark_as_advanced(BKI_MAPPING_PCL_ROS_FILTERS)
 if(BKI_MAPPING_PCL_ROS_FILTERS)
   set(link ${CATKIN_DEVEL_PREFIX}/lib/libpcl_ros_filters.so)
   file(MAKE_DIRECTORY ${CATKIN_DEVEL_PREFIX}/lib)
   file(CREATE_LINK ${BKI_MAPPING_PCL_ROS_FILTERS} ${link} SYMBOLIC)
-  #catkin_lint: ignore_once external_file
-  install(FILES ${link} DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+  if(NOT CMAKE_INSTALL_PREFIX STREQUAL "/usr")  # where packaging/debian has such a link
+    #catkin_lint: ignore_once external_file
+    install(FILES ${link} DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+  endif()
 endif()
