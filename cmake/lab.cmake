@@ -1,14 +1,19 @@
 # The lab: what measures the mapper, and simulates what it measures with. No robot needs it.
-if(NOT BKI_MAPPING_LAB)
+if(NOT BKI_MAPPING_LAB AND NOT BKI_MAPPING_DEMO)
   return()
 endif()
-find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
-
 bki_mapping_room(simulation FOLDER lab/simulation SOURCES
     city.cpp drive_file.cpp furniture.cpp lidar.cpp rooms.cpp scene.cpp street.cpp street_parts.cpp
     truth_cloud.cpp voxel_truth.cpp
   LINK bki_mapping_sequence bki_mapping_settings)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
+bki_mapping_join(bki_mapping_simulation)
+bki_mapping_program(lab/tools simulate_drive bki_mapping_simulation)
+if(NOT BKI_MAPPING_LAB)
+  return()
+endif()
+
+find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp
     occupants.cpp octomap_mapper.cpp octomap_settings.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp
@@ -17,11 +22,9 @@ bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 set_source_files_properties(lab/evaluation/octomap_mapper.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
-bki_mapping_join(bki_mapping_simulation bki_mapping_evaluation)
+bki_mapping_join(bki_mapping_evaluation)
 
-foreach(name simulate_city simulate_drive)
-  bki_mapping_program(lab/tools ${name} bki_mapping_simulation)
-endforeach()
+bki_mapping_program(lab/tools simulate_city bki_mapping_simulation)
 bki_mapping_program(lab/tools evaluate_map bki_mapping_evaluation pcl_filters)
 target_sources(evaluate_map PRIVATE lab/tools/draw.cpp lab/tools/yardstick.cpp)
 

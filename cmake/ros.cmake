@@ -95,7 +95,7 @@ install(TARGETS map_bag mapping_node play_sequence print_parameters sequence_to_
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-catkin_install_python(PROGRAMS scripts/body_box.py scripts/launch_path.py scripts/mapping_summary.py
+catkin_install_python(PROGRAMS scripts/body_box.py scripts/demo_drive.py scripts/launch_path.py scripts/mapping_summary.py
   scripts/play_bag.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 
 # pcl_ros serves at run time: launch files load its nodelets, nothing is linked with it. Debian's describes them as being in
