@@ -266,6 +266,7 @@ bki_mapping_script_test(house layering_test)
 bki_mapping_script_test(house links_test)
 bki_mapping_script_test(house foxglove_test)
 if(NOT CMAKE_CROSSCOMPILING)  # for which this machine may lack packages
+  bki_mapping_script_test(house version_test)
   bki_mapping_script_test(house without_lab_test)
 endif()
 add_test(NAME vector_symbols_test

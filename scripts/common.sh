@@ -28,6 +28,13 @@ what_was_skipped() {
   for each in "${skipped[@]}"; do echo "SKIPPED: $each" >&2; done
 }
 
+# apt-get as root, without questions.
+apt_get() {
+  local sudo=
+  if [ "$(id -u)" -ne 0 ]; then sudo=sudo; fi
+  $sudo env DEBIAN_FRONTEND=noninteractive apt-get -qq "$@"
+}
+
 # Installs with apt what is missing.
 install_dependencies() {
   local list=$root/scripts/dependencies.debian.txt beside= missing=() package
@@ -42,10 +49,8 @@ install_dependencies() {
     return
   fi
   echo "    installing ${#missing[@]} packages"
-  local sudo=
-  if [ "$(id -u)" -ne 0 ]; then sudo=sudo; fi
-  $sudo apt-get update -qq
-  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+  apt_get update
+  apt_get install -y --no-install-recommends "${missing[@]}" >/dev/null
 }
 
 # ROS of the system, where it is not in the standard places.

@@ -8,7 +8,7 @@ import xml.etree.ElementTree
 
 ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
 DOCUMENTS = sorted(os.path.relpath(path, ROOT) for pattern in ('*.md', 'docs/*.md') for path in glob.glob(f'{ROOT}/{pattern}'))
-FOLDERS = ('cfg', 'cmake', 'config', 'docs', 'examples', 'include', 'lab', 'launch', 'msg', 'python', 'rviz', 'scripts', 'src', 'srv', 'test')
+FOLDERS = ('cfg', 'cmake', 'config', 'docs', 'examples', 'include', 'lab', 'launch', 'msg', 'packaging', 'python', 'rviz', 'scripts', 'src', 'srv', 'test')
 SOURCE = re.compile(r'[\w./-]+\.(h|cpp|py|launch|cfg|msg|srv|cmake|test)')
 PLACEHOLDER = re.compile(r'\b(NAME|ROOM|FILE|DIR|MODE)\b')
 

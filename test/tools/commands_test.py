@@ -41,6 +41,7 @@ SCANS = 6
 # Commands that are not run, and why.
 LEFT_OUT = {
     'catkin build': 'builds a whole workspace, for minutes',
+    'catkin_make_isolated --install': 'the same',
     'cmake --build build -j2': 'builds everything',
     **dict.fromkeys(("sudo apt-get install --no-install-recommends $(grep -v '^#' scripts/dependencies.debian.txt)",
                      'mkdir -p ~/catkin_ws/src', 'git clone . ~/catkin_ws/src/bki_mapping', 'cd ~/catkin_ws',
@@ -50,7 +51,10 @@ LEFT_OUT = {
     'scripts/demo --headless --scans 12': 'the same',
     'scripts/test --fast': 'the same',
     **dict.fromkeys(('scripts/test_on bookworm', 'scripts/test_on trixie', 'CXX=g++-9 scripts/test_on bullseye',
-                     'scripts/test_on --arm64 trixie'), 'installs and builds in a chroot, for many minutes'),
+                     'scripts/test_on --arm64 trixie', 'scripts/test_on --package bookworm'),
+                    'installs and builds in a chroot, for many minutes'),
+    'scripts/package': 'installs packages and builds; `scripts/test_on --package` runs it',
+    'sudo apt-get install ./build-package/*.deb': 'the same',
     'scripts/fuzz --seconds 14400 --seed 7': 'builds with sanitizers; scripts/test runs hostile_test',
     'scripts/fuzz --seed 7 --settings two_lidars': 'the same',
     'scripts/fuzz --target map_file --seconds 14400': 'builds with Clang and runs for hours; ctest runs the fixed inputs',
@@ -84,6 +88,7 @@ LEFT_OUT = {
 # Slow parts of commands and their replacements. Everything else is run as written.
 SHORTER = {
     '--scans 300': '--scans 4',
+    'roslaunch bki_mapping demo.launch': f'roslaunch bki_mapping demo.launch scans:={SCANS}',
     '--scans 200': '--scans 4',
     '--scans 1000 --every 10': '--scans 50 --every 10',
     ' --curves curves': '',  # two thousand simulated scans in each mode; tools_test draws curves
@@ -352,7 +357,7 @@ class Commands(unittest.TestCase):
         launches = [command for command in block if command.startswith('roslaunch') and GOES_ON.match(command)]
         if not launches:
             return
-        if not any('bag:=' in command or 'sequence:=' in command for command in launches):
+        if not any(re.search('bag:=|sequence:=|demo.launch', command) for command in launches):
             shell.run('build/devel/lib/bki_mapping/play_sequence --sequence ~/kitti/sequences/04 --rate 0 '
                       'cloud_in:=/velodyne_points')
         for command in launches:
