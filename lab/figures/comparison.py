@@ -14,8 +14,8 @@ from . import comparison_pictures  # noqa: E402
 from .programs import Programs, commit  # noqa: E402
 from .tables import markdown  # noqa: E402
 
-# Settings of evaluate_map --octomap. None is OctoMap's best in all columns: some are fast, some keep what stands, some show
-# at once what comes. Of 21 that were tried on a real clip, none had a better sqrt(SA DA) than the default.
+# Settings of evaluate_map --octomap. None is OctoMap's best in all columns: some are fast, some keep what stands, some
+# show at once what comes. Of 21 that were tried on a real clip, none had a better sqrt(SA DA) than the default.
 OCTOMAP = (
     'default',
     'discretize=true',
@@ -28,13 +28,14 @@ OCTOMAP = (
     'hit=0.97,miss=0.3,min=0.3',
 )
 # Presets with further arguments of evaluate_map.
-OURS = {preset: ['--config', preset] for preset in ('paper_none', 'baseline_even', 'paper_linear', 'paper_line', 'robot')}
+PRESETS = ('paper_none', 'baseline_even', 'paper_linear', 'paper_line', 'robot')
+OURS = {preset: ['--config', preset] for preset in PRESETS}
 OURS['robot without labels'] = ['--config', 'robot', '--classes', 'occupancy']
 BESIDE = 'robot'  # takes turns with OctoMap, scan by scan
 THREADS = (1, 2)
 TIMES = (('processor_ms', 'yardstick_processor_ms'), ('median_ms', 'yardstick_ms'))  # by number of threads
-HEADER = ['map', 'ms, 1 thread', 'Y, 1 thread', 'Y, 2 threads', 'MB', 'SA', 'holes', 'DA', 'PA to 50 m', 'free precision',
-          'free recall', 'ECE']
+HEADER = ['map', 'ms, 1 thread', 'Y, 1 thread', 'Y, 2 threads', 'MB', 'SA', 'holes', 'DA', 'PA to 50 m',
+          'free precision', 'free recall', 'ECE']
 INTRODUCTION = '''Measured on {date}, commit {commit}: {data}, voxels of {resolution:g} m. Y = {yardstick:.1f} ms.
 
 '''

@@ -30,7 +30,8 @@ def draw_times(figures_of, output):
                 continue
             time, share = figures['yardsticks'][1], 100 * figures[key]
             label = f'{number} {name}' if key == 'sa' else None  # a drive may lack points of what moved
-            axis.scatter(time, share, color=color_of(name), marker='s' if name.startswith('OctoMap') else 'o', label=label)
+            marker = 's' if name.startswith('OctoMap') else 'o'
+            axis.scatter(time, share, color=color_of(name), marker=marker, label=label)
             axis.annotate(str(number), (time, share), xytext=(4, 4), textcoords='offset points', fontsize=8)
         axis.set_xscale('log')
         axis.set_xlabel('time of a scan on one thread [Y]')
@@ -81,8 +82,9 @@ def draw_left(errors_of, ours, edge, output):
     draw_columns(axes.flat[0], stands, {'stands': KINDS['kept'][0]}, corner, edge)
     draw_columns(axes.flat[0], gone, {'gone': HAS_LEFT[0]}, corner, edge)
     axes.flat[0].set_title('truth, of the voxels with points')
+    colors = {kind: color for kind, (color, _) in KINDS.items()}
     for axis, name in zip(axes.flat[1:], names):
-        draw_columns(axis, read_columns(errors_of[name]), {kind: color for kind, (color, _) in KINDS.items()}, corner, edge)
+        draw_columns(axis, read_columns(errors_of[name]), colors, corner, edge)
         axis.set_title(name)
     for axis in axes.flat:
         axis.set_xlim(corner[0], corner[0] + WINDOW[0])
