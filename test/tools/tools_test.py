@@ -50,7 +50,7 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'query_city', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'export_map', 'inspect_map', 'map_bag', 'map_sequence', 'merge_maps', 'query_city', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help', '--version'}
             self.assertGreater(len(options), 1, program)
             for option in options:
@@ -59,7 +59,7 @@ class Tools(unittest.TestCase):
     def test_scripts_are_documented_with_all_options(self):
         source = os.environ['BKI_MAPPING_SOURCE_DIR']
         rows = self.rows_of_document()
-        for script in ('compare', 'demo', 'reproduce', 'soak', 'test', 'test_on'):
+        for script in ('compare', 'demo', 'package', 'reproduce', 'soak', 'test', 'test_on'):
             with open(os.path.join(source, 'scripts', script)) as file:
                 options = set(re.findall(r'^ +(--[a-z-]+)\)', file.read(), re.MULTILINE)) - {'--help'}
             self.assertTrue(options, script)
