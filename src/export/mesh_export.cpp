@@ -4,20 +4,20 @@
 #include <filesystem>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
 
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
 #include "export/open_faces.h"
+#include "export/ordered_json.h"
 #include "export/voxel_color.h"
 #include "export/voxel_points.h"
 
 namespace bki_mapping {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = OrderedJson;
 using FacesByClass = std::map<ClassId, Faces>;
 
 Color colorOf(ClassId id, const ClassTable& classes) {

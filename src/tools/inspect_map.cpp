@@ -4,7 +4,6 @@
 #include <ctime>
 #include <iomanip>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -16,13 +15,14 @@
 #include "core/counted.h"
 #include "export/map_picture.h"
 #include "export/map_statistics.h"
+#include "export/ordered_json.h"
 #include "tools/options.h"
 
 namespace {
 
 using namespace bki_mapping;
 namespace po = tools::po;
-using Json = nlohmann::ordered_json;
+using Json = OrderedJson;
 
 po::options_description options() {
   po::options_description options("Options");

@@ -1,16 +1,16 @@
 /// @file Prints the properties of all parameters as JSON, for scripts/generate_parameters.
 #include <algorithm>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "bki_mapping/mapping/mapper_config.h"
+#include "export/ordered_json.h"
 #include "ros/live_settings.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = OrderedJson;
 
 const char* nameOf(ParameterType type) {
   switch (type) {

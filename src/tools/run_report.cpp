@@ -4,17 +4,17 @@
 
 #include <iomanip>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "core/quantile.h"
+#include "export/ordered_json.h"
 
 namespace bki_mapping::tools {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = OrderedJson;
 
 struct VoxelCounts {
   std::size_t free = 0, occupied = 0, occluded = 0;
