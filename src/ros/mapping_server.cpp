@@ -220,7 +220,7 @@ void MappingServer::warnOfFarPlace() {
 void MappingServer::reportTfJumps() {
   for (const TfJump& jump : poses_->takeJumps()) {
     ledger_.tfJumped();
-    if (!throttle_.allow(jump.parent + " " + jump.child, Clock::now())) continue;
+    if (!throttle_.allow(shortText(jump.parent) + " " + shortText(jump.child), Clock::now())) continue;
     ROS_WARN("%s; call ~reset, or map a recording with the corrected poses", sentenceOf(jump).c_str());
   }
 }

@@ -132,6 +132,7 @@ void RecordingMapper::onTimeJump(const ros::Time& new_time) {
   if (forget) {
     mapper_.reset();
     drive_ = {};
+    listener_.forgotten();
   }
   listener_.warn("the stamps of clouds went back to time " + secondsText(new_time) +
                  ": old transforms are dropped, the map is " + (forget ? "reset" : "kept") +

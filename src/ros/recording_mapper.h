@@ -30,6 +30,7 @@ class RecordingMapper {
   struct Listener {
     std::function<void(const std::string&)> warn, inform;
     std::function<void(const PlacedScan&, const ScanStats&)> mapped;
+    std::function<void()> forgotten;  ///< the map was reset, so it has none of the clouds before
   };
 
   /// How long a cloud waits for its transform [s of the recording]: as long as tf keeps transforms.

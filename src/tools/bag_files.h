@@ -19,6 +19,7 @@ class BagFiles {
   /// Opens the bags. @throws std::runtime_error in one sentence with the remedy if one cannot be read.
   explicit BagFiles(std::vector<std::string> paths);
 
+  std::size_t count() const { return bags_.size(); }
   /// "bag 'a.bag'", "bags 'a.bag', 'b.bag'".
   std::string text() const;
   /// The file names, joined by plus signs.

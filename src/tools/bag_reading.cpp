@@ -11,7 +11,9 @@
 namespace bki_mapping::tools {
 namespace {
 
-constexpr char kTf[] = "/tf", kTfStatic[] = "/tf_static";
+bool isStatic(const std::string& topic) {
+  return topic == "/tf_static" || topic == "tf_static";  // as it was recorded
+}
 
 /// Transforms are read from so long before the first cloud on: longer than tf keeps them, and than clouds
 /// wait [s].
@@ -22,6 +24,16 @@ constexpr double kTfBefore = 2.0 * ros_interface::RecordingMapper::kLongestWait;
 BagReading::BagReading(const BagFiles& bags, std::vector<std::string> topics,
                        ros_interface::RecordingMapper& recording)
     : bags_(bags), topics_(std::move(topics)), recording_(recording), times_(bags.times(topics_)) {}
+
+std::size_t BagReading::firstAtTimeOf(std::size_t cloud) const {
+  if (cloud >= times_.size() || (topics_.size() == 1 && bags_.count() == 1)) return cloud;
+  const auto first = std::lower_bound(times_.begin(), times_.end(), times_[cloud]);
+  return static_cast<std::size_t>(first - times_.begin());
+}
+
+CloudRange BagReading::cuttable(const CloudRange& range) const {
+  return {firstAtTimeOf(range.first), firstAtTimeOf(range.last)};
+}
 
 CloudRange BagReading::map(const CloudRange& range, const Interruption& interruption,
                            const std::function<void(std::size_t)>& progress) {
@@ -37,9 +49,12 @@ CloudRange BagReading::map(const CloudRange& range, const Interruption& interrup
     told = done;
   };
   std::vector<std::string> topics = topics_;
-  topics.insert(topics.end(), {kTf, kTfStatic});
+  topics.insert(topics.end(), {"/tf", "tf", "/tf_static", "tf_static"});
   bags_.read(topics, begin, ros::TIME_MAX, [&](const rosbag::MessageInstance& message) {
-    if (interruption.requested()) read.last = std::min(read.last, std::max(number, range.first));
+    // Where the next cloud has an order, reading may end before it.
+    if (interruption.requested() && firstAtTimeOf(number) == number) {
+      read.last = std::min(read.last, std::max(number, range.first));
+    }
     if (!isCloud(message)) {
       addTransforms(message);
     } else {
@@ -57,7 +72,7 @@ CloudRange BagReading::map(const CloudRange& range, const Interruption& interrup
 }
 
 void BagReading::readStaticTransforms(const ros::Time& end) {
-  bags_.read({kTfStatic}, ros::TIME_MIN, end, [&](const rosbag::MessageInstance& message) {
+  bags_.read({"/tf_static", "tf_static"}, ros::TIME_MIN, end, [&](const rosbag::MessageInstance& message) {
     addTransforms(message);
     return true;
   });
@@ -70,7 +85,7 @@ bool BagReading::isCloud(const rosbag::MessageInstance& message) const {
 void BagReading::addTransforms(const rosbag::MessageInstance& message) {
   try {
     const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
-    if (transforms) recording_.addTransforms(*transforms, message.getTopic() == kTfStatic);
+    if (transforms) recording_.addTransforms(*transforms, isStatic(message.getTopic()));
   } catch (const rosbag::BagException&) {
     throw;
   } catch (const std::exception& fault) {

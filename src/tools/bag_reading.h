@@ -30,6 +30,10 @@ class BagReading {
   /// When each cloud was recorded.
   const std::vector<ros::Time>& times() const { return times_; }
 
+  /// The range, cut where parts of a recording can be: clouds of several topics or bags that were recorded at
+  /// one time have no order, so a part has all of them or none.
+  CloudRange cuttable(const CloudRange& range) const;
+
   /// Maps a range of the clouds, or, after a signal, those that had been read by then.
   /// @param progress is told how many have been mapped or dropped, whenever that changes.
   /// @return the range that was read. @throws std::runtime_error if a bag is damaged.
@@ -41,6 +45,8 @@ class BagReading {
   void readStaticTransforms(const ros::Time& end);
   bool isCloud(const rosbag::MessageInstance& message) const;
   void addTransforms(const rosbag::MessageInstance& message);
+  /// The number of the first cloud that was recorded at the same time as a cloud, if they have no order.
+  std::size_t firstAtTimeOf(std::size_t cloud) const;
   /// @param mapped false: the cloud is before the range, and only its stamp is of use.
   void addCloud(const rosbag::MessageInstance& message, bool mapped);
 

@@ -4,15 +4,17 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/settings/yaml.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
+#include "export/ordered_json.h"
 #include "ros/recording_mapper.h"
 #include "ros/server_config.h"
 #include "tools/bag_files.h"
@@ -94,12 +96,20 @@ std::vector<InputConfig> inputs(const po::variables_map& given, const ros_interf
       inputs.back().topic = topic;
     }
   }
-  for (InputConfig& input : inputs) input.topic = bags.cloudTopic(input.topic, "--cloud-topic TOPIC");
+  std::set<std::string> topics;
+  for (InputConfig& input : inputs) {
+    input.topic = bags.cloudTopic(input.topic, "--cloud-topic TOPIC");
+    if (!topics.insert(input.topic).second) {
+      throw std::invalid_argument("topic " + input.topic +
+                                  " is named twice, and its clouds would count twice; name it once");
+    }
+  }
   return inputs;
 }
 
-/// The clouds that the options select. @param times of the recording of all clouds.
-tools::CloudRange rangeOf(const po::variables_map& given, const std::vector<ros::Time>& times) {
+/// The clouds that the options select.
+tools::CloudRange rangeOf(const po::variables_map& given, const tools::BagReading& reading) {
+  const std::vector<ros::Time>& times = reading.times();
   for (const auto& [a, b] : {std::pair("first", "start"), std::pair("scans", "duration")}) {
     if (given.count(a) == 0 || given.count(b) == 0) continue;
     throw std::invalid_argument("--" + std::string(a) + " and --" + b +
@@ -120,7 +130,8 @@ tools::CloudRange rangeOf(const po::variables_map& given, const std::vector<ros:
   }
   if (given.count("scans")) range.last = std::min(range.last, range.first + tools::count(given, "scans"));
   if (given.count("duration")) range.last = numberAt(given["duration"].as<double>(), times[range.first]);
-  if (range.first == range.last) throw std::invalid_argument("--duration selects no cloud; raise it");
+  range = reading.cuttable(range);
+  if (range.first >= range.last) throw std::invalid_argument("these options select no cloud; ask for more");
   return range;
 }
 
@@ -153,7 +164,7 @@ std::string poseLine(const ros_interface::PlacedScan& placed) {
 /// The report of map_sequence, with what became of the clouds.
 std::string reportText(const SemanticMapper& mapper, const std::vector<tools::ScanReport>& scans,
                        const MappingStatus& status) {
-  auto report = nlohmann::ordered_json::parse(tools::reportJson(mapper, scans));
+  auto report = OrderedJson::parse(tools::reportJson(mapper, scans));
   report["clouds"] = {{"read", status.received}, {"mapped", status.integrated}};
   for (const ros_interface::DropKind& kind : ros_interface::dropKinds()) {
     if (status.*kind.count > 0) report["clouds"]["dropped"][kind.name] = status.*kind.count;
@@ -184,6 +195,7 @@ RecordingMapper::Listener listenerOf(Run& run) {
     run.scans.push_back({std::to_string(placed.scan.stamp), stats});
     run.trajectory += poseLine(placed);
   };
+  listener.forgotten = [&] { run = {}; };
   return listener;
 }
 
@@ -215,6 +227,16 @@ int printTopics(const tools::BagFiles& bags) {
   return 0;
 }
 
+/// @throws std::invalid_argument if a file that is to be written is one of the bags.
+void checkIsNoBag(const std::string& option, const std::string& path, const po::variables_map& given) {
+  for (const std::string& bag : given["files"].as<std::vector<std::string>>()) {
+    std::error_code missing;
+    if (std::filesystem::equivalent(path, bag, missing)) {
+      throw std::invalid_argument("--" + option + " " + path + " would replace the bag; name another file");
+    }
+  }
+}
+
 int mapBag(const po::variables_map& given) {
   if (given.count("files") == 0) throw std::invalid_argument("name one or more bags (see --help)");
   const tools::BagFiles bags(given["files"].as<std::vector<std::string>>());
@@ -223,6 +245,9 @@ int mapBag(const po::variables_map& given) {
   tools::checkMapOutput(given);
   for (const char* file : {"report", "trajectory"}) {
     if (given.count(file)) checkWritable(given[file].as<std::string>());
+  }
+  for (const char* file : {"output", "report", "trajectory"}) {
+    if (given.count(file)) checkIsNoBag(file, given[file].as<std::string>(), given);
   }
   const tools::Interruption interruption;
   const auto classes = std::make_shared<const ClassTable>(loadClassTable(server.classes));
@@ -238,14 +263,16 @@ int mapBag(const po::variables_map& given) {
   Run run;
   RecordingMapper recording(mapper, server, from, listenerOf(run));
   tools::BagReading reading(bags, topics, recording);
-  const tools::CloudRange range = rangeOf(given, reading.times());
+  const tools::CloudRange range = rangeOf(given, reading);
   const tools::CloudRange done = reading.map(range, interruption, [&](std::size_t count) {
     tools::showProgress(count, range.size(), progressText(run));
   });
   if (done.size() == 0) throw tools::Stopped("stopped before the first cloud; nothing was written");
   const std::string counts = recording.ledger().summary(0), fault = faultOf(recording);
   if (run.scans.empty() && !(given["allow-empty"].as<bool>() && fault.empty())) {
-    const std::string why = fault.empty() ? recording.drops().begin()->second : fault;
+    std::string why = fault;
+    if (why.empty() && !recording.drops().empty()) why = recording.drops().begin()->second;
+    if (why.empty()) why = "the map was reset after the last cloud";
     throw std::runtime_error("no cloud was mapped, and nothing was written: " + why + " (" + counts + ")");
   }
   DriveRecord drive = recording.drive();

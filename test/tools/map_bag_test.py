@@ -208,6 +208,26 @@ class MapBag(unittest.TestCase):
         self.assertEqual(self.tiles('map.bkm'), self.tiles('part1.bkm'))
         self.refused('the bags have 6 clouds on these topics, so none is left', bag, '--first', '6')
         self.refused('--first and --start say the same', bag, '--first', '1', '--start', '1')
+        self.refused('these options select no cloud', bag, '--duration', '0')
+
+    def test_clouds_recorded_at_one_time_are_of_one_part(self):
+        """Two lidars; rosbag gives such clouds in any order."""
+        lidars = ('/left', '/right')
+        messages = [message for n in range(SCANS) for message in (
+            ('/tf', transform(100.0 + n, n), 100.0 + n), *((topic, self.cloud(100.0 + n, n), 100.0 + n) for topic in lidars))]
+        bag = self.write('lidars.bag', *messages)
+        topics = ('--cloud-topic', lidars[0], '--cloud-topic', lidars[1])
+        self.assertIn(f'Mapped {2 * SCANS} of {2 * SCANS} clouds', self.map(bag, *topics, topic=None).stdout)
+        whole = self.tiles('map.bkm')
+        parts = []
+        for options in (('--scans', 5), ('--first', 5)):
+            parts.append(self.path(f'of_lidars{len(parts)}.bkm'))
+            self.map(bag, *topics, *options, topic=None)
+            os.rename(self.path('map.bkm'), parts[-1])
+        self.assertEqual([rows(part, 'SELECT scans FROM drive') for part in parts], [[(4,)], [(8,)]])
+        self.call('merge_maps', *parts, '--output', self.path('sum.bkm'))
+        self.assertEqual(self.tiles('sum.bkm'), whole)
+        self.refused('topic /left is named twice', bag, '--cloud-topic', 'left', topic='/left')
 
     def test_clouds_wait_for_tf_by_the_time_of_the_recording(self):
         def bag_with_tf_after(seconds):
@@ -267,8 +287,24 @@ class MapBag(unittest.TestCase):
             os.rename(self.path('map.bkm'), parts[-1])
         self.call('merge_maps', *parts, '--output', self.path('laps.bkm'))
         self.assertEqual(self.tiles('laps.bkm'), both)
-        self.map(bag, '--set', 'on_time_jump=reset')
+        self.map(bag, '--set', 'on_time_jump=reset', '--trajectory', self.path('poses.txt'), '--report', self.path('report.json'))
         self.assertNotEqual(self.tiles('map.bkm'), both)
+        for name, count in (('poses.txt', lambda text: len(text.splitlines())),
+                            ('report.json', lambda text: len(json.loads(text)['scans']))):
+            with open(self.path(name)) as file:
+                self.assertEqual(count(file.read()), rows(self.path('map.bkm'), 'SELECT scans FROM drive')[0][0], name)
+
+    def test_tf_may_be_recorded_without_a_slash(self):
+        poses = [('tf_static', transform(0.0, 1.0, 'base', 'velodyne'), 99.0), ('tf', transform(100.0, child='base'), 99.0)]
+        self.assertIn('Mapped 1 of 1 clouds', self.map(self.write('bare.bag', *poses, (TOPIC, self.cloud(100.0), 100.0))).stdout)
+
+    def test_no_file_replaces_a_bag(self):
+        with open(self.bag, 'rb') as file:
+            before = file.read()
+        for option in ('--report', '--trajectory'):
+            self.refused(f'{option} {self.bag} would replace the bag', self.bag, option, self.bag)
+        with open(self.bag, 'rb') as file:
+            self.assertEqual(file.read(), before)
 
     def test_what_cannot_be_read_is_said_with_the_remedy(self):
         self.refused(f"bag '{self.path('none.bag')}' cannot be read (No such file or directory)", self.path('none.bag'))
