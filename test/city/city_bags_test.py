@@ -5,7 +5,7 @@ import math
 import sys
 import unittest
 
-from harness import SCANS, MadeCity, program, tiles_of
+from harness import BIN, SCANS, MadeCity, program, tiles_of
 
 import numpy
 from bki_mapping.city import report
@@ -18,6 +18,9 @@ try:
     from tf2_msgs.msg import TFMessage
 except ImportError as error:
     print(f'SKIPPED: needs ROS: {error}', file=sys.stderr)
+    sys.exit(77)
+if not (BIN / 'map_bag').exists():
+    print('SKIPPED: needs map_bag, which is built with ROS', file=sys.stderr)
     sys.exit(77)
 
 

@@ -6,10 +6,13 @@ import pathlib
 import sys
 import unittest
 
-from harness import MadeCity, tiles_of
+from harness import BIN, MadeCity, tiles_of
 
 if 'BKI_MAPPING_TEST_DATA' not in os.environ:
     print('SKIPPED: needs BKI_MAPPING_TEST_DATA', file=sys.stderr)
+    sys.exit(77)
+if not (BIN / 'map_bag').exists():
+    print('SKIPPED: needs map_bag, which is built with ROS', file=sys.stderr)
     sys.exit(77)
 
 

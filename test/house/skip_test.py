@@ -35,6 +35,10 @@ class Skips(unittest.TestCase):
         if 'real_bag_rostest' in self.tests:
             self.assertEqual(self.outcome('real_bag_rostest'), 'skipped')
 
+    def test_without_ros(self):
+        self.assertEqual(self.outcome('city_bags_test', BKI_MAPPING_BIN='/no/such'), 'skipped')
+        self.assertEqual(self.outcome('city_real_bag_test', BKI_MAPPING_BIN='/no/such', BKI_MAPPING_TEST_DATA='/no/such'), 'skipped')
+
     def test_without_an_emulator(self):
         self.assertEqual(self.outcome('nehalem_test', PATH='/no/such'), 'skipped')
 
