@@ -8,7 +8,7 @@ import unittest
 from harness import BIN, SCANS, MadeCity, program, tiles_of
 
 import numpy
-from bki_mapping.city import report
+from bki_mapping.city import build, report
 
 try:
     import rosbag
@@ -93,6 +93,18 @@ class Bags(MadeCity):
         (self.output / drive['pieces'][1]['file']).with_suffix('.json').unlink()
         self.finish(self.start(city, '--workers', '2', '--resume'))
         self.assertIn('| map pieces | 6 | 1 | ', (self.output / 'report.md').read_text())
+        # Or is empty or cut, as after a loss of power. Bags that an earlier version has converted go, and others stay.
+        for name in (f'bags/d-{"0" * 16}/bag.json', 'bags/mine.bag'):
+            (self.output / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.output / name).write_text('')
+        for number, left in ((0, 0), (1, 20)):
+            account = (self.output / drive['pieces'][number]['file']).with_suffix('.json')
+            account.write_text(account.read_text()[:left])
+        self.assertEqual(report.way_of(drive, self.output).shape, (0, 3))
+        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.assertIn('| map pieces | 6 | 2 | ', (self.output / 'report.md').read_text())
+        self.assertEqual(list((self.output / 'bags').iterdir()), [self.output / 'bags/mine.bag'])
+        numpy.testing.assert_allclose(report.way_of(drive, self.output), poses[:SCANS - 1, :, 3], atol=1e-6)
         self.expect_equal([], whole=whole)
         self.assertEqual([path for path in self.output.rglob('.*') if path.name != '.run'], [], 'nothing is left over')
         # Other pieces make the same city; without labels, it is that of such a map.
@@ -103,6 +115,23 @@ class Bags(MadeCity):
         city = self.describe_drives({**bag, 'labelled': False}, classes='occupancy')
         self.finish(self.start(city, '--workers', '2', '--resume'))
         self.expect_equal([], whole=tiles_of(self.folder / 'unlabelled.bkm'))
+
+    def test_only_what_earlier_versions_wrote_leaves_the_folder_of_bags(self):
+        bags = self.folder / 'old/bags'
+        earlier = [f'my.drive-{"0" * 16}/bag.json', f'my.drive-{"0" * 16}/velodyne/000000.bin', f'.my.{"f" * 32}.drive-{"0" * 16}/x']
+        others = ['monday.bag', '.hidden/note', f'notes-{"0" * 16}/note', 'drive/bag.json', f'a-{"0" * 17}/bag.json']
+        for name in earlier + others:
+            (bags / name).parent.mkdir(parents=True, exist_ok=True)
+            (bags / name).write_text('')
+        build.remove_converted_bags(bags)
+        self.assertEqual(sorted(str(path.relative_to(bags)) for path in bags.rglob('*') if path.is_file()), sorted(others))
+        for name in others:
+            (bags / name).unlink()
+        for path in list(bags.iterdir()):
+            path.rmdir()
+        build.remove_converted_bags(bags)
+        self.assertFalse(bags.exists(), 'an empty folder stays')
+        build.remove_converted_bags(bags)
 
     def test_wrong_bags_are_left_out_with_a_sentence(self):
         good = {'cloud_topic': '/points', 'frame': 'city'}

@@ -22,6 +22,7 @@ ALLOWED_FAILURES = 1000
 SMALLEST_FREE = 16 << 20  # of a disk [bytes]: below it, a task that failed is taken to have failed for want of space
 NO_SPACE = re.compile('No space left on device|Disk quota exceeded')
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}  # of file systems that know none
+CONVERTED, CONVERTING = re.compile(r'-[0-9a-f]{16}$'), re.compile(r'\..+\.[0-9a-f]{32}(\.|$)')  # bags, by earlier versions
 WAIT = 60  # for the first worker of a scheduler [s]
 
 
@@ -266,7 +267,16 @@ class Builder:
             for path in self.folder.glob(pattern):
                 if path != own:
                     path.unlink()
-        shutil.rmtree(self.folder / 'bags', ignore_errors=True)  # of earlier versions
+        remove_converted_bags(self.folder / 'bags')
+
+
+def remove_converted_bags(folder):
+    """Removes the sequences that earlier versions made of bags, and the folder if nothing else is in it."""
+    for path in folder.glob('*'):
+        if CONVERTING.match(path.name) or CONVERTED.search(path.name) and (path / 'bag.json').is_file():
+            shutil.rmtree(path, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def unfit_process(client):

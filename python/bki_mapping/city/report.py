@@ -196,11 +196,11 @@ def draw(folder, index):
 def way_of(drive, city):
     """Where the sensor was in each scan of a drive of the index, (N, 3), in the frame of the city [m]. city: its folder."""
     import numpy
-    if 'bag' in drive:
-        accounts = [json.loads((city / plan.account_of(piece['file'])).read_text()) for piece in drive['pieces']]
-        return numpy.array([at for account in accounts for at in account['way']], float).reshape(-1, 3)
-    folder = pathlib.Path(drive['sequence'])
     try:
+        if 'bag' in drive:
+            accounts = [json.loads((city / plan.account_of(piece['file'])).read_text()) for piece in drive['pieces']]
+            return numpy.array([at for account in accounts for at in account['way']], float).reshape(-1, 3)
+        folder = pathlib.Path(drive['sequence'])
         if not (folder / 'velodyne').is_dir():
             heads = [path.open('rb').read(4096).split(b'VIEWPOINT')[1].split()[:3] for path in sorted(folder.glob('pcd/*.pcd'))]
             return numpy.array(heads, float).reshape(-1, 3)

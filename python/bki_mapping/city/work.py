@@ -274,9 +274,10 @@ def map_piece(setup, piece):
             known = json.loads(account.read_text()) if drive.bag else {}
             known.pop('way', None)
             return result_of(setup, piece.file, ran, columns=plan.columns_of(path), **known)
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, ValueError) as error:  # of the piece, or of its account
             if ran is not None:  # it is new, so the disk is to blame
-                raise Fault(f'{path} is damaged on {socket.gethostname()} ({error}); remove it', of_worker=True) from None
+                damaged = account if isinstance(error, ValueError) else path
+                raise Fault(f'{damaged} is damaged on {socket.gethostname()} ({error}); remove it', of_worker=True) from None
             with contextlib.suppress(FileNotFoundError):  # another worker may have removed it
                 path.unlink()
 
@@ -312,7 +313,10 @@ def map_bag(setup, piece, own):
         ran = run(setup, 'map_bag', arguments + of_piece(setup, piece, own), log_of_piece(piece))
         clouds = json.loads(report.read_text())['clouds']
         way = [[float(word) for word in line.split()[1:4]] for line in trajectory.read_text().splitlines()]
-        written.write_text(json.dumps({'clouds': clouds['read'], 'dropped': clouds.get('dropped', {}), 'way': way}) + '\n')
+        with open(written, 'w') as file:
+            file.write(json.dumps({'clouds': clouds['read'], 'dropped': clouds.get('dropped', {}), 'way': way}) + '\n')
+            file.flush()
+            os.fsync(file.fileno())  # the piece counts on it, also after a loss of power
         if is_over(setup):
             raise Fault(OVER, of_worker=True)
         os.replace(written, own.parent / pathlib.PurePath(plan.account_of(piece.file)).name)
