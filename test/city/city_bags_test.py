@@ -118,7 +118,8 @@ class Bags(MadeCity):
 
     def test_only_what_earlier_versions_wrote_leaves_the_folder_of_bags(self):
         bags = self.folder / 'old/bags'
-        earlier = [f'my.drive-{"0" * 16}/bag.json', f'my.drive-{"0" * 16}/velodyne/000000.bin', f'.my.{"f" * 32}.drive-{"0" * 16}/x']
+        earlier = [f'my.drive-{"0" * 16}/bag.json', f'my.drive-{"0" * 16}/velodyne/000000.bin',
+                   f'.my.{"f" * 32}.drive-{"0" * 16}/x']
         others = ['monday.bag', '.hidden/note', f'notes-{"0" * 16}/note', 'drive/bag.json', f'a-{"0" * 17}/bag.json']
         for name in earlier + others:
             (bags / name).parent.mkdir(parents=True, exist_ok=True)
