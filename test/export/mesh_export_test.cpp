@@ -28,7 +28,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-const StateRules kRules = StateRules().withFreeGain(80, 0.1);
+const StateRules kMeshRules = StateRules().withFreeGain(80, 0.1);
 
 /// The centre of a face in half voxels from the map's origin, and where it looks.
 using Place = std::tuple<std::int64_t, std::int64_t, std::int64_t, int, int, int>;
@@ -134,7 +134,7 @@ class Mesh {
 
 std::map<std::string, std::set<Place>> expectedFaces(const SemanticMap& map, const ClassTable& classes) {
   std::map<std::tuple<int, int, int>, ClassId> occupied;
-  forEachKnownVoxel(map, kRules, [&](const VoxelIndex& voxel, const VoxelView& view) {
+  forEachKnownVoxel(map, kMeshRules, [&](const VoxelIndex& voxel, const VoxelView& view) {
     if (view.state == VoxelState::kOccupied) occupied[{voxel.x, voxel.y, voxel.z}] = view.label;
   });
   std::map<std::string, std::set<Place>> expected;
@@ -159,7 +159,7 @@ TEST(Mesh, HasTheOpenFacesOfEachClass) {
   const SemanticMap map = randomMap(4, 60, 3);
   const std::shared_ptr<const ClassTable> table = infoOf().classes;
   const ClassTable& classes = *table;
-  exportMesh(folder / "map.glb", map, kRules, classes);
+  exportMesh(folder / "map.glb", map, kMeshRules, classes);
   const Mesh mesh(folder / "map.glb", map.geometry().resolution());
   const auto expected = expectedFaces(map, classes);
   EXPECT_GT(expected.size(), 1u);
@@ -172,7 +172,7 @@ TEST(Mesh, HasTheOpenFacesOfEachClass) {
 
 TEST(Mesh, HasTheColoursOfTheClassesAsLight) {
   const TemporaryFolder folder;
-  exportMesh(folder / "map.glb", randomMap(4, 60, 3), kRules, *infoOf().classes);
+  exportMesh(folder / "map.glb", randomMap(4, 60, 3), kMeshRules, *infoOf().classes);
   const Mesh mesh(folder / "map.glb", 0.3);
   for (const Json& material : mesh.json["materials"]) {
     const Json& color = material["pbrMetallicRoughness"]["baseColorFactor"];
@@ -186,7 +186,7 @@ TEST(Mesh, StandsFarFromTheOriginAsExactlyAsNearIt) {
   const std::vector<EvidenceUnits> plane(kBlockVoxels, 900);
   SemanticMap map = infoOf().emptyMap();
   map.getOrAllocate({{208333, 1666666, 3}}).add(40, plane.data());  // 500 km east, 4,000 km north
-  exportMesh(folder / "map.glb", map, kRules, *infoOf().classes);
+  exportMesh(folder / "map.glb", map, kMeshRules, *infoOf().classes);
   const Mesh mesh(folder / "map.glb", map.geometry().resolution());
   EXPECT_EQ(mesh.faces, expectedFaces(map, *infoOf().classes));
   EXPECT_EQ(mesh.count, 6u * 64u);
@@ -234,7 +234,7 @@ TEST(Mesh, HasTheSameFacesInAPlyFile) {
   far.getOrAllocate({{208333, 1666666, 3}}).add(40, std::vector<EvidenceUnits>(kBlockVoxels, 900).data());
   const SemanticMap near = randomMap(4, 60, 3);
   for (const SemanticMap* const map : std::initializer_list<const SemanticMap*>{&near, &far}) {
-    exportMesh(folder / "map.ply", *map, kRules, *table);
+    exportMesh(folder / "map.ply", *map, kMeshRules, *table);
     std::map<Color, std::multiset<Place>> expected;
     for (const auto& [name, faces] : expectedFaces(*map, *table)) {
       for (const SemanticClass& c : table->classes()) {
@@ -253,7 +253,7 @@ TEST(Mesh, EndsInGlbOrPly) {
 
 TEST(Mesh, OfAnEmptyMapIsAnEmptyScene) {
   const TemporaryFolder folder;
-  exportMesh(folder / "map.glb", infoOf().emptyMap(), kRules, *infoOf().classes);
+  exportMesh(folder / "map.glb", infoOf().emptyMap(), kMeshRules, *infoOf().classes);
   const Mesh mesh(folder / "map.glb", 0.3);
   EXPECT_EQ(mesh.json["scenes"][0]["nodes"], Json({0}));
   EXPECT_FALSE(mesh.json["nodes"][0].contains("mesh"));
@@ -261,7 +261,7 @@ TEST(Mesh, OfAnEmptyMapIsAnEmptyScene) {
 }
 
 TEST(Mesh, TooLargeIsNoticedBeforeItIsWritten) {
-  EXPECT_THROW(openFaces(randomMap(4, 60, 3), kRules, Eigen::Vector3d::Zero(), 1000), std::length_error);
+  EXPECT_THROW(openFaces(randomMap(4, 60, 3), kMeshRules, Eigen::Vector3d::Zero(), 1000), std::length_error);
 }
 
 }  // namespace
