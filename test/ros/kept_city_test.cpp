@@ -179,8 +179,9 @@ TEST_F(KeptCity, AWindowMovesTilesToTheMappersOwnFile) {
   EXPECT_EQ(own.drives.size(), 2u);
   EXPECT_EQ(cityBytes(), before);
   // A second start would count tiles twice.
-  EXPECT_NE(sentenceOf([&] { Robot{config_}; }).find("exists already, and may hold tiles of the city"),
-            std::string::npos);
+  EXPECT_NE(
+      bki_mapping::sentenceOf([&] { Robot{config_}; }).find("exists already, and may hold tiles of the city"),
+      std::string::npos);
 }
 
 TEST_F(KeptCity, ClearingAndResettingReachTilesThatComeLater) {
