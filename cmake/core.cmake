@@ -42,7 +42,8 @@ function(bki_mapping_core_room room)
   bki_mapping_join(bki_mapping_${room})
   if(room STREQUAL "core")
     bki_mapping_precompile(bki_mapping_core
-      <Eigen/Geometry> <algorithm> <array> <bitset> <cmath> <map> <memory> <optional> <stdexcept> <string> <vector>)
+      <Eigen/Geometry> <algorithm> <array> <bitset> <cmath> <map> <memory> <optional> <stdexcept> <string> <vector>
+      ${PROJECT_SOURCE_DIR}/src/simd/intrinsics.h)
   else()
     bki_mapping_precompile(bki_mapping_${room} REUSE bki_mapping_core)
   endif()

@@ -40,9 +40,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
+
+#include "simd/intrinsics.h"
 
 namespace bki_mapping {
 namespace {
