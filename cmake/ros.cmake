@@ -41,6 +41,7 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
     tf_jumps.cpp
+    voxel_pcl.cpp
   LINK bki_mapping_city bki_mapping_export pcl_common ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>

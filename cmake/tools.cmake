@@ -13,26 +13,29 @@ bki_mapping_room(city SOURCES city_index.cpp region_files.cpp tiled_map.cpp LINK
 target_link_libraries(bki_mapping_city PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_room(export SOURCES
     cleaned_points.cpp display_colors.cpp export_file.cpp grid_export.cpp html_export.cpp html_page.cpp map_export.cpp
-    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp voxel_drives.cpp voxel_pcl.cpp
-    voxel_points.cpp
+    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp voxel_drives.cpp voxel_points.cpp
   LINK bki_mapping_query bki_mapping_sequence bki_mapping_store)
-target_link_libraries(bki_mapping_export PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_io PNG::PNG yaml-cpp ZLIB::ZLIB
+target_link_libraries(bki_mapping_export PRIVATE nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB
   ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_export SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
-# In debug builds OctoMap would print what it writes to standard error.
-set_source_files_properties(src/export/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
+if(CMAKE_BUILD_TYPE STREQUAL "Debug")
+  # OctoMap would print what it writes to standard error.
+  set_source_files_properties(src/export/octomap_export.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
+endif()
 bki_mapping_join(bki_mapping_sequence bki_mapping_city bki_mapping_export)
 bki_mapping_light(bki_mapping_sequence bki_mapping_city bki_mapping_export)
-bki_mapping_precompile_files(bki_mapping_export
-  <Eigen/Geometry> <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
-bki_mapping_precompile(bki_mapping_city REUSE bki_mapping_settings)
+foreach(room sequence city export)
+  bki_mapping_precompile(bki_mapping_${room} REUSE bki_mapping_settings)
+endforeach()
 
-bki_mapping_room(tools SOURCES interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp
+bki_mapping_room(tools SOURCES
+    interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp version.cpp
   LINK bki_mapping_city bki_mapping_query bki_mapping_sequence Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_join(bki_mapping_tools)
 # Of one file: precompiled headers serve only targets with all the definitions of theirs.
-set_source_files_properties(src/tools/options.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}")
+set_source_files_properties(src/tools/version.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}"
+  SKIP_PRECOMPILE_HEADERS ON)
 target_compile_options(bki_mapping_tools PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the other libraries
 bki_mapping_precompile(bki_mapping_tools
   <Eigen/Geometry> <boost/program_options.hpp> <filesystem> <functional> <iostream> <map> <string> <vector>)

@@ -1,16 +1,15 @@
 #include "bki_mapping/export/map_export.h"
 
-#include <pcl/io/pcd_io.h>
-
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
+#include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
-#include "export/voxel_pcl.h"
 #include "export/voxel_points.h"
 
 namespace bki_mapping {
@@ -47,12 +46,23 @@ std::string plyBytes(const VoxelPoints& points, double resolution, bool far) {
 }
 
 std::string pcdBytes(const VoxelPoints& points, const Eigen::Vector3d& origin) {
-  Eigen::Vector4f viewpoint = Eigen::Vector4f::Zero();
-  viewpoint.head<3>() = origin.cast<float>();
+  if (points.count() > std::numeric_limits<std::uint32_t>::max() / sizeof(VoxelPoint)) {
+    throw std::length_error(std::to_string(points.count()) + " voxels are more than a PCD file can hold");
+  }
+  std::ostringstream names, sizes, types, counts, header;
+  for (const VoxelField& field : kVoxelFields) {
+    names << ' ' << field.name;
+    sizes << ' ' << field.bytes();
+    types << ' ' << (field.type == VoxelField::kFloat32 ? 'F' : 'U');
+    counts << " 1";
+  }
   // PCL's own writer maps the file into memory, and the process dies if the disk fills up meanwhile.
-  const std::string header = pcl::PCDWriter().generateHeaderBinary(pclHeader(points.count()), viewpoint,
-                                                                   Eigen::Quaternionf::Identity());
-  return withPoints<VoxelPoint>(header + "DATA binary\n", points, origin);
+  header << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS" << names.str() << "\nSIZE"
+         << sizes.str() << "\nTYPE" << types.str() << "\nCOUNT" << counts.str() << "\nWIDTH "
+         << points.count() << "\nHEIGHT 1\nVIEWPOINT " << numberText(origin.x()) << ' '
+         << numberText(origin.y()) << ' ' << numberText(origin.z()) << " 1 0 0 0\nPOINTS " << points.count()
+         << "\nDATA binary\n";
+  return withPoints<VoxelPoint>(header.str(), points, origin);
 }
 
 std::string bytesOf(const std::string& ending, const SemanticMap& map, const StateRules& rules,

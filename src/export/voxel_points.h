@@ -33,6 +33,8 @@ struct VoxelField {
   const char* name;
   Type type;
   std::uint32_t offset;  ///< in the point [bytes]
+
+  constexpr std::size_t bytes() const { return type == kFloat32 ? 4 : type == kUint16 ? 2 : 1; }
 };
 /// The fields of VoxelPoint; rgb is declared as a float32, as PCL does.
 inline constexpr std::array kVoxelFields = {

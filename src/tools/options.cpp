@@ -12,6 +12,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
 #include "tools/interruption.h"
+#include "tools/version.h"
 
 namespace bki_mapping::tools {
 namespace {
@@ -64,7 +65,7 @@ std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::strin
       return nullptr;
     }
     if (given->count("version")) {
-      std::cout << "bki_mapping " BKI_MAPPING_VERSION "\n";
+      std::cout << "bki_mapping " << version() << "\n";
       return nullptr;
     }
     po::notify(*given);

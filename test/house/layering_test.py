@@ -38,7 +38,7 @@ LIBRARIES = {
     'settings': ('yaml-cpp/',),
     'sequence': ('pcl/',),
     'city': ('nlohmann/',),
-    'export': ('nlohmann/', 'octomap/', 'pcl/', 'png.h', 'yaml-cpp/', 'zlib.h'),
+    'export': ('nlohmann/', 'octomap/', 'png.h', 'yaml-cpp/', 'zlib.h'),
     'evaluation': ('nlohmann/', 'octomap/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "export/voxel_pcl.h"
 #include "export/voxel_points.h"
 #include "ros/cloud_frame.h"
 #include "ros/server_snapshot.h"
+#include "ros/voxel_pcl.h"
 #include "streamed_message.h"
 
 namespace bki_mapping::ros_interface {

@@ -1,11 +1,11 @@
-#include "export/voxel_pcl.h"
+#include "ros/voxel_pcl.h"
 
 #include <limits>
 #include <stdexcept>
 
 #include "export/voxel_points.h"
 
-namespace bki_mapping {
+namespace bki_mapping::ros_interface {
 
 pcl::PCLPointCloud2 pclHeader(std::size_t count) {
   if (count > std::numeric_limits<std::uint32_t>::max() / sizeof(VoxelPoint)) {
@@ -27,4 +27,4 @@ pcl::PCLPointCloud2 pclHeader(std::size_t count) {
   return cloud;
 }
 
-}  // namespace bki_mapping
+}  // namespace bki_mapping::ros_interface
