@@ -1,19 +1,4 @@
-# What is installed, with catkin and without it, and the targets that find_package(bki_mapping) gives to other packages.
-if(BKI_MAPPING_ROS)
-  set(BKI_MAPPING_BIN_DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-  set(BKI_MAPPING_LIB_DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
-  set(BKI_MAPPING_SHARE_DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-  set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
-  if(CMAKE_INSTALL_PREFIX STREQUAL "/usr" AND CMAKE_LIBRARY_ARCHITECTURE)  # where Debian's catkin puts its own, too
-    set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_LIB_DESTINATION}/cmake/${PROJECT_NAME})
-  endif()
-else()
-  set(BKI_MAPPING_BIN_DESTINATION bin)
-  set(BKI_MAPPING_LIB_DESTINATION lib)
-  set(BKI_MAPPING_SHARE_DESTINATION share/${PROJECT_NAME})
-  set(BKI_MAPPING_CMAKE_DESTINATION ${BKI_MAPPING_SHARE_DESTINATION}/cmake)
-endif()
-
+# What is installed, and the targets that find_package(bki_mapping) gives to other packages.
 get_property(bki_mapping_rooms GLOBAL PROPERTY BKI_MAPPING_ROOMS)
 # Programs are made of these alone; they have no public headers.
 set(bki_mapping_private_rooms ${bki_mapping_rooms})
