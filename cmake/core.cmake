@@ -110,5 +110,8 @@ target_link_libraries(bki_mapping_store PRIVATE SQLite::SQLite3 ZLIB::ZLIB)
 bki_mapping_join(bki_mapping_store)
 bki_mapping_light(bki_mapping_store)
 bki_mapping_precompile(bki_mapping_store REUSE bki_mapping_settings)
-# The linkage of a private class counts as the main file's only there.
-set_source_files_properties(src/store/map_keeper.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+if(BKI_MAPPING_JOIN)
+  set_target_properties(bki_mapping_store PROPERTIES UNITY_BUILD_BATCH_SIZE 28)  # one file
+  # Of a class whose members are of the unnamed namespace of an included file.
+  target_compile_options(bki_mapping_store PRIVATE -Wno-subobject-linkage)
+endif()

@@ -18,7 +18,7 @@ constexpr double kGpsRollover = 1024.0 * 7.0 * kDay;
 /// No transform of this age is late, and no cloud of this age waited [s].
 constexpr double kTolerance = 1.0;
 /// A time before this is counted from a start, one after it from 1970 [s].
-constexpr double kLongestUptime = 10.0 * kYear, kFirstDate = 30.0 * kYear;
+constexpr double kLongestUptime = 10.0 * kYear, kLeastDate = 30.0 * kYear;
 
 bool near(double value, double expected, double tolerance) {
   return std::abs(value - expected) <= tolerance;
@@ -52,11 +52,11 @@ std::string durationText(double seconds) {
 std::string clockAdvice(const ros::Time& stamp, const ros::Time& tf) {
   const double ahead = stamp.toSec() - tf.toSec(), difference = std::abs(ahead);
   const std::string whose = ahead > 0.0 ? "the sensor" : "the publisher of the transforms";
-  if (stamp.toSec() < kLongestUptime && tf.toSec() > kFirstDate) {
+  if (stamp.toSec() < kLongestUptime && tf.toSec() > kLeastDate) {
     return ", which looks like time since the sensor's start instead of since 1970; synchronise the sensor's "
            "clock (PTP, GPS), or have its driver stamp clouds with the computer's time";
   }
-  if (tf.toSec() < kLongestUptime && stamp.toSec() > kFirstDate) {
+  if (tf.toSec() < kLongestUptime && stamp.toSec() > kLeastDate) {
     return ", which looks like simulated time in tf and real time in the clouds; set use_sim_time before all "
            "nodes start, or nowhere";
   }

@@ -11,10 +11,10 @@ namespace {
 
 /// Tolerance within which a number of voxels or quarter turns counts as whole: larger than the rounding of
 /// decimal fractions of metres, and smaller than any shift that a user intends.
-constexpr double kWhole = 1e-6;
+constexpr double kWholeTolerance = 1e-6;
 
 bool isWhole(double number) {
-  return std::abs(number - std::round(number)) < kWhole;
+  return std::abs(number - std::round(number)) < kWholeTolerance;
 }
 
 /// The bounding box of the images of a box's corners.
