@@ -50,7 +50,7 @@ function(bki_mapping_light)
   endif()
 endfunction()
 
-# Joined: GCC looks for garbage from 128 MiB of memory on, in vain: it needs at most 1.2 GiB for any file.
+# Joined: GCC looks for garbage from 128 MiB of memory on, in vain: it needs at most 1.7 GiB for any file.
 if(BKI_MAPPING_JOIN AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options("SHELL:--param ggc-min-heapsize=1048576")
 endif()
