@@ -117,6 +117,33 @@ Eigen::Isometry3d rigidTransform(const std::vector<double>& numbers, const std::
   return T;
 }
 
+std::string rowOf(const Eigen::Isometry3d& T) {
+  std::ostringstream row;
+  row.precision(17);
+  for (int i = 0; i < 12; ++i) row << (i ? " " : "") << T.matrix()(i / 4, i % 4);
+  return row.str();
+}
+
+Eigen::Isometry3d readCalibration(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw std::runtime_error(
+        path +
+        " cannot be read; poses of the camera need calib.txt with a line 'Tr:' (sensor to "
+        "camera); if they are of the lidar, say so with --poses-in lidar");
+  }
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string key;
+    words >> key;
+    if (key != "Tr:" && key != "Tr") continue;
+    std::vector<double> numbers;
+    for (double number = 0.0; words >> number;) numbers.push_back(number);
+    return rigidTransform(numbers, path + ", Tr:");
+  }
+  throw std::runtime_error(path + " has no line 'Tr:'; add the transform from sensor to camera");
+}
+
 PoseFile readPoseFile(const std::string& path, const std::string& remedy) {
   std::ifstream file(path, std::ios::binary);
   if (!file || std::filesystem::is_directory(path)) {

@@ -1,4 +1,4 @@
-/// @file Reads files of poses.
+/// @file Reads files of poses, and of the calibration that leads to the sensor.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -28,6 +28,13 @@ struct PoseFile {
 /// A rigid transform from the numbers of a 3x4 or 4x4 matrix, row by row; the rotation is made orthonormal.
 /// @param what the numbers are of, for the error. @throws std::runtime_error if it is no rigid transform.
 Eigen::Isometry3d rigidTransform(const std::vector<double>& numbers, const std::string& what);
+
+/// The 3x4 matrix of a transform, row by row, with all digits.
+std::string rowOf(const Eigen::Isometry3d& T);
+
+/// Reads `Tr` of a calib.txt: T_camera_sensor. @throws std::runtime_error if the file cannot be read, or has
+/// no such rigid transform.
+Eigen::Isometry3d readCalibration(const std::string& path);
 
 /// Reads a text file with a pose on each line. The first line with a known number of numbers decides which of
 /// these formats the file has:

@@ -29,22 +29,6 @@ std::ifstream openFile(const fs::path& path, const std::string& remedy) {
   return file;
 }
 
-Eigen::Isometry3d readCalibration(const fs::path& path) {
-  std::ifstream file = openFile(path,
-                                "poses of the camera need calib.txt with a line 'Tr:' (sensor to camera); if "
-                                "they are of the lidar, say so with --poses-in lidar");
-  for (std::string line; std::getline(file, line);) {
-    std::istringstream words(line);
-    std::string key;
-    words >> key;
-    if (key != "Tr:" && key != "Tr") continue;
-    std::vector<double> numbers;
-    for (double number = 0.0; words >> number;) numbers.push_back(number);
-    return rigidTransform(numbers, path.string() + ", Tr:");
-  }
-  fail(path.string() + " has no line 'Tr:'; add the transform from sensor to camera");
-}
-
 template <typename T>
 std::vector<T> readBinary(const fs::path& path, std::size_t record) {
   std::ifstream file = openFile(path, "check the sequence's folder");
@@ -148,7 +132,7 @@ Sequence::Sequence(const std::string& folder, const SequenceOptions& options)
                         times.given());
   poses_in_ = options.poses_in.value_or(poses.stamped() ? PosesIn::kLidar : PosesIn::kCamera);
   Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();
-  if (poses_in_ == PosesIn::kCamera) T_camera_sensor = readCalibration(root / "calib.txt");
+  if (poses_in_ == PosesIn::kCamera) T_camera_sensor = readCalibration((root / "calib.txt").string());
   const auto of_sensor = [&](const Eigen::Isometry3d& pose) {
     return Eigen::Isometry3d(T_camera_sensor.inverse() * pose * T_camera_sensor);
   };

@@ -10,6 +10,7 @@
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
 #include "sequence/pcd_file.h"
+#include "sequence/pose_file.h"
 
 namespace bki_mapping {
 namespace {
@@ -44,8 +45,9 @@ void LabelWriter::write(const std::string& name, const std::vector<std::uint32_t
   writeBinary(fs::path(folder_) / (name + ".label"), labels);
 }
 
-SequenceWriter::SequenceWriter(const std::string& folder, SequenceLayout layout)
-    : folder_(folder), layout_(layout) {
+SequenceWriter::SequenceWriter(const std::string& folder, SequenceLayout layout,
+                               const Eigen::Isometry3d& T_camera_sensor)
+    : folder_(folder), layout_(layout), T_camera_sensor_(T_camera_sensor) {
   for (const char* name : {layout == SequenceLayout::kDynamicMap ? "pcd" : "velodyne", "labels"}) {
     makeEmptyFolder(fs::path(folder) / name, "give a new folder, or remove the old scans first");
   }
@@ -73,16 +75,10 @@ void SequenceWriter::write(const SequenceFrame& frame) {
   }
   writeBinary(fs::path(folder_) / "labels" / (std::string(name) + ".label"), frame.labels);
 
-  std::ostringstream pose, time;
-  pose.precision(17);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      pose << (row + column ? " " : "") << frame.T_map_sensor.matrix()(row, column);
-    }
-  }
+  std::ostringstream time;
   time.precision(9);
   time << std::fixed << static_cast<double>(frame.stamp - Sequence::kFirstStamp) * 1e-9;
-  poses_ += pose.str() + "\n";
+  poses_ += rowOf(T_camera_sensor_ * frame.T_map_sensor * T_camera_sensor_.inverse()) + "\n";
   times_ += time.str() + "\n";
 }
 
@@ -90,7 +86,7 @@ void SequenceWriter::finish() {
   writeTextFile((fs::path(folder_) / "times.txt").string(), times_);
   if (layout_ == SequenceLayout::kDynamicMap) return;
   writeTextFile((fs::path(folder_) / "poses.txt").string(), poses_);
-  writeTextFile((fs::path(folder_) / "calib.txt").string(), "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+  writeTextFile((fs::path(folder_) / "calib.txt").string(), "Tr: " + rowOf(T_camera_sensor_) + "\n");
 }
 
 }  // namespace bki_mapping

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "bki_mapping/sequence/sequence.h"
 #include "sequence/pose_file.h"
 
 namespace bki_mapping {
@@ -22,6 +21,24 @@ std::vector<Eigen::Vector3d> readPositions(const std::string& path) {
 }
 
 }  // namespace
+
+LidarPoses readLidarPoses(const std::string& path, const std::string& calibration,
+                          std::optional<PosesIn> poses_in) {
+  const PoseFile file = readPoseFile(path, "give a file of poses");
+  if (file.lines.empty()) throw std::runtime_error("the trajectory " + path + " has no pose");
+  LidarPoses lidar;
+  if (poses_in.value_or(file.has_stamps ? PosesIn::kLidar : PosesIn::kCamera) == PosesIn::kCamera)
+    lidar.T_camera_sensor = readCalibration(calibration);
+  for (const PoseLine& line : file.lines) {
+    if (line.blank)
+      throw std::runtime_error(path + " line " + std::to_string(line.number) + " has no pose; write one");
+    for (const std::string& fault : {line.fault, line.rotation_fault}) {
+      if (!fault.empty()) throw std::runtime_error(fault);
+    }
+    lidar.poses.push_back(lidar.T_camera_sensor.inverse() * line.pose * lidar.T_camera_sensor);
+  }
+  return lidar;
+}
 
 Trajectory readTrajectory(const std::string& path) {
   Trajectory trajectory;

@@ -1,9 +1,12 @@
 /// @file Trajectories from files.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "bki_mapping/sequence/sequence.h"
 
 namespace bki_mapping {
 
@@ -18,5 +21,18 @@ struct Trajectory {
 /// @throws std::runtime_error in one sentence: no such file, a line that is not such a pose, no pose at all,
 /// or as Sequence.
 Trajectory readTrajectory(const std::string& path);
+
+/// Poses of the lidar.
+struct LidarPoses {
+  std::vector<Eigen::Isometry3d> poses;  ///< in the frame of the file, as with map_sequence --poses
+  Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();  ///< identity for poses of the lidar
+};
+
+/// Reads the poses of a file in one of the formats of readPoseFile() as those of a sequence are read: by
+/// default, poses with stamps are of the lidar, and others of the camera.
+/// @param calibration file with `Tr`, for poses of the camera. @throws std::runtime_error in one sentence: no
+/// such file, a line that is not such a pose or lacks it, no pose at all.
+LidarPoses readLidarPoses(const std::string& path, const std::string& calibration,
+                          std::optional<PosesIn> poses_in);
 
 }  // namespace bki_mapping

@@ -16,6 +16,8 @@ bool hasOneClass(const ClassTable& table) {
   return table.classes().size() == 1 && table.classes().front().any_raw;
 }
 
+}  // namespace
+
 std::optional<PosesIn> posesIn(const po::variables_map& given) {
   if (!given.count("poses-in")) return std::nullopt;
   const std::string sensor = given["poses-in"].as<std::string>();
@@ -23,8 +25,6 @@ std::optional<PosesIn> posesIn(const po::variables_map& given) {
   if (sensor == "lidar") return PosesIn::kLidar;
   throw std::invalid_argument("--poses-in '" + sensor + "' is unknown; known sensors: camera, lidar");
 }
-
-}  // namespace
 
 po::options_description sequenceOptions() {
   po::options_description options("Sequence");

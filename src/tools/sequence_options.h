@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -13,6 +14,9 @@ namespace bki_mapping::tools {
 /// --sequence, --labels, --poses-in, --first, --scans.
 po::options_description sequenceOptions();
 
+/// The sensor that --poses-in names; nullopt if it is not given. @throws std::invalid_argument if it is
+/// unknown.
+std::optional<PosesIn> posesIn(const po::variables_map& given);
 /// What the options say of a sequence. Scans whose labels are missing have none if that makes no difference,
 /// because the class table of the options has one class for all labels.
 /// @throws std::invalid_argument if --sequence is missing, or an option is wrong.

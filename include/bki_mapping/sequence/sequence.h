@@ -114,11 +114,14 @@ class LabelWriter {
   std::string folder_;
 };
 
-/// Writes frames in the same layouts, with labels and times; Tr is the identity.
+/// Writes frames in the same layouts, with labels and times.
 class SequenceWriter {
  public:
   /// Creates the folders. @throws std::runtime_error if that fails, or if `folder` already holds scans.
-  explicit SequenceWriter(const std::string& folder, SequenceLayout layout = SequenceLayout::kSemanticKitti);
+  /// @param T_camera_sensor of calib.txt; poses.txt has the poses of the camera. By default, it is the
+  /// identity, and they are those of the lidar.
+  explicit SequenceWriter(const std::string& folder, SequenceLayout layout = SequenceLayout::kSemanticKitti,
+                          const Eigen::Isometry3d& T_camera_sensor = Eigen::Isometry3d::Identity());
   /// @throws std::runtime_error if a file cannot be written.
   void write(const SequenceFrame& frame);
   /// Writes times.txt and, in SemanticKITTI's layout, poses.txt and calib.txt.
@@ -127,6 +130,7 @@ class SequenceWriter {
  private:
   std::string folder_, poses_, times_;
   SequenceLayout layout_;
+  Eigen::Isometry3d T_camera_sensor_;
   std::size_t count_ = 0;
 };
 
