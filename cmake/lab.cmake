@@ -3,8 +3,8 @@ if(NOT BKI_MAPPING_LAB AND NOT BKI_MAPPING_DEMO)
   return()
 endif()
 bki_mapping_room(simulation FOLDER lab/simulation SOURCES
-    city.cpp drive_file.cpp furniture.cpp lidar.cpp rooms.cpp scene.cpp street.cpp street_parts.cpp
-    truth_cloud.cpp voxel_truth.cpp
+    city.cpp drive_file.cpp furniture.cpp lidar.cpp oncoming.cpp plots.cpp relief.cpp rooms.cpp scene.cpp
+    shape_index.cpp street.cpp street_along.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp way.cpp
   LINK bki_mapping_sequence bki_mapping_settings)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_join(bki_mapping_simulation)

@@ -6,14 +6,17 @@
 #include <stdexcept>
 
 #include "core/atomic_file.h"
+#include "sequence/pose_file.h"
+#include "sequence/trajectory_file.h"
 #include "settings/yaml_file.h"
 
 namespace bki_mapping::simulation {
 namespace {
 
-std::string pathIn(const std::string& folder) {
-  return (std::filesystem::path(folder) / "simulation.yaml").string();
+std::string pathIn(const std::string& folder, const char* name = "simulation.yaml") {
+  return (std::filesystem::path(folder) / name).string();
 }
+constexpr char kTrajectory[] = "trajectory.txt";
 
 /// Calls visit(name, value) for each setting, in the order of the file.
 template <typename Config, typename Visit>
@@ -36,6 +39,11 @@ void forEachSetting(Config& config, Visit&& visit) {
 }  // namespace
 
 void writeDriveFile(const std::string& folder, const DriveConfig& config) {
+  if (!config.trajectory.empty()) {
+    std::string rows;
+    for (const Eigen::Isometry3d& pose : config.trajectory) rows += rowOf(pose) + "\n";
+    writeTextFile(pathIn(folder, kTrajectory), rows);
+  }
   YAML::Emitter out;
   out.SetDoublePrecision(17);
   out << YAML::BeginMap << YAML::Key << "scene" << YAML::Value << nameOf(config.scene);
@@ -56,6 +64,8 @@ std::optional<DriveConfig> readDriveFile(const std::string& folder) {
       if (name == std::string("height") && !file[name]) return;  // a file of an earlier version
       value = file[name].template as<std::decay_t<decltype(value)>>();
     });
+    if (config.scene == SceneKind::kTrajectory)
+      config.trajectory = readLidarPoses(pathIn(folder, kTrajectory), "", PosesIn::kLidar).poses;
     return config;
   } catch (const std::exception& fault) {
     throw std::runtime_error(path + " cannot be read (" + fault.what() +

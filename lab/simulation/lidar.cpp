@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "core/pi.h"
 #include "parallel/counter_random.h"
 #include "parallel/thread_pool.h"
 #include "simulation/rooms.h"
+#include "simulation/street_along.h"
 
 namespace bki_mapping::simulation {
 namespace {
@@ -21,8 +24,8 @@ struct Return {
 Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const Eigen::Vector3d& origin,
             const Eigen::Vector3d& direction, double time, double max_range) {
   Return nearest{max_range, 0};
-  if (direction.z() < 0.0 && -origin.z() / direction.z() < nearest.range) {
-    nearest.range = -origin.z() / direction.z();
+  if (const auto ground = scene.ground.hit(origin, direction, max_range)) {
+    nearest.range = *ground;
     nearest.label = scene.ground.labelAt(origin.x() + nearest.range * direction.x(),
                                          origin.y() + nearest.range * direction.y());
   }
@@ -33,16 +36,28 @@ Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const E
   return nearest.range < max_range ? nearest : Return{};
 }
 
-/// The shapes that a vertical fan of beams may hit.
+/// Tangent of the angle between two directions, seen from above; infinity from a right angle on.
+double spreadOf(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const double along = a.head<2>().dot(b.head<2>());
+  if (!(along > 0.0)) return std::numeric_limits<double>::infinity();
+  return std::abs(a.x() * b.y() - a.y() * b.x()) / along;
+}
+
+/// The shapes that a fan of beams may hit, which is vertical if the sensor is upright.
+/// @param direction of the middle beam. @param spread tangent of the angle between it and the farthest beam,
+/// seen from above.
 std::vector<const Shape*> shapesInFan(const Scene& scene, const Eigen::Vector3d& origin,
-                                      const Eigen::Vector3d& direction, double time, double max_range) {
+                                      const Eigen::Vector3d& direction, double time, double max_range,
+                                      double spread = 0.0) {
   std::vector<const Shape*> shapes;
   const Eigen::Vector2d forward = direction.head<2>().normalized();
   for (const Shape& shape : scene.shapes) {
     const Eigen::Vector2d to = (shape.centreAt(time) - origin).head<2>();
     const double radius = shape.half.head<2>().norm();
     const double along = to.dot(forward), aside = to.x() * forward.y() - to.y() * forward.x();
-    if (along > -radius && along < max_range + radius && std::abs(aside) < radius) shapes.push_back(&shape);
+    const bool within =
+        along > -radius && along < max_range + radius && std::abs(aside) < radius + spread * (along + radius);
+    if (within || std::isinf(spread)) shapes.push_back(&shape);
   }
   return shapes;
 }
@@ -50,6 +65,25 @@ std::vector<const Shape*> shapesInFan(const Scene& scene, const Eigen::Vector3d&
 /// The label of a shape chosen at random. @param pick uniform on [0, 1).
 std::uint32_t randomLabel(const Scene& scene, double pick) {
   return scene.shapes[static_cast<std::size_t>(pick * static_cast<double>(scene.shapes.size()))].label;
+}
+
+/// Whether there are poses for each scan, of a trajectory along which a street can be laid out.
+void checkTrajectory(const DriveConfig& config) {
+  const std::size_t poses = config.trajectory.size();
+  if (config.scene != SceneKind::kTrajectory) {
+    if (poses > 0) throw std::invalid_argument("the scene " + nameOf(config.scene) + " takes no trajectory");
+    return;
+  }
+  if (poses == 0) throw std::invalid_argument("the scene trajectory needs poses; give --trajectory FILE");
+  if (static_cast<std::size_t>(config.scans) > poses) {
+    throw std::invalid_argument("scans is " + std::to_string(config.scans) +
+                                ", but the trajectory has only " + std::to_string(poses) + " poses");
+  }
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses; ++i)
+    length += (config.trajectory[i].translation() - config.trajectory[i - 1].translation()).norm();
+  if (!(length <= 1e5))
+    throw std::invalid_argument("a trajectory must not be longer than 100 km; give a part of it");
 }
 
 const DriveConfig& checked(const DriveConfig& config) {
@@ -81,6 +115,7 @@ void checkDrive(const DriveConfig& config) {
     throw std::invalid_argument(std::string(l.name) + " is " + numberText(l.value) + ", but must be from " +
                                 numberText(l.least) + " to " + numberText(l.most));
   }
+  checkTrajectory(config);
   if (!(config.speed * config.duration() <= 1e6)) {  // before makeScene allocates a street of this length
     throw std::invalid_argument(
         "a drive must not be longer than 1000 km; lower scans or speed, or raise rate");
@@ -92,6 +127,7 @@ DriveConfig usualDrive(SceneKind scene) {
   drive.scene = scene;
   switch (scene) {
     case SceneKind::kStreet:
+    case SceneKind::kTrajectory:
       break;
     case SceneKind::kTraffic:
       drive.speed = 3.0;
@@ -145,7 +181,9 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
     const auto world = [&](std::size_t beam) -> Eigen::Vector3d {
       return T_world_sensor.linear() * directionOf(column, beam);
     };
-    const auto shapes = shapesInFan(scene, origin, world(beams / 2), time, lidar.max_range);
+    const Eigen::Vector3d middle = world(beams / 2);
+    const double spread = std::max(spreadOf(middle, world(0)), spreadOf(middle, world(beams - 1)));
+    const auto shapes = shapesInFan(scene, origin, middle, time, lidar.max_range, spread);
     for (std::size_t beam = 0; beam < beams; ++beam) {
       returns[column * beams + beam] = cast(scene, shapes, origin, world(beam), time, lidar.max_range);
     }
@@ -166,11 +204,16 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
 
 Drive::Drive(const DriveConfig& config)
     : config_(checked(config)),
-      scene_(makeScene(config.scene, config.speed * config.duration() + 110.0, config.duration(),
-                       config.speed, config.seed)) {}
+      scene_(config.scene == SceneKind::kTrajectory
+                 ? makeStreetAlong(config)
+                 : makeScene(config.scene, config.speed * config.duration() + 110.0, config.duration(),
+                             config.speed, config.seed)) {
+  if (config.scene == SceneKind::kTrajectory) index_.emplace(scene_.shapes);
+}
 
 Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
   if (config_.scene == SceneKind::kRooms) return poseInRooms(config_.speed * timeOf(i), config_.height);
+  if (config_.scene == SceneKind::kTrajectory) return config_.trajectory[i];
   // In the right lane, weaving slightly.
   const double x = config_.speed * timeOf(i), wave = 0.06;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -181,7 +224,13 @@ Eigen::Isometry3d Drive::T_world_sensor(std::size_t i) const {
 }
 
 SequenceFrame Drive::frame(std::size_t i) const {
-  SequenceFrame frame = scan(scene_, config_.lidar, T_world_sensor(i), timeOf(i), i);
+  Scene near;  // of a street along a trajectory
+  if (index_) {
+    const Eigen::Vector2d at = T_world_sensor(i).translation().head<2>();
+    near = {scene_.ground, shapesNear(scene_.shapes, *index_, at, config_.lidar.max_range, timeOf(i))};
+  }
+  SequenceFrame frame =
+      scan(index_ ? std::as_const(near) : scene_, config_.lidar, T_world_sensor(i), timeOf(i), i);
   frame.T_map_sensor = T_world_sensor(0).inverse() * T_world_sensor(i);
   frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(timeOf(i) * 1e9));
   return frame;

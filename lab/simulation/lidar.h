@@ -3,6 +3,7 @@
 
 #include "bki_mapping/sequence/sequence.h"
 #include "simulation/scene.h"
+#include "simulation/shape_index.h"
 
 namespace bki_mapping::simulation {
 
@@ -37,6 +38,9 @@ struct DriveConfig {
   LidarConfig lidar;
   SceneKind scene = SceneKind::kStreet;
   double height = 1.73;  ///< of the sensor above the ground, as in KITTI [m]
+  /// Poses of the sensor in the world frame, whose z axis points up, for SceneKind::kTrajectory; at least
+  /// `scans`.
+  std::vector<Eigen::Isometry3d> trajectory = {};
 
   double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };
@@ -49,7 +53,7 @@ DriveConfig usualDrive(SceneKind scene);
 /// @throws std::invalid_argument if a setting is out of its limits.
 void checkDrive(const DriveConfig& config);
 
-/// A drive along the street of makeScene, or round and round through its rooms.
+/// A drive along the street of makeScene, round and round through its rooms, or along a trajectory.
 class Drive {
  public:
   /// @throws std::invalid_argument if a setting is out of its limits.
@@ -65,6 +69,7 @@ class Drive {
  private:
   DriveConfig config_;
   Scene scene_;
+  std::optional<ShapeIndex> index_;  ///< of a street along a trajectory, of which each scan sees little
 };
 
 }  // namespace bki_mapping::simulation

@@ -62,7 +62,15 @@ Shape::Placement Shape::placeAt(double time) const {
   return {at, yaw + turned};
 }
 
+Shape Shape::standingAt(double time) const {
+  const Placement place = placeAt(time);
+  Shape standing{type, place.centre, half, place.yaw};
+  standing.label = label;
+  return standing;
+}
+
 bool Shape::contains(const Eigen::Vector3d& point, double time) const {
+  if (!isThereAt(time)) return false;
   const Placement place = placeAt(time);
   const Eigen::Array3d r = intoAxes(point - place.centre, place.yaw).cwiseQuotient(half).array();
   switch (type) {
@@ -78,6 +86,7 @@ bool Shape::contains(const Eigen::Vector3d& point, double time) const {
 
 std::optional<double> Shape::hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                  double time) const {
+  if (!isThereAt(time)) return std::nullopt;
   // In coordinates where the shape has half extents 1.
   const Placement place = placeAt(time);
   const Eigen::Vector3d o = intoAxes(origin - place.centre, place.yaw).cwiseQuotient(half);
@@ -104,8 +113,16 @@ std::uint32_t Ground::labelAt(double x, double y) const {
   const auto toAxis = [&](double c) {
     return std::abs(c - street_distance * std::clamp(std::round(c / street_distance), 0.0, streets - 1.0));
   };
-  const double distance = streets == 0 ? std::abs(y) : std::min(toAxis(x), toAxis(y));
+  const double distance =
+      relief ? relief->fromAxis(x, y) : (streets == 0 ? std::abs(y) : std::min(toAxis(x), toAxis(y)));
   return distance < road_half_width ? road : (distance < sidewalk_half_width ? sidewalk : terrain);
+}
+
+std::optional<double> Ground::hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                  double max_range) const {
+  if (relief) return relief->hit(origin, direction, max_range);
+  if (!(direction.z() < 0.0 && -origin.z() / direction.z() < max_range)) return std::nullopt;
+  return -origin.z() / direction.z();
 }
 
 std::optional<std::uint32_t> Scene::shapeLabelAt(const Eigen::Vector3d& point, double time) const {
@@ -117,7 +134,7 @@ std::optional<std::uint32_t> Scene::shapeLabelAt(const Eigen::Vector3d& point, d
 
 std::optional<std::uint32_t> Scene::labelAt(const Eigen::Vector3d& point, double time) const {
   const auto of_shape = shapeLabelAt(point, time);
-  if (of_shape || point.z() > 0.0) return of_shape;
+  if (of_shape || point.z() > ground.heightAt(point.x(), point.y())) return of_shape;
   return ground.labelAt(point.x(), point.y());
 }
 

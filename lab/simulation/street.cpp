@@ -95,13 +95,13 @@ void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>&
     addGate(x, 8.5, Motion::sliding(2.3, dice.between(2.0, 6.0), dice.between(2.0, 6.0), duration), shapes);
 }
 
-constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals", "rooms"};
+constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals", "rooms", "trajectory"};
 
 }  // namespace
 
 SceneKind sceneKindNamed(const std::string& name) {
   for (const SceneKind kind : {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd,
-                               SceneKind::kArrivals, SceneKind::kRooms}) {
+                               SceneKind::kArrivals, SceneKind::kRooms, SceneKind::kTrajectory}) {
     if (nameOf(kind) == name) return kind;
   }
   throw std::invalid_argument("there is no scene " + name +
@@ -146,6 +146,7 @@ Scene makeScene(SceneKind kind, double length, double duration, double speed, st
       addVisitors(length, duration, dice, shapes);
       break;
     case SceneKind::kRooms:
+    case SceneKind::kTrajectory:
       break;
   }
   return scene;

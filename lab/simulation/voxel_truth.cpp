@@ -7,7 +7,7 @@
 namespace bki_mapping::simulation {
 
 VoxelTruth::VoxelTruth(Scene scene, const Eigen::Isometry3d& T_world_map, const GridGeometry& geometry)
-    : scene_(std::move(scene)), geometry_(geometry), T_world_map_(T_world_map) {}
+    : scene_(std::move(scene)), index_(scene_.shapes), geometry_(geometry), T_world_map_(T_world_map) {}
 
 template <typename Visit>
 bool VoxelTruth::anyPoint(const VoxelIndex& voxel, Visit&& visit) const {
@@ -24,7 +24,9 @@ std::vector<Shape> VoxelTruth::shapesAt(const VoxelIndex& voxel, double time, do
   const Eigen::Vector3d centre = T_world_map_ * geometry_.voxelCentre(voxel);
   const double reach = 0.87 * geometry_.resolution();  // half the diagonal of a voxel
   std::vector<Shape> shapes;
-  for (const Shape& shape : scene_.shapes) {
+  for (const std::uint32_t number : index_.near(centre.head<2>(), reach + std::max(0.0, 1.5 * margin))) {
+    const Shape& shape = scene_.shapes[number];
+    if (!shape.isThereAt(time)) continue;
     Shape grown = shape;
     grown.half.array() += margin;
     const double radius = grown.half.norm() + reach;
@@ -42,7 +44,7 @@ VoxelContent VoxelTruth::contentAt(const VoxelIndex& voxel, double time) const {
     const auto label = near.labelAt(point, time);
     if (label) ++votes[*label];
     const bool in_shape = near.shapeLabelAt(point, time).has_value();
-    inside += in_shape ? 1.0 : std::clamp(0.5 - point.z() / height, 0.0, 1.0);
+    inside += in_shape ? 1.0 : std::clamp(0.5 - heightOver(point) / height, 0.0, 1.0);
     return false;
   });
   VoxelContent content;
@@ -64,7 +66,7 @@ bool VoxelTruth::isNear(const VoxelIndex& voxel, double time, double margin,
 }
 
 bool VoxelTruth::isNearAnything(const VoxelIndex& voxel, double time, double margin) const {
-  return anyPoint(voxel, [&](const Eigen::Vector3d& point) { return point.z() <= margin; }) ||
+  return anyPoint(voxel, [&](const Eigen::Vector3d& point) { return heightOver(point) <= margin; }) ||
          isNear(voxel, time, margin, [](std::uint32_t) { return true; });
 }
 

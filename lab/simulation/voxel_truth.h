@@ -6,6 +6,7 @@
 
 #include "bki_mapping/core/grid_geometry.h"
 #include "simulation/lidar.h"
+#include "simulation/shape_index.h"
 
 namespace bki_mapping::simulation {
 
@@ -50,7 +51,13 @@ class VoxelTruth {
   /// Shapes near enough to reach the voxel, grown by `margin`.
   std::vector<Shape> shapesAt(const VoxelIndex& voxel, double time, double margin) const;
 
+  /// Height of a point in the world frame over the ground [m].
+  double heightOver(const Eigen::Vector3d& point) const {
+    return point.z() - scene_.ground.heightAt(point.x(), point.y());
+  }
+
   Scene scene_;
+  ShapeIndex index_;
   GridGeometry geometry_;
   Eigen::Isometry3d T_world_map_;
 };

@@ -3,9 +3,11 @@
 
 #include <filesystem>
 
+#include "sequence/trajectory_file.h"
 #include "simulation/drive_file.h"
 #include "simulation/truth_cloud.h"
 #include "tools/options.h"
+#include "tools/sequence_options.h"
 
 namespace {
 
@@ -20,7 +22,16 @@ po::options_description options() {
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
       "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop or "
       "sit down, trolleys, gates; rooms: furnished rooms along a corridor, people, doors")(
-      "scans", tools::optionWith("N", 100), "number of scans")(
+      "trajectory", tools::textOption("FILE"),
+      "poses of the sensor, one for each scan, along which a street is laid out; --scene and --speed do not "
+      "apply")(
+      "calib", tools::textOption("FILE"),
+      "file whose line Tr: leads from the lidar to the camera, for a trajectory of the camera; default: "
+      "calib.txt beside the trajectory")("poses-in", po::value<std::string>()->value_name("camera|lidar"),
+                                         "which sensor the trajectory is of; default: the camera, as in "
+                                         "KITTI, and the lidar if poses have stamps")(
+      "scans", po::value<int>()->value_name("N"),
+      "number of scans; default: 100, or all poses of the trajectory")(
       "lidar", tools::textOption("NAME"),
       "rows of the lidar: hdl64, hdl32 or vlp16; default: hdl64, in rooms vlp16")(
       "beams", po::value<int>()->value_name("N"), "number of rows, spread over the same angles")(
@@ -41,10 +52,27 @@ po::options_description options() {
   return options;
 }
 
-simulation::DriveConfig driveConfig(const po::variables_map& given) {
-  simulation::DriveConfig drive =
-      simulation::usualDrive(simulation::sceneKindNamed(given["scene"].as<std::string>()));
-  drive.scans = given["scans"].as<int>();
+/// The poses of --trajectory. @throws std::invalid_argument if other options contradict it.
+LidarPoses lidarPoses(const po::variables_map& given) {
+  for (const char* name : {"scene", "speed"}) {
+    if (!given.count(name) || given[name].defaulted()) continue;
+    throw std::invalid_argument("--" + std::string(name) + " cannot be given with --trajectory, which says " +
+                                "where the sensor is at each scan; leave it out");
+  }
+  const std::string path = given["trajectory"].as<std::string>();
+  const std::string beside = (std::filesystem::path(path).parent_path() / "calib.txt").string();
+  return readLidarPoses(path, given.count("calib") ? given["calib"].as<std::string>() : beside,
+                        tools::posesIn(given));
+}
+
+simulation::DriveConfig driveConfig(const po::variables_map& given, const LidarPoses& trajectory) {
+  using simulation::SceneKind;
+  simulation::DriveConfig drive = simulation::usualDrive(
+      given.count("trajectory") ? SceneKind::kTrajectory
+                                : simulation::sceneKindNamed(given["scene"].as<std::string>()));
+  drive.trajectory = trajectory.poses;
+  if (!drive.trajectory.empty()) drive.scans = static_cast<int>(drive.trajectory.size());
+  if (given.count("scans")) drive.scans = given["scans"].as<int>();
   if (given.count("speed")) drive.speed = given["speed"].as<double>();
   if (given.count("height")) drive.height = given["height"].as<double>();
   drive.seed = tools::count(given, "seed");
@@ -66,15 +94,24 @@ SequenceLayout layoutNamed(const std::string& name) {
 }
 
 int simulate(const po::variables_map& given) {
-  const simulation::DriveConfig config = driveConfig(given);
+  LidarPoses trajectory;
+  if (given.count("trajectory")) {
+    trajectory = lidarPoses(given);
+  } else if (given.count("calib") || given.count("poses-in")) {
+    throw std::invalid_argument("--calib and --poses-in are for --trajectory; give one, or leave them out");
+  }
+  const simulation::DriveConfig config = driveConfig(given, trajectory);
   const simulation::Drive drive(config);
   const std::string folder = given["output"].as<std::string>();
   const SequenceLayout layout = layoutNamed(given["layout"].as<std::string>());
-  SequenceWriter writer(folder, layout);
+  SequenceWriter writer(folder, layout, trajectory.T_camera_sensor);
   TruthCloud truth;
   std::size_t points = 0;
   for (std::size_t i = 0; i < drive.size(); ++i) {
-    const SequenceFrame frame = drive.frame(i);
+    SequenceFrame frame = drive.frame(i);
+    // In the frame of the trajectory, so that other poses in this frame fit the scans.
+    if (!config.trajectory.empty() && layout == SequenceLayout::kSemanticKitti)
+      frame.T_map_sensor = drive.T_world_sensor(i);
     writer.write(frame);
     if (layout == SequenceLayout::kDynamicMap) truth.add(frame.scan());
     points += frame.points.size();

@@ -123,6 +123,55 @@ class Sequences(unittest.TestCase):
         self.fails('places.txt line 1 has no rotation', 'map_sequence', '--sequence', self.drive, '--poses',
                    os.path.join(self.drive, 'places.txt'))
 
+    def test_a_drive_along_a_trajectory(self):
+        first = [[[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3]]]  # not the identity: the frame is that of the file
+        self.poses = first + [[[1, 0, 0, 1 + 1.2 * n], [0, 0.8, -0.6, 2], [0, 0.6, 0.8, 3 + 0.1 * n]] for n in range(1, 5)]
+        of_camera = self.write('camera.txt', *(text_of(product(product(TR, pose), inverse(TR))) for pose in self.poses))
+        calib = self.write('of_camera.txt', 'Tr: ' + text_of(TR))
+        of_lidar = self.write('lidar.txt', *(text_of(pose) for pose in self.poses))
+        along = ('simulate_drive', '--beams', '16', '--columns', '200', '--output')
+        folders = [self.path(name) for name in ('by_camera', 'by_lidar')]
+        self.succeeds(*along, folders[0], '--trajectory', of_camera, '--calib', calib)
+        self.succeeds(*along, folders[1], '--trajectory', of_lidar, '--poses-in', 'lidar')
+        for folder, trajectory in zip(folders, (of_camera, of_lidar)):
+            self.assertEqual(len(os.listdir(os.path.join(folder, 'velodyne'))), len(self.poses))
+            with open(os.path.join(folder, 'poses.txt')) as written, open(trajectory) as given:
+                for line, other in zip(written.read().splitlines(), given.read().splitlines(), strict=True):
+                    for number, expected in zip(line.split(), other.split(), strict=True):
+                        self.assertAlmostEqual(float(number), float(expected), places=9)
+        scans = []
+        for folder in folders:
+            with open(os.path.join(folder, 'labels', '000003.label'), 'rb') as file:
+                scans.append(file.read())
+        self.assertGreater(len(scans[0]), 4 * 1000)
+        self.drive = folders[0]
+        self.assertEqual(self.mapped('--poses', of_camera), self.mapped('--poses', os.path.join(folders[0], 'poses.txt')))
+        by_truth, said = self.mapped('--poses', of_camera)
+        self.assertEqual(said, '')
+        drifted = [[row[:3] + [row[3] + 0.2 * n] for row in pose] for n, pose in enumerate(self.poses)]
+        odometry = self.write('odometry.txt', *(text_of(product(product(TR, pose), inverse(TR))) for pose in drifted))
+        self.assertNotEqual(self.mapped('--poses', odometry)[0], by_truth)
+        figures = self.path('figures.json')
+        self.succeeds('evaluate_map', '--sequence', folders[0], '--json', figures)
+        with open(figures) as file:
+            truth = json.load(file)['truth']
+        self.assertGreater(truth['free_precision'], 0.5, 'the truth is in the frame of the map')
+        self.assertGreater(truth['occupied_recall'], 0.5)
+
+        never = self.path('never')
+        self.fails('scans is 6, but the trajectory has only 5 poses', *along, never, '--trajectory', of_lidar, '--poses-in', 'lidar',
+                   '--scans', '6')
+        self.fails('calib.txt cannot be read; poses of the camera need calib.txt', *along, never, '--trajectory',
+                   shutil.copy(of_camera, self.folder))
+        for option, value in (('--speed', '3'), ('--scene', 'crowd')):
+            self.fails(option + ' cannot be given with --trajectory', *along, never, '--trajectory', of_lidar, option, value)
+        self.fails('are for --trajectory', *along, never, '--poses-in', 'lidar')
+        self.fails('needs poses; give --trajectory FILE', *along, never, '--scene', 'trajectory')
+        self.fails('missing.txt cannot be read', *along, never, '--trajectory', self.path('missing.txt'))
+        self.fails('has no pose', *along, never, '--trajectory', self.write('empty.txt'))
+        self.fails('line 1 has no pose', *along, never, '--poses-in', 'lidar', '--trajectory', self.write('gap.txt', '', text_of(first[0])))
+        self.assertFalse(os.path.exists(never))
+
     def test_poses_of_the_other_sensor_are_noticed(self):
         self.write('calib.txt', 'Tr: ' + text_of(TR))
         of_camera = [text_of(product(product(TR, pose), inverse(TR))) for pose in self.poses]
