@@ -50,7 +50,7 @@ function(bki_mapping_core_room room)
 endfunction()
 
 bki_mapping_core_room(core SOURCES atomic_file.cpp class_filter.cpp class_table.cpp named_parameter.cpp unlisted_labels.cpp LINK Eigen3::Eigen)
-bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
+bki_mapping_core_room(parallel SOURCES thread_pool.cpp thread_priority.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES clear_box.cpp looks.cpp semantic_map.cpp LINK bki_mapping_parallel)
 bki_mapping_core_room(rules SOURCES
@@ -76,12 +76,19 @@ bki_mapping_core_room(mapping SOURCES
     former_parameters.cpp parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp sensor_height.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
 
+bki_mapping_core_room(journal SOURCES
+    corrected_path.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp sensor_scan.cpp
+  LINK bki_mapping_mapping)
+
 bki_mapping_kernels(rules limit_kernels)
 bki_mapping_kernels(rules view_kernels)
 bki_mapping_kernels(update sum_kernels)
 bki_mapping_kernels(query distance_kernels)
 bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
 bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
+
+find_package(ZLIB REQUIRED)
+target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
 
 # Class tables and parameters from YAML.
 find_package(yaml-cpp REQUIRED)
@@ -99,7 +106,6 @@ bki_mapping_precompile(bki_mapping_settings
 file(STRINGS package.xml version_line REGEX "<version>")
 string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${version_line}")
 find_package(SQLite3 REQUIRED)
-find_package(ZLIB REQUIRED)
 bki_mapping_room(store SOURCES
     database.cpp drive_cover.cpp drive_overlap.cpp grid_transform.cpp map_clear.cpp map_file.cpp map_file_state.cpp map_info.cpp map_keeper.cpp
     map_merge.cpp mapper_file.cpp migration.cpp new_map_file.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp

@@ -1,5 +1,7 @@
 #include "bki_mapping/map/looks.h"
 
+#include "bki_mapping/map/semantic_map.h"
+
 namespace bki_mapping {
 
 void Looks::insert(const Look& look) {
@@ -87,6 +89,23 @@ void Looks::dropEmpty() {
     const auto latest = looks_.end() - 1;
     looks_.erase(std::remove_if(looks_.begin(), latest, saw_nothing), latest);
   }
+}
+
+std::vector<GridIndex> replaceLooks(SemanticMap& map, const GridIndex& region, const LooksByBlock& looks) {
+  static const Looks kNone;
+  std::vector<BlockIndex> blocks;  // listed first: writing may copy the region
+  if (const Region* const known = map.findRegion(region)) {
+    known->forEachIndex([&](const BlockIndex& index) { blocks.push_back(index); });
+  }
+  std::vector<GridIndex> changed;
+  for (const BlockIndex& index : blocks) {
+    const auto found = looks.find(index);
+    const Looks& now = found == looks.end() ? kNone : found->second;
+    if (map.find(index)->looks() == now) continue;
+    map.getOrAllocate(index).looks() = now;
+    changed.push_back(index);
+  }
+  return changed;
 }
 
 }  // namespace bki_mapping

@@ -60,15 +60,13 @@ class RangeLimits {
  public:
   /// @param none_at_max whether points at max_range mean that their beam had no return.
   RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
-      : sensor_(sensor), reach_(sensor.reach()), none_at_max_(sensor.knowsRange() && none_at_max) {}
+      : sensor_(sensor), reach_(sensor.reach()), none_at_max_(none_at_max) {}
 
   /// Whether a point at this range can be a hit; false for NaN and infinity.
   bool contains(float range) const {
     return range >= kSensorRadius && range >= sensor_.min_range && range <= reach_ && !isAtMax(range);
   }
-  bool isAtMax(float range) const {
-    return none_at_max_ && std::abs(range - sensor_.max_range) <= kAtMaxRange * sensor_.max_range;
-  }
+  bool isAtMax(float range) const { return none_at_max_ && isAtMaxRange(sensor_, range); }
   /// Counts a point that cannot be a hit under its reason. @return whether its beam is free up to max_range.
   bool countOutside(const Eigen::Vector3f& point, float range, PointCounts& counts) const {
     if (!point.allFinite()) {
@@ -93,10 +91,8 @@ class RangeLimits {
   bool none_at_max_;
 };
 
-/// Whether the shares of a point are probabilities; other values could make evidence infinite.
 bool areShares(const ClassShare* begin, const ClassShare* end) {
-  constexpr float kMost = 1.001f;  // allows for rounding
-  return std::all_of(begin, end, [=](const ClassShare& s) { return s.share > 0.0f && s.share <= kMost; });
+  return std::all_of(begin, end, [](const ClassShare& s) { return isProbability(s.share); });
 }
 
 }  // namespace

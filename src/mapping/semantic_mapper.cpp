@@ -210,6 +210,26 @@ SemanticMap SemanticMapper::takeRegion(const GridIndex& region) {
   return taken;
 }
 
+SemanticMap SemanticMapper::takeMap() {
+  SemanticMap taken = std::exchange(map_, SemanticMap(map_.geometry(), map_.prior(), map_.classCount()));
+  block_bytes_ = 0;
+  return taken;
+}
+
+std::vector<GridIndex> SemanticMapper::replaceLooks(const GridIndex& region, const LooksByBlock& looks) {
+  const auto bytesThere = [&] {
+    std::size_t bytes = 0;
+    if (const Region* const blocks = map_.findRegion(region)) {
+      blocks->forEachIndex([&](const BlockIndex& b) { bytes += blocks->find(Region::numberOf(b))->bytes(); });
+    }
+    return bytes;
+  };
+  const std::size_t before = bytesThere();
+  std::vector<GridIndex> changed = bki_mapping::replaceLooks(map_, region, looks);
+  block_bytes_ += bytesThere() - before;
+  return changed;
+}
+
 std::vector<GridIndex> SemanticMapper::clearBox(const Eigen::AlignedBox3d& box) {
   std::vector<GridIndex> changed = bki_mapping::clearBox(map_, box);
   countBlockBytes();

@@ -1,12 +1,9 @@
 #include "ros/publisher_set.h"
 
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "parallel/thread_priority.h"
 #include "rules/neighbourhood.h"
 
 namespace bki_mapping::ros_interface {
@@ -19,13 +16,6 @@ constexpr double kIdleWait = 0.1;
 struct Wake : ros::CallbackInterface {
   CallResult call() override { return Success; }
 };
-
-/// Gives other threads of the process priority: publishing may wait, a scan may not. (On Linux, niceness is a
-/// property of the thread, although POSIX speaks of the process.)
-void yieldToOthers() {
-  constexpr int kNiceness = 19;  // the most
-  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);
-}
 
 }  // namespace
 
@@ -83,7 +73,7 @@ void PublisherSet::startOver() {
 }
 
 void PublisherSet::work() {
-  yieldToOthers();
+  yieldToOtherThreads();
   while (running_) {
     queue_.callAvailable(ros::WallDuration(kIdleWait));
     publishDue();

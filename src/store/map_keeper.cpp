@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <new>
 #include <set>
@@ -184,6 +185,43 @@ struct MapKeeper::State {
     }
   }
 
+  /// Adds what change() was given, as far as there is memory.
+  void addDifferences() {
+    for (; !differences.empty(); differences.pop_front()) {
+      auto& [tile, part] = differences.front();
+      if (here.count(tile) == 0 && stored.count(tile) > 0) {
+        store->add(tile, std::move(part));
+        continue;
+      }
+      try {
+        addToMap(std::move(part));
+      } catch (const std::bad_alloc&) {
+        return;  // tries again when there is memory
+      }
+      must_sweep |= here.count(tile) == 0;
+      noteChange(tile);
+    }
+  }
+
+  /// Changes those of some tiles whose evidence is, or is partly, in the file.
+  /// @param change as in TileStore::changeTiles.
+  void changeStored(const std::vector<GridIndex>& tiles, std::function<void(SemanticMap&)> change) {
+    std::vector<GridIndex> in_file;
+    for (const GridIndex& tile : tiles) {
+      if (stored.count(tile) == 0) continue;
+      const auto known = here.find(tile);
+      const bool stays =
+          known != here.end() && (known->second.here == Here::kWhole || known->second.here == Here::kDamaged);
+      if (!stays) in_file.push_back(tile);
+    }
+    if (in_file.empty()) return;
+    store->changeTiles(in_file, std::move(change));
+    for (const GridIndex& tile : in_file) {  // requests from before the change are out of date
+      const auto known = here.find(tile);
+      if (known != here.end() && known->second.here == Here::kLoading) load(tile);
+    }
+  }
+
   double memoryLimit() const { return 1e6 * mapper.config().memory_limit; }  ///< [bytes]
 
   /// Hands over the farthest tiles until the map takes less memory than a limit [bytes], and shrinks the
@@ -229,7 +267,8 @@ struct MapKeeper::State {
   Eigen::Vector3d swept_at{0.0, 0.0, 0.0};  ///< centre of the window at the last sweep
   bool must_sweep = true;                   ///< sweep even if the window has not moved
   TileStore::Call reset_call = 0;           ///< the last reset; answers to earlier calls are ignored
-  std::vector<GridIndex> moved;             ///< blocks that were added or removed, for the next moveTo()
+  std::deque<std::pair<GridIndex, SemanticMap>> differences;  ///< of tiles, which are still to be added
+  std::vector<GridIndex> moved;  ///< blocks that were added or removed, for the next moveTo()
   bool closed = false;
 };
 
@@ -257,6 +296,7 @@ std::vector<GridIndex> MapKeeper::moveTo(const Window& window) {
   s.must_sweep |= s.eviction.setWindow(window.edge);
   s.window = window;
   s.takeArrivals(false);
+  s.addDifferences();
   const double moved = (window.centre - s.swept_at).cwiseAbs().maxCoeff();
   s.must_sweep |= s.eviction.isDue(moved);
   s.keepWithinMemory();
@@ -307,10 +347,20 @@ void MapKeeper::reset(const DriveRecord& drive) {
   s.stored.clear();
   s.damaged.clear();
   s.moved.clear();
+  s.differences.clear();
   s.mapper.reset();
   s.drive = drive;
   s.drives.clear();
   s.eviction.reset();
+}
+
+void MapKeeper::change(SemanticMap difference) {
+  State& s = *state_;
+  s.mapper.map().checkAddable(difference);
+  for (const GridIndex& tile : difference.regions()) {
+    s.differences.emplace_back(tile, difference.takeRegion(tile));
+  }
+  s.addDifferences();
 }
 
 void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives, bool allow_overlap) {
@@ -340,20 +390,27 @@ std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
   s.takeArrivals(true);
   std::vector<GridIndex> changed = s.mapper.clearBox(box);
   for (const GridIndex& block : changed) s.noteChange(SemanticMap::regionOf({block}));
-  std::vector<GridIndex> in_file;
+  std::vector<GridIndex> in_box;
   for (const GridIndex& tile : s.stored) {
     const Eigen::Vector3d low = s.edge * Eigen::Vector3d(tile.x, tile.y, tile.z);
-    const auto known = s.here.find(tile);
-    const bool stays =
-        known != s.here.end() && (known->second.here == Here::kWhole || known->second.here == Here::kDamaged);
-    if (!stays && box.intersects({low, low + Eigen::Vector3d::Constant(s.edge)})) in_file.push_back(tile);
+    if (box.intersects({low, low + Eigen::Vector3d::Constant(s.edge)})) in_box.push_back(tile);
   }
-  s.store->changeTiles(in_file, [box](SemanticMap& map) { bki_mapping::clearBox(map, box); });
-  for (const GridIndex& tile : in_file) {  // requests from before the clearing are out of date
-    const auto known = s.here.find(tile);
-    if (known != s.here.end() && known->second.here == Here::kLoading) s.load(tile);
-  }
+  s.changeStored(in_box, [box](SemanticMap& map) { bki_mapping::clearBox(map, box); });
   return changed;
+}
+
+std::vector<GridIndex> MapKeeper::replaceLooks(const GridIndex& tile, const LooksByBlock& looks) {
+  State& s = *state_;
+  s.takeArrivals(true);
+  std::vector<GridIndex> changed = s.mapper.replaceLooks(tile, looks);
+  if (!changed.empty()) s.noteChange(tile);
+  s.changeStored(std::vector<GridIndex>{tile},
+                 [tile, looks](SemanticMap& map) { bki_mapping::replaceLooks(map, tile, looks); });
+  return changed;
+}
+
+std::vector<GridIndex> MapKeeper::storedTiles() const {
+  return {state_->stored.begin(), state_->stored.end()};
 }
 
 std::string MapKeeper::fault() const {

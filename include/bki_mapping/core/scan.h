@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -32,12 +33,21 @@ struct SensorModelConfig {
 
 /// Relative tolerance for treating a point as being at max_range (1 cm at 100 m); covers drivers' rounding.
 constexpr double kAtMaxRange = 1e-4;
+/// Whether a range [m] is max_range (within kAtMaxRange); false if max_range is not known.
+inline bool isAtMaxRange(const SensorModelConfig& sensor, double range) {
+  return sensor.knowsRange() && std::abs(range - sensor.max_range) <= kAtMaxRange * sensor.max_range;
+}
 
 /// The probability of one class for a point.
 struct ClassShare {
   ClassId id;
   float share;  ///< probability, > 0
 };
+
+/// Whether a share is a probability > 0, within rounding; other values could make evidence infinite.
+inline bool isProbability(float share) {
+  return share > 0.0f && share <= 1.001f;
+}
 
 /// The shares of the classes for each point of a scan. Those of a point sum to 1, or it has none.
 class SoftLabels {

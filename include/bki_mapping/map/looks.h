@@ -6,6 +6,7 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "bki_mapping/core/types.h"
@@ -133,5 +134,8 @@ class Looks {
 
   std::vector<Look> looks_;
 };
+
+/// The looks at some blocks, by their index.
+using LooksByBlock = std::unordered_map<GridIndex, Looks, GridIndexHash>;
 
 }  // namespace bki_mapping

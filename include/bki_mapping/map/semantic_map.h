@@ -227,4 +227,8 @@ std::vector<std::pair<BlockIndex, const Block*>> sortedBlocks(const SemanticMap&
 /// @throws std::bad_alloc; part of the box may then be cleared.
 std::vector<GridIndex> clearBox(SemanticMap& map, const Eigen::AlignedBox3d& box);
 
+/// Replaces the looks of all blocks that a map has in a region. @param looks of these blocks; the others have
+/// none. @return the blocks that changed. @throws std::bad_alloc; part may then be replaced.
+std::vector<GridIndex> replaceLooks(SemanticMap& map, const GridIndex& region, const LooksByBlock& looks);
+
 }  // namespace bki_mapping

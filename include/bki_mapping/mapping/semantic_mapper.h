@@ -48,6 +48,13 @@ class SemanticMapper {
   /// Moves a region of the map to a map of its own (SemanticMap::takeRegion).
   SemanticMap takeRegion(const GridIndex& region);
 
+  /// Moves the whole map out; this one is empty afterwards.
+  SemanticMap takeMap();
+
+  /// Replaces what scans saw of the blocks of a region (bki_mapping::replaceLooks). @return the blocks that
+  /// changed.
+  std::vector<GridIndex> replaceLooks(const GridIndex& region, const LooksByBlock& looks);
+
   /// Clears a box of the map (bki_mapping::clearBox). @return the blocks that changed.
   std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
 

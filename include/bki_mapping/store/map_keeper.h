@@ -73,6 +73,17 @@ class MapKeeper {
   /// @return the blocks in memory that changed.
   std::vector<GridIndex> clearBox(const Eigen::AlignedBox3d& box);
 
+  /// Adds the difference that a move of scans makes, which may hold negative evidence: in memory, or in the
+  /// file where it has tiles that are not in memory. What there is no memory for is added later.
+  /// @throws std::invalid_argument as SemanticMap::add.
+  void change(SemanticMap difference);
+  /// Replaces the looks of a tile, in memory and in the file (bki_mapping::replaceLooks).
+  /// @return the blocks in memory that changed.
+  std::vector<GridIndex> replaceLooks(const GridIndex& tile, const LooksByBlock& looks);
+
+  /// The tiles in the file, once all changes are written, sorted.
+  std::vector<GridIndex> storedTiles() const;
+
   /// What is wrong with the file at the moment, in one sentence; "" if nothing is.
   std::string fault() const;
   /// Memory of the tiles that have left the map and are not yet in the file [bytes].

@@ -1,0 +1,467 @@
+#include "journal/map_corrector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "core/stopwatch.h"
+#include "journal/scan_codec.h"
+#include "parallel/thread_priority.h"
+
+namespace bki_mapping {
+namespace {
+
+/// Scans that are packed, or looked through, at once.
+constexpr std::size_t kScansAtOnce = 4;
+/// Scans that are moved at once. More share the work of changing blocks, but hold up the mapper for longer
+/// when their difference is added.
+constexpr std::size_t kMovesAtOnce = 2;
+/// Scans of equal priority [m]: of those within this distance of each other, the newest are moved first.
+constexpr double kEquallyNear = 20.0;
+/// Regions whose looks are made at once: few, so that they need little memory.
+constexpr std::size_t kRegionsAtOnce = 256;
+/// Scans that may wait for being packed: a raw one takes ten times the memory.
+constexpr std::size_t kMostUnpacked = 20;
+/// Rounds after which the mapper's thread looks through the last scans itself, because more keep coming.
+constexpr int kPatience = 5;
+/// Time for replacing looks, before scans come first [ms].
+constexpr double kLooksMs = 3.0;
+/// Errors below are rounding [m].
+constexpr double kNoError = 1e-9;
+
+/// Whether any region is one of those of the looks.
+bool anyIn(const LooksByRegion& looks, const std::vector<GridIndex>& regions) {
+  return std::any_of(regions.begin(), regions.end(),
+                     [&](const GridIndex& region) { return looks.count(region) > 0; });
+}
+
+/// Equal, or both not a number.
+bool sameNumber(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
+
+}  // namespace
+
+MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const ClassTable> classes,
+                           const Settings& settings, CorrectedMap map)
+    : settings_(settings),
+      map_(std::move(map)),
+      config_(std::make_shared<const MapperConfig>(config)),
+      journal_(settings.memory),
+      mover_(std::make_unique<ScanMover>(config, std::move(classes))) {
+  if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
+  checkCorrectable(config);
+  thread_ = std::thread(&MapCorrector::work, this);
+}
+
+MapCorrector::~MapCorrector() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void MapCorrector::checkCorrectable(const MapperConfig& config) {
+  const bool mapped =
+      config.free_space.mode == "line" && config.free_space.extent == FreeSpaceExtent::kMapped;
+  if (!mapped && config.occlusion == OcclusionExtent::kNone) return;
+  throw std::invalid_argument(
+      std::string("scans cannot move with ") + (mapped ? "free_space/extent: mapped" : "occlusion marks") +
+      ", which depend on the order of scans; set " +
+      (mapped ? "free_space/extent: observed" : "occlusion: none") + ", or do without the journal");
+}
+
+RoundedScan MapCorrector::round(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor) const {
+  return toSensorScan(scan, T_map_sensor, settings_.quantum, config_->sensor_model);
+}
+
+void MapCorrector::addScan(SensorScan scan, std::size_t sensor, const Eigen::Isometry3d& T_map_sensor,
+                           const Eigen::Isometry3d& T_odometry_sensor,
+                           const std::vector<GridIndex>& touched) {
+  JournalScan entry;
+  entry.stamp = scan.stamp;
+  entry.settings = config_;
+  entry.sensor = sensor;
+  entry.T_map_sensor = T_map_sensor;
+  entry.T_odometry_sensor = T_odometry_sensor;
+  entry.reach = reachOf(scan, config_->sensor_model);
+  entry.regions = regionsOf(touched);
+  entry.scan = std::make_shared<const SensorScan>(std::move(scan));
+  const bool seen = looks_ && anyIn(*looks_, entry.regions);
+  const Number number = journal_.add(std::move(entry));
+  unpacked_.push_back(number);
+  if (seen) to_look_.push_back(number);
+}
+
+void MapCorrector::reconfigure(const MapperConfig& config) {
+  checkCorrectable(config);
+  config_ = std::make_shared<const MapperConfig>(config);
+}
+
+void MapCorrector::noteCleared(const Eigen::AlignedBox3d& box) {
+  journal_.noteCleared(box);
+  ++generation_;
+  dropLooks();
+}
+
+void MapCorrector::noteForeign(const std::vector<GridIndex>& regions) {
+  journal_.noteForeign(regions);
+}
+
+void MapCorrector::reset() {
+  journal_.clear();
+  unpacked_.clear();
+  dropLooks();
+  changed_regions_.clear();
+  ++generation_;
+  alone_ = false;
+  progress_.to_go = progress_.failed = 0;
+  progress_.fault.clear();
+}
+
+bool MapCorrector::correct(const std::vector<StampedMotion>& keyframes,
+                           const std::vector<Eigen::Isometry3d>& T_sensor_keyframe) {
+  if (!journal_.setPath(keyframes, T_sensor_keyframe)) return false;
+  ++progress_.paths;
+  progress_.largest_move = 0.0;
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    mark(journal_.at(n));
+    progress_.largest_move = std::max(progress_.largest_move, ScanJournal::errorOf(journal_.at(n)));
+  }
+  progress_.failed = 0;
+  progress_.fault.clear();
+  countToGo();
+  return true;
+}
+
+std::vector<StampedMotion> MapCorrector::trajectory() const {
+  std::vector<StampedMotion> poses;
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    poses.push_back({journal_.at(n).stamp, journal_.at(n).wanted});
+  }
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const StampedMotion& a, const StampedMotion& b) { return a.stamp < b.stamp; });
+  return poses;
+}
+
+void MapCorrector::mark(JournalScan& scan) const {
+  scan.off = scan.isKept() &&
+             !(ScanJournal::errorOf(scan) <= std::max(settings_.tolerance, kNoError));  // or not a number
+}
+
+void MapCorrector::countToGo() {
+  progress_.to_go = 0;
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) progress_.to_go += journal_.at(n).off;
+}
+
+MapCorrector::Progress MapCorrector::progress() const {
+  Progress progress = progress_;
+  progress.scans = journal_.size();
+  progress.bytes = journal_.bytes();
+  progress.forgotten = journal_.forgotten();
+  progress.done = progress.to_go == 0 && changed_regions_.empty() && !looks_;
+  return progress;
+}
+
+std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot) {
+  std::vector<GridIndex> changed;
+  if (auto done = takeDone()) changed = take(*done);
+  if (unpacked_.size() > kMostUnpacked) packNext();
+  try {
+    if (isIdle() && looks_ && to_look_.empty()) {
+      const std::vector<GridIndex> looked_at = replaceLooks();
+      changed.insert(changed.end(), looked_at.begin(), looked_at.end());
+    }
+    if (isIdle()) startNext(robot);
+  } catch (const std::exception& error) {
+    giveUpLooks(error.what());
+  }
+  return changed;
+}
+
+void MapCorrector::finish(const Eigen::Vector3d& robot) {
+  if (running_) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    ended_.wait(lock, [this] { return job_done_; });
+  }
+  alone_at_work_ = true;
+  do {
+    update(robot);
+  } while (running_ || !progress().done || !unpacked_.empty());
+  alone_at_work_ = false;
+}
+
+template <typename Work>
+void MapCorrector::start(Work work) {
+  running_ = true;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    job_ = Job{std::move(work), generation_, ""};
+    job_done_ = alone_at_work_;
+  }
+  if (alone_at_work_) return perform(*job_);
+  wake_.notify_all();
+}
+
+void MapCorrector::startNext(const Eigen::Vector3d& robot) {
+  if (startPacking() || startMoving(robot)) return;
+  startLooking(robot);
+}
+
+bool MapCorrector::startPacking() {
+  Packing packing;
+  while (!unpacked_.empty() && packing.scans.size() < kScansAtOnce) {
+    const Number number = unpacked_.front();
+    unpacked_.pop_front();
+    if (journal_.has(number)) packing.scans.emplace_back(number, journal_.at(number).scan);
+  }
+  if (packing.scans.empty()) return false;
+  start(std::move(packing));
+  return true;
+}
+
+bool MapCorrector::startMoving(const Eigen::Vector3d& robot) {
+  if (progress_.to_go == 0 || (map_.ready && !map_.ready())) return false;
+  std::optional<Number> best;
+  double best_distance = 0.0;
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    const JournalScan& scan = journal_.at(n);
+    if (!scan.packed || !scan.off) continue;
+    const double distance = std::floor((scan.wanted.translation() - robot).norm() / kEquallyNear);
+    if (best && distance > best_distance) continue;
+    best = n;
+    best_distance = distance;
+  }
+  if (!best) {
+    countToGo();
+    return false;
+  }
+  Moving moving;
+  const JournalScan& first = journal_.at(*best);
+  for (Number n = *best; moving.numbers.size() < (alone_ ? 1 : kMovesAtOnce); --n) {
+    const JournalScan& scan = journal_.at(n);
+    const bool alike = scan.settings == first.settings && scan.cleared_before == first.cleared_before;
+    if (!scan.packed || !scan.off || !alike) break;
+    moving.numbers.push_back(n);
+    moving.moves.push_back({journal_.placed(n), scan.wanted});
+    if (n == journal_.begin()) break;
+  }
+  start(std::move(moving));
+  return true;
+}
+
+void MapCorrector::beginLooks(const Eigen::Vector3d& robot) {
+  const double edge = Region::kEdge * GridGeometry(config_->resolution).blockSize();
+  std::vector<std::pair<double, GridIndex>> nearest;
+  for (const GridIndex& region : changed_regions_) {
+    const Eigen::Vector3d centre = edge * (Eigen::Array3d(region.x, region.y, region.z) + 0.5);
+    nearest.emplace_back((centre - robot).norm(), region);
+  }
+  const std::size_t count = std::min(kRegionsAtOnce, nearest.size());
+  std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count), nearest.end());
+  nearest.resize(count);
+  looks_ = std::make_shared<LooksByRegion>();
+  for (const auto& [distance, region] : nearest) {
+    if (journal_.foreign().count(region) == 0) (*looks_)[region];
+    changed_regions_.erase(region);
+  }
+  rounds_ = 0;
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    if (anyIn(*looks_, journal_.at(n).regions)) to_look_.push_back(n);
+  }
+}
+
+bool MapCorrector::startLooking(const Eigen::Vector3d& robot) {
+  if (progress_.to_go > 0 || (changed_regions_.empty() && !looks_)) return false;
+  if (!config_->rules.enabled || !config_->rules.latest) {
+    changed_regions_.clear();  // there are no looks
+    return false;
+  }
+  if (!looks_) beginLooks(robot);
+  if (to_look_.size() <= kScansAtOnce && ++rounds_ > kPatience) {
+    lookAtNext();
+    return false;
+  }
+  Looking looking{{}, looks_};
+  for (; !to_look_.empty() && looking.scans.size() < kScansAtOnce; to_look_.pop_front()) {
+    if (!journal_.has(to_look_.front()) || !journal_.at(to_look_.front()).isKept()) continue;
+    if (!journal_.at(to_look_.front()).packed) break;
+    looking.scans.push_back(journal_.placed(to_look_.front()));
+  }
+  if (looking.scans.empty()) return false;
+  start(std::move(looking));
+  return true;
+}
+
+void MapCorrector::lookAtNext() {
+  if (to_look_.empty()) return;
+  const Number number = to_look_.front();
+  if (journal_.has(number) && journal_.at(number).isKept()) {
+    if (!journal_.at(number).packed) return;
+    mover_->addLooks(journal_.placed(number), *looks_);
+  }
+  to_look_.pop_front();
+}
+
+void MapCorrector::dropLooks() {
+  if (!looks_) return;
+  for (const auto& [region, looks] : *looks_) changed_regions_.insert(region);
+  looks_ = nullptr;
+  to_look_.clear();
+}
+
+void MapCorrector::dropLooksOf(const std::vector<GridIndex>& regions) {
+  for (const GridIndex& region : regions) {
+    changed_regions_.insert(region);
+    if (looks_) looks_->erase(region);
+  }
+}
+
+void MapCorrector::giveUpLooks(const std::string& fault) {
+  progress_.fault = fault;
+  if (!looks_) return;
+  std::vector<GridIndex> regions;
+  for (const auto& [region, looks] : *looks_) regions.push_back(region);
+  journal_.noteForeign(regions);
+  looks_ = nullptr;
+  to_look_.clear();
+}
+
+std::vector<GridIndex> MapCorrector::replaceLooks() {
+  std::vector<GridIndex> changed;
+  Stopwatch watch;
+  for (double ms = 0.0; !looks_->empty() && ms < kLooksMs; ms += watch.lap()) {
+    const auto first = looks_->begin();
+    if (journal_.foreign().count(first->first) == 0) {
+      const std::vector<GridIndex> blocks = map_.replace_looks(first->first, first->second);
+      changed.insert(changed.end(), blocks.begin(), blocks.end());
+    }
+    looks_->erase(first);
+  }
+  if (looks_->empty()) looks_ = nullptr;
+  return changed;
+}
+
+std::vector<GridIndex> MapCorrector::take(Job& job) {
+  if (const auto* const packing = std::get_if<Packing>(&job.work)) takePacked(job, *packing);
+  if (auto* const moving = std::get_if<Moving>(&job.work)) return takeMoved(job, *moving);
+  if (std::holds_alternative<Looking>(job.work) && !job.fault.empty()) giveUpLooks(job.fault);
+  return {};
+}
+
+void MapCorrector::takePacked(const Job& job, const Packing& packing) {
+  for (std::size_t n = 0; n < packing.scans.size(); ++n) {
+    const Number number = packing.scans[n].first;
+    if (n < packing.packed.size()) {
+      journal_.setPacked(number, packing.packed[n]);
+    } else if (journal_.has(number)) {  // it stays where it is
+      progress_.fault = job.fault;
+      JournalScan& scan = journal_.at(number);
+      journal_.noteForeign(scan.regions);
+      scan.scan = nullptr;
+      scan.off = false;
+    }
+  }
+}
+
+void MapCorrector::packNext() {
+  const Number number = unpacked_.front();
+  unpacked_.pop_front();
+  if (!journal_.has(number)) return;
+  Job job{Packing{{{number, journal_.at(number).scan}}, {}}, generation_, ""};
+  perform(job);
+  take(job);
+}
+
+void MapCorrector::giveUp(const Moving& moving, const std::string& fault) {
+  alone_ = moving.numbers.size() > 1;
+  if (alone_) return;
+  JournalScan& scan = journal_.at(moving.numbers.front());
+  const Eigen::Isometry3d& to = moving.moves.front().to;
+  if (!std::equal(to.data(), to.data() + 16, scan.wanted.data(), sameNumber)) return;  // a later path came
+  scan.off = false;
+  ++progress_.failed;
+  progress_.fault = fault;
+}
+
+std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
+  const bool all_known =
+      std::all_of(moving.numbers.begin(), moving.numbers.end(), [&](Number n) { return journal_.has(n); });
+  std::vector<GridIndex> changed;
+  if (job.generation != generation_ || !all_known) {
+    countToGo();
+    return changed;  // they are moved again
+  }
+  if (job.fault.empty()) {
+    try {
+      changed = map_.add(std::move(moving.moved->difference));
+    } catch (const std::exception& error) {
+      job.fault = error.what();
+    }
+  }
+  if (!job.fault.empty()) {
+    giveUp(moving, job.fault);
+    countToGo();
+    return changed;
+  }
+  for (std::size_t n = 0; n < moving.numbers.size(); ++n) {
+    JournalScan& scan = journal_.at(moving.numbers[n]);
+    dropLooksOf(scan.regions);
+    scan.T_map_sensor = moving.moves[n].to;
+    mark(scan);
+    scan.regions = std::move(moving.moved->regions[n]);
+    dropLooksOf(scan.regions);
+  }
+  alone_ = false;
+  progress_.moved += moving.numbers.size();
+  progress_.scan_ms = moving.ms / static_cast<double>(moving.numbers.size());
+  countToGo();
+  return changed;
+}
+
+std::optional<MapCorrector::Job> MapCorrector::takeDone() {
+  if (!running_) return std::nullopt;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!job_done_) return std::nullopt;
+  running_ = false;
+  return std::exchange(job_, std::nullopt);
+}
+
+void MapCorrector::work() {
+  yieldToOtherThreads();
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [this] { return stop_ || (job_ && !job_done_); });
+    if (stop_) return;
+    lock.unlock();
+    perform(*job_);  // nobody else touches it before job_done_
+    lock.lock();
+    job_done_ = true;
+    ended_.notify_all();
+  }
+}
+
+void MapCorrector::perform(Job& job) {
+  try {
+    if (auto* const packing = std::get_if<Packing>(&job.work)) {
+      for (const auto& [number, scan] : packing->scans) {
+        packing->packed.push_back(std::make_shared<const std::string>(packScan(*scan)));
+      }
+    } else if (auto* const moving = std::get_if<Moving>(&job.work)) {
+      Stopwatch watch;
+      moving->moved = mover_->move(moving->moves);
+      moving->ms = watch.lap();
+    } else if (auto* const looking = std::get_if<Looking>(&job.work)) {
+      for (const PlacedJournalScan& scan : looking->scans) {
+        mover_->addLooks(scan, *looking->to);
+      }
+    }
+  } catch (const std::exception& error) {
+    job.fault = error.what();
+  }
+}
+
+}  // namespace bki_mapping

@@ -1,0 +1,189 @@
+/// @file Moves scans in a map when their poses are corrected, beside mapping.
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "bki_mapping/mapping/semantic_mapper.h"
+#include "journal/scan_journal.h"
+#include "journal/scan_mover.h"
+
+namespace bki_mapping {
+
+/// The map that is corrected, in memory or elsewhere. add and replace_looks return the blocks that changed.
+struct CorrectedMap {
+  std::function<std::vector<GridIndex>(SemanticMap difference)> add;
+  std::function<std::vector<GridIndex>(const GridIndex& region, const LooksByBlock& looks)> replace_looks;
+  /// Whether scans may be moved now; empty: always.
+  std::function<bool()> ready = {};
+};
+
+/// Keeps the scans of a map, and moves them to where they belong. A thread of its own computes, for a few
+/// scans at a time, the difference that the move makes; update() adds it to the map at once, so that a
+/// snapshot has each scan exactly once, at its old or its new pose. The map then equals, to the bit, the one
+/// of all scans at their corrected poses.
+///
+/// Looks (rules/latest) cannot be subtracted. While scans move, a block keeps the looks at the old poses
+/// beside those at the new ones; when no scan is left to be moved, the looks of all changed regions are made
+/// anew from the scans, and replaced at once. Where the map has evidence that is of no scan of the journal,
+/// from another map or a forgotten scan, the old looks stay; and where a box was cleared, intervals of looks
+/// may differ from those of a map made afresh.
+///
+/// Not thread-safe; for the thread of the mapper.
+class MapCorrector {
+ public:
+  struct Settings {
+    double quantum = 0.01;    ///< to which points are rounded in the sensor's frame [m]
+    double tolerance = -1.0;  ///< scans that no point of which is farther off stay [m]; < 0: resolution / 10
+    std::size_t memory = 0;   ///< of the packed scans [bytes]; 0: no limit
+  };
+
+  /// @throws as checkCorrectable().
+  MapCorrector(const MapperConfig& config, std::shared_ptr<const ClassTable> classes,
+               const Settings& settings, CorrectedMap map);
+  ~MapCorrector();
+
+  /// Rounds a scan; the result is what must be integrated, and then given to addScan().
+  /// @param T_map_sensor pose at which it is integrated.
+  RoundedScan round(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor) const;
+  /// Notes a scan that has been integrated. @param touched blocks (SemanticMapper::touchedBlocks).
+  /// @param T_odometry_sensor its recorded pose in a frame that does not jump.
+  void addScan(SensorScan scan, std::size_t sensor, const Eigen::Isometry3d& T_map_sensor,
+               const Eigen::Isometry3d& T_odometry_sensor, const std::vector<GridIndex>& touched);
+  /// The settings with which later scans are integrated. @throws as checkCorrectable(); nothing has then
+  /// changed.
+  void reconfigure(const MapperConfig& config);
+  /// @throws std::invalid_argument in one sentence if the map depends on the order of scans with these
+  /// settings.
+  static void checkCorrectable(const MapperConfig& config);
+  /// Notes what happens to the map beside scans, as ScanJournal does; what is under way is given up.
+  void noteCleared(const Eigen::AlignedBox3d& box);
+  void noteForeign(const std::vector<GridIndex>& regions);
+  /// Notes that the recorded poses jump (ScanJournal::noteJump).
+  void noteJump(std::uint64_t stamp) { journal_.noteJump(stamp); }
+  /// Forgets all scans; the counts of Progress stay.
+  void reset();
+
+  /// Sets where the scans belong (ScanJournal::setPath). What has been moved already stays moved.
+  /// @return whether any keyframe lies among the scans; otherwise nothing has changed.
+  bool correct(const std::vector<StampedMotion>& keyframes,
+               const std::vector<Eigen::Isometry3d>& T_sensor_keyframe);
+
+  /// Adds to the map what is ready, and has the next scans moved: those near a place first, and of these the
+  /// newest. Call it between scans; it takes some milliseconds. @param robot position in the map frame [m].
+  /// @return the changed blocks.
+  std::vector<GridIndex> update(const Eigen::Vector3d& robot);
+  /// Calls update() until nothing is left to be done, and works in the calling thread, with its priority.
+  /// Takes as long as that takes.
+  void finish(const Eigen::Vector3d& robot);
+
+  /// The poses where the kept scans belong, by rising stamp.
+  std::vector<StampedMotion> trajectory() const;
+
+  struct Progress {
+    std::uint64_t scans = 0;      ///< in the journal
+    std::uint64_t bytes = 0;      ///< that they take
+    std::uint64_t forgotten = 0;  ///< to keep within the limit; they stay where they are
+    std::uint64_t paths = 0;      ///< calls of correct()
+    std::uint64_t moved = 0;      ///< moves of scans
+    std::uint64_t to_go = 0;      ///< scans that are still to be moved
+    std::uint64_t failed = 0;     ///< scans that cannot be moved to where they belong
+    double largest_move = 0.0;    ///< of a point of a scan, by the last path [m]
+    double scan_ms = 0.0;         ///< time of the thread for a scan, in the last moves [ms]
+    bool done = true;             ///< whether the map is that of the corrected poses
+    std::string fault;            ///< why the last failed scan cannot be moved
+  };
+  Progress progress() const;
+
+ private:
+  using Number = ScanJournal::Number;
+  // What the thread does, and what comes of it:
+  struct Packing {
+    std::vector<std::pair<Number, std::shared_ptr<const SensorScan>>> scans;
+    std::vector<std::shared_ptr<const std::string>> packed;
+  };
+  struct Moving {
+    std::vector<Number> numbers;
+    std::vector<ScanMove> moves;
+    std::optional<ScanMover::Moved> moved;
+    double ms = 0.0;
+  };
+  struct Looking {
+    std::vector<PlacedJournalScan> scans;
+    std::shared_ptr<LooksByRegion> to;
+  };
+  struct Job {
+    std::variant<Packing, Moving, Looking> work;
+    std::uint64_t generation = 0;
+    std::string fault;  ///< why it has failed; "" if it has not
+  };
+
+  void work();
+  void perform(Job& job);
+  /// Starts a job; the thread must be idle.
+  template <typename Work>
+  void start(Work work);
+  /// The job that has ended since the last call, if any.
+  std::optional<Job> takeDone();
+  bool isIdle() const { return !running_; }
+
+  std::vector<GridIndex> take(Job& job);
+  void takePacked(const Job& job, const Packing& packing);
+  /// Packs a scan in this thread, where too many wait for the other one.
+  void packNext();
+  std::vector<GridIndex> takeMoved(Job& job, Moving& moving);
+  /// The scans of a job could not be moved: tries each of them alone, or gives up the only one.
+  void giveUp(const Moving& moving, const std::string& fault);
+  void startNext(const Eigen::Vector3d& robot);
+  bool startPacking();
+  bool startMoving(const Eigen::Vector3d& robot);
+  bool startLooking(const Eigen::Vector3d& robot);
+  void beginLooks(const Eigen::Vector3d& robot);
+  /// Looks through one of the last scans in this thread.
+  void lookAtNext();
+  /// What has been made of the looks is out of date: all of it, or that of some regions.
+  void dropLooks();
+  void dropLooksOf(const std::vector<GridIndex>& regions);
+  /// Gives up the looks that are being made: the old ones stay.
+  void giveUpLooks(const std::string& fault);
+  /// Replaces the looks of some regions, which takes a moment.
+  std::vector<GridIndex> replaceLooks();
+  /// Marks a scan as to be moved, or not, by where it is.
+  void mark(JournalScan& scan) const;
+  void countToGo();
+
+  Settings settings_;
+  CorrectedMap map_;
+  std::shared_ptr<const MapperConfig> config_;
+  ScanJournal journal_;
+  std::deque<Number> unpacked_;
+  std::set<GridIndex> changed_regions_;  ///< whose looks must be made anew, without those of looks_
+  /// The looks of changed regions as far as they have been made; nullptr: none are being made. The thread
+  /// changes the looks, this one the set of regions, while the thread is idle.
+  std::shared_ptr<LooksByRegion> looks_;
+  std::deque<Number> to_look_;  ///< scans for looks_
+  int rounds_ = 0;              ///< of jobs for the last few scans of looks_
+  bool alone_ = false;          ///< moves one scan at a time, because several have failed
+  Progress progress_;
+  std::uint64_t generation_ = 0;  ///< of what results of jobs may be added to the map
+
+  // Shared with the thread:
+  std::unique_ptr<ScanMover> mover_;  ///< the thread's, while it has a job
+  std::mutex mutex_;
+  std::condition_variable wake_, ended_;
+  std::optional<Job> job_;
+  bool job_done_ = false, stop_ = false;
+  bool running_ = false;        ///< a job was started and not yet taken; of the mapper's thread
+  bool alone_at_work_ = false;  ///< jobs are done by the mapper's thread, in finish()
+  std::thread thread_;
+};
+
+}  // namespace bki_mapping

@@ -1,0 +1,73 @@
+#include "journal/scan_journal.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "journal/rigid_motion.h"
+
+namespace bki_mapping {
+
+ScanJournal::Number ScanJournal::add(JournalScan scan) {
+  scan.cleared_before = cleared_.size();
+  scan.wanted = scan.T_map_sensor;
+  if (scan.packed) bytes_ += scan.packed->size();
+  scans_.push_back(std::move(scan));
+  forgetOldest();
+  return end() - 1;
+}
+
+void ScanJournal::setPacked(Number number, std::shared_ptr<const std::string> packed) {
+  if (!has(number)) return;
+  JournalScan& scan = at(number);
+  bytes_ += packed->size();
+  scan.packed = std::move(packed);
+  scan.scan = nullptr;
+  forgetOldest();
+}
+
+void ScanJournal::forgetOldest() {
+  while (memory_ > 0 && bytes_ > memory_ && scans_.size() > 1 && scans_.front().packed) {
+    noteForeign(scans_.front().regions);
+    bytes_ -= scans_.front().packed->size();
+    scans_.pop_front();
+    ++first_;
+    ++forgotten_;
+  }
+}
+
+void ScanJournal::clear() {
+  first_ = end();
+  scans_.clear();
+  cleared_.clear();
+  foreign_.clear();
+  jumps_.clear();
+  bytes_ = 0;
+}
+
+bool ScanJournal::setPath(const std::vector<StampedMotion>& keyframes,
+                          const std::vector<Eigen::Isometry3d>& T_sensor_keyframe) {
+  std::vector<StampedMotion> odometry;
+  for (const JournalScan& scan : scans_) {
+    odometry.push_back({scan.stamp, scan.T_odometry_sensor * T_sensor_keyframe[scan.sensor]});
+  }
+  std::stable_sort(odometry.begin(), odometry.end(),
+                   [](const StampedMotion& a, const StampedMotion& b) { return a.stamp < b.stamp; });
+  const CorrectedPath path(keyframes, odometry, jumps_);
+  if (path.empty()) return false;
+  for (JournalScan& scan : scans_) {
+    scan.wanted = path.poseAt(scan.stamp, scan.T_odometry_sensor).value_or(scan.T_map_sensor);
+  }
+  return true;
+}
+
+double ScanJournal::errorOf(const JournalScan& scan) {
+  return farthestMove(scan.wanted * scan.T_map_sensor.inverse(), scan.T_map_sensor.translation(), scan.reach);
+}
+
+PlacedJournalScan ScanJournal::placed(Number number) const {
+  const JournalScan& scan = at(number);
+  const auto after = cleared_.begin() + static_cast<std::ptrdiff_t>(scan.cleared_before);
+  return {scan.packed, scan.settings, scan.T_map_sensor, {after, cleared_.end()}};
+}
+
+}  // namespace bki_mapping

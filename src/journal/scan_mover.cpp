@@ -1,0 +1,75 @@
+#include "journal/scan_mover.h"
+
+#include <algorithm>
+
+#include "journal/scan_codec.h"
+
+namespace bki_mapping {
+namespace {
+
+/// The map's settings, for a mapper on the side.
+MapperConfig asideOf(MapperConfig config) {
+  config.threads = 1;
+  config.memory_limit = 0.0;
+  return config;
+}
+
+}  // namespace
+
+std::vector<GridIndex> regionsOf(const std::vector<GridIndex>& blocks) {
+  std::vector<GridIndex> regions;
+  for (const GridIndex& block : blocks) {
+    const GridIndex region = SemanticMap::regionOf({block});
+    if (regions.empty() || regions.back() != region) regions.push_back(region);
+  }
+  std::sort(regions.begin(), regions.end());
+  regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
+  return regions;
+}
+
+ScanMover::ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
+    : mapper_(asideOf(config), std::move(classes)) {}
+
+void ScanMover::use(const PlacedJournalScan& scan) {
+  if (settings_ != scan.settings) mapper_.reconfigure(asideOf(*scan.settings));
+  settings_ = scan.settings;
+}
+
+ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
+  mapper_.takeMap();  // what a failed call has left
+  std::vector<std::vector<GridIndex>> regions;
+  std::vector<SensorScan> scans;
+  for (const ScanMove& move : moves) {
+    use(move.scan);
+    scans.push_back(unpackScan(*move.scan.packed));
+    mapper_.withdraw(place(scans.back(), move.scan.T_map_sensor));
+  }
+  // After all is withdrawn: a block that is empty for a moment loses its looks.
+  for (std::size_t n = 0; n < moves.size(); ++n) {
+    mapper_.integrate(place(scans[n], moves[n].to));
+    regions.push_back(regionsOf(mapper_.touchedBlocks()));
+  }
+  Moved moved{mapper_.takeMap(), std::move(regions)};
+  if (!moves.empty()) {
+    for (const Eigen::AlignedBox3d& box : moves.front().scan.cleared) clearBox(moved.difference, box);
+  }
+  return moved;
+}
+
+void ScanMover::addLooks(const PlacedJournalScan& scan, LooksByRegion& looks) {
+  use(scan);
+  mapper_.takeMap();  // what a failed call has left
+  mapper_.integrate(place(unpackScan(*scan.packed), scan.T_map_sensor));
+  for (const Eigen::AlignedBox3d& box : scan.cleared) mapper_.clearBox(box);
+  for (const GridIndex& region : mapper_.map().regions()) {
+    const auto to = looks.find(region);
+    if (to == looks.end()) continue;
+    const Region& blocks = *mapper_.map().findRegion(region);
+    blocks.forEachIndex([&](const BlockIndex& index) {
+      const Block& block = *blocks.find(Region::numberOf(index));
+      if (!block.looks().empty()) to->second[index].add(block.looks());
+    });
+  }
+}
+
+}  // namespace bki_mapping
