@@ -8,6 +8,7 @@ bki_mapping_room(ros SOURCES
     cloud_frame.cpp
     clock_offset.cpp
     color_reader.cpp
+    corrected_poses.cpp correction_config.cpp
     distance_section_config.cpp
     input_config.cpp
     input_notes.cpp
@@ -42,7 +43,7 @@ bki_mapping_room(ros SOURCES
     server_config.cpp
     tf_jumps.cpp
     voxel_pcl.cpp
-  LINK bki_mapping_city bki_mapping_export pcl_common ${catkin_LIBRARIES})
+  LINK bki_mapping_city bki_mapping_export bki_mapping_journal pcl_common ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)

@@ -336,7 +336,7 @@ if(CATKIN_ENABLE_TESTING)
     "BKI_MAPPING_DEVEL=${CATKIN_DEVEL_PREFIX}" "BKI_MAPPING_DEMO_TARGETS=${demo_targets}")
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
-    test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
+    test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/corrections_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
     test/ros/large_coordinates_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
     test/ros/bumper_rostest.py test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
     test/ros/query_latency_rostest.py test/ros/rates_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
@@ -372,6 +372,7 @@ if(CATKIN_ENABLE_TESTING)
     set_tests_properties(follower_rostest PROPERTIES SKIP_RETURN_CODE 77)
   endif()
   add_rostest(test/ros/city.test)
+  add_rostest(test/ros/corrections.test)
   add_rostest(test/ros/killed.test)
   add_rostest(test/ros/large_coordinates.test)
   add_rostest(test/ros/launch.test)

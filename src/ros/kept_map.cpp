@@ -19,6 +19,9 @@ namespace {
 /// Fraction of memory_limit up to which tiles of a city are loaded; the rest is for scans.
 constexpr double kMostOfMemory = 0.8;
 
+/// While more than this waits to be written to the file [bytes], no scans move.
+constexpr std::size_t kMostWaiting = 128 << 20;
+
 bool samePath(const std::string& a, const std::string& b) {
   std::error_code ignored;
   return std::filesystem::weakly_canonical(a, ignored) == std::filesystem::weakly_canonical(b, ignored);
@@ -48,7 +51,6 @@ KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::
       }
       keeper_ = std::make_unique<MapKeeper>(mapper_, config.own_map_file, info(), drive_);
     }
-    return;
   } else if (!config.map_file.empty()) {
     keeper_ = std::make_unique<MapKeeper>(mapper_, config.map_file, info(), drive_);
     if (config.window <= 0.0) {
@@ -56,10 +58,38 @@ KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::
       keeper_->waitForTiles();
     }
   }
-  if (!config.map_file.empty()) {
+  if (!read_only_) beginJournal(config);
+  if (!config.map_file.empty() && !namesCity(config.map_file)) {
     ROS_INFO("The map is %s %s; %lu blocks are loaded", read_only_ ? "read from" : "kept in",
              config.map_file.c_str(), mapper_.map().size());
   }
+}
+
+void KeptMap::beginJournal(const ServerConfig& config) {
+  if (!config.correction.journal) return;
+  MapCorrector::Settings settings;
+  settings.quantum = config.correction.journal_quantum;
+  settings.tolerance = config.correction.tolerance;
+  settings.memory = static_cast<std::size_t>(1e6 * config.correction.journal_limit);
+  const auto add = [this](SemanticMap difference) {
+    std::vector<GridIndex> changed;
+    for (const auto& [index, block] : difference.entries()) changed.push_back(index);
+    if (keeper_) {
+      keeper_->change(std::move(difference));
+    } else {
+      mapper_.addMap(std::move(difference));
+    }
+    save_.noteChange();
+    return changed;
+  };
+  const auto replaceLooks = [this](const GridIndex& region, const LooksByBlock& looks) {
+    save_.noteChange();
+    return keeper_ ? keeper_->replaceLooks(region, looks) : mapper_.replaceLooks(region, looks);
+  };
+  const auto ready = [this] { return !keeper_ || keeper_->waitingBytes() < kMostWaiting; };
+  corrector_ = std::make_unique<MapCorrector>(mapper_.config(), mapper_.sharedClasses(), settings,
+                                              CorrectedMap{add, replaceLooks, ready});
+  corrector_->noteForeign(keeper_ ? keeper_->storedTiles() : std::vector<GridIndex>());
 }
 
 MapInfo KeptMap::info() const {
@@ -95,6 +125,7 @@ std::vector<GridIndex> KeptMap::addFromCity(const ServerConfig& config) {
   if (limit > 0.0 && !makes_room)
     wanted.room = kMostOfMemory * limit - static_cast<double>(mapper_.mapBytes());
   city_.update(wanted, !makes_room, [&](SemanticMap&& tiles, const std::vector<DriveRecord>& drives) {
+    if (corrector_) corrector_->noteForeign(tiles.regions());
     if (keeper_) {
       keeper_->addMap(std::move(tiles), drives);
     } else {
@@ -110,10 +141,15 @@ std::vector<GridIndex> KeptMap::addFromCity(const ServerConfig& config) {
 }
 
 std::vector<GridIndex> KeptMap::update(const ServerConfig& config, PeriodicSave::Clock::time_point now) {
-  std::vector<GridIndex> loaded = addFromCity(config);
-  if (!keeper_) return loaded;
+  std::vector<GridIndex> changed = addFromCity(config);
+  const auto add = [&](const std::vector<GridIndex>& more) {
+    changed.insert(changed.end(), more.begin(), more.end());
+  };
+  if (corrector_) add(corrector_->update(window_.centre));
+  if (!keeper_) return changed;
   save_.update(*keeper_, config.save_period, now);
-  return keeper_->moveTo(window_);
+  add(keeper_->moveTo(window_));
+  return changed;
 }
 
 void KeptMap::requireWritable() const {
@@ -131,6 +167,7 @@ void KeptMap::reset() {
   } else {
     mapper_.reset();
   }
+  if (corrector_) corrector_->reset();
 }
 
 void KeptMap::addMap(StoredMap map, bool replace, bool allow_overlap) {
@@ -141,16 +178,22 @@ void KeptMap::addMap(StoredMap map, bool replace, bool allow_overlap) {
   }
   city_.checkHoldsNone(map.drives);
   save_.noteChange();
-  if (keeper_) return keeper_->addMap(std::move(map.map), map.drives, allow_overlap);
-  checkNotAdded("the map", drives_, map.drives, allow_overlap);
-  mapper_.addMap(std::move(map.map));
-  drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
+  const std::vector<GridIndex> regions = map.map.regions();
+  if (keeper_) {
+    keeper_->addMap(std::move(map.map), map.drives, allow_overlap);
+  } else {
+    checkNotAdded("the map", drives_, map.drives, allow_overlap);
+    mapper_.addMap(std::move(map.map));
+    drives_.insert(drives_.end(), map.drives.begin(), map.drives.end());
+  }
+  if (corrector_) corrector_->noteForeign(regions);
 }
 
 std::vector<GridIndex> KeptMap::clearBox(const Eigen::AlignedBox3d& box) {
   requireWritable();
   save_.noteChange();
   city_.clearBox(box);
+  if (corrector_) corrector_->noteCleared(box);
   return keeper_ ? keeper_->clearBox(box) : mapper_.clearBox(box);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bki_mapping/store/map_keeper.h"
+#include "journal/map_corrector.h"
 #include "ros/city_tiles.h"
 #include "ros/periodic_save.h"
 #include "ros/server_config.h"
@@ -30,8 +31,13 @@ class KeptMap {
   /// Notes what a scan changed, and moves the window. @param stamp of the scan [ns].
   std::vector<GridIndex> addScan(std::uint64_t stamp, const Eigen::Vector3d& sensor,
                                  const ServerConfig& config);
-  /// Does what is due between scans: adds evidence that has been read from the file, and saves the map.
+  /// Does what is due between scans: adds evidence that has been read from the file, and what corrected poses
+  /// change, and saves the map.
   std::vector<GridIndex> update(const ServerConfig& config, PeriodicSave::Clock::time_point now);
+
+  /// Keeps the scans and moves them to corrected poses; nullptr without the parameter journal.
+  MapCorrector* corrector() { return corrector_.get(); }
+  const MapCorrector* corrector() const { return corrector_.get(); }
 
   /// Makes room for a scan that was refused for lack of memory. @return whether memory was gained.
   bool makeRoom() { return keeper_ && keeper_->makeRoom(); }
@@ -75,6 +81,8 @@ class KeptMap {
 
  private:
   void requireWritable() const;
+  /// Begins the journal. @throws std::logic_error if the settings do not allow one.
+  void beginJournal(const ServerConfig& config);
   /// Adds the tiles that have been read from the city. @return the blocks that changed; none with a keeper,
   /// which reports them itself.
   std::vector<GridIndex> addFromCity(const ServerConfig& config);
@@ -89,6 +97,7 @@ class KeptMap {
   std::unique_ptr<MapKeeper> keeper_;  ///< nullptr: the map is in memory only
   PeriodicSave save_;
   CityTiles city_;
+  std::unique_ptr<MapCorrector> corrector_;  ///< last, because it changes what is above
 };
 
 }  // namespace bki_mapping::ros_interface

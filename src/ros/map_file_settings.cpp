@@ -47,6 +47,11 @@ void checkCitySettings(const ServerConfig& config) {
 }  // namespace
 
 void checkMapFileSettings(const ServerConfig& config) {
+  if (config.correction.journal && config.window > 0.0 && config.map_file.empty()) {
+    throw std::invalid_argument(
+        "journal needs all that its scans have mapped, but window removes what is far from the sensor; set "
+        "map_file, which keeps it, or window to 0");
+  }
   if (namesCity(config.map_file)) return checkCitySettings(config);
   if (!config.own_map_file.empty()) {
     throw std::invalid_argument(

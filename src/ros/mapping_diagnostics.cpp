@@ -38,6 +38,9 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
   };
   if (!drops.empty()) warn("dropped: " + drops);
   if (!now.map_file_fault.empty()) warn(now.map_file_fault);
+  if (now.corrections_refused > before.corrections_refused) {
+    warn("corrected_path was refused: " + now.last_correction_refusal);
+  }
   if (const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
       !advice.empty()) {
     warn(advice);
@@ -89,6 +92,10 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("last refused change of settings", now_.last_refusal);
   out.add("time jumps", now_.time_jumps);
   out.add("tf jumps", now_.tf_jumps);
+  out.add("scans kept", now_.journal_scans);
+  out.add("scans to be moved", now_.correction_to_go);
+  out.add("scans that could not be moved", now_.correction_failed);
+  out.add("last refused corrected_path", now_.last_correction_refusal);
   out.add("blocks", now_.blocks);
   out.add("map [bytes]", now_.map_bytes);
   out.add("map file", now_.map_file_fault);

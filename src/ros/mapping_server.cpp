@@ -38,6 +38,12 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
   kept_ = std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace());
 
   poses_ = std::make_unique<PoseSource>(node_);
+  if (kept_->corrector()) {
+    corrected_ = std::make_unique<CorrectedPoses>(node_, config_, *poses_, *kept_->corrector(), [this] {
+      trajectory_.correct(kept_->corrector()->trajectory());
+      status_publisher_.publish(status());
+    });
+  }
   publishing_ = std::make_unique<PublisherSet>(node_, config_, [this] {
     return QueuedCall<std::shared_ptr<const ServerSnapshot>>::ask(queue_, [this] {
       publishing_->closeChanges();
@@ -81,6 +87,7 @@ MappingServer::~MappingServer() {
     }
   };
   say(ledger_.summary(waiting_.size()));
+  if (corrected_ && !corrected_->summary().empty()) say(corrected_->summary());
   if (!kept_->hasFile()) return;
   const std::string lost = kept_->close();
   say(lost.empty() ? "The map is saved in " + kept_->filePath() : lost);
@@ -107,7 +114,9 @@ void MappingServer::subscribe() {
 
 void MappingServer::applySettings(const ServerConfig& server, const MapperConfig& mapper) {
   checkMapFileSettings(server);
+  if (kept_->corrector()) MapCorrector::checkCorrectable(mapper);
   mapper_->reconfigure(mapper);
+  if (kept_->corrector()) kept_->corrector()->reconfigure(mapper);
   config_ = server;
   const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
   readers_.clear();
@@ -129,6 +138,7 @@ void MappingServer::work() {
     processQueue();
     const std::vector<GridIndex> moved = kept_->update(config_, Clock::now());
     if (!moved.empty()) mapChanged(moved);
+    if (corrected_ && corrected_->update(Clock::now())) status_publisher_.publish(status());
     queries_->map().releaseIfIdle();
     reportFault();
     diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
@@ -178,7 +188,7 @@ void MappingServer::map(const WaitingCloud& waiting) {
 }
 
 void MappingServer::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
-  const ScanStats stats = addToMap(placed.scan);
+  const ScanStats stats = addToMap(waiting, placed);
   const std_msgs::Header& header = waiting.cloud->header;
   const auto now = Clock::now();
   ledger_.integrated(header, stats, std::chrono::duration<double>(now - waiting.received).count(), now);
@@ -220,9 +230,22 @@ void MappingServer::warnOfFarPlace() {
 void MappingServer::reportTfJumps() {
   for (const TfJump& jump : poses_->takeJumps()) {
     ledger_.tfJumped();
+    if (corrected_) corrected_->noteJump(jump.stamp);
     if (!throttle_.allow(shortText(jump.parent) + " " + shortText(jump.child), Clock::now())) continue;
-    ROS_WARN("%s; call ~reset, or map a recording with the corrected poses", sentenceOf(jump).c_str());
+    ROS_WARN("%s; %s", sentenceOf(jump).c_str(),
+             corrected_ ? "the map follows the corrected poses on corrected_path"
+                        : "set journal and publish the corrected poses on corrected_path, or call ~reset");
   }
+}
+
+ScanStats MappingServer::addToMap(const WaitingCloud& waiting, const PlacedScan& placed) {
+  if (!corrected_) return addToMap(placed.scan);
+  RoundedScan rounded = corrected_->round(placed);
+  ScanStats stats = addToMap(place(rounded.scan, rounded.T_map_sensor));
+  stats.counts += rounded.left_out;
+  corrected_->add(std::move(rounded.scan), rounded.T_map_sensor,
+                  readers_[waiting.input].sensorFrame(*waiting.cloud), mapper_->touchedBlocks());
+  return stats;
 }
 
 ScanStats MappingServer::addToMap(const Scan& scan) {
@@ -296,6 +319,8 @@ Health MappingServer::judgeAllPoints() {
 MappingStatus MappingServer::status() {
   MappingStatus status = ledger_.status(Clock::now(), waiting_.size());
   status.paused = paused_;
+  status.correction_done = true;
+  if (corrected_) corrected_->fill(status);
   if (live_settings_) status.last_refusal = live_settings_->lastRefusal();
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());
   status.map_bytes = mapper_->mapBytes();

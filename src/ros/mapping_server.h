@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "ros/corrected_poses.h"
 #include "ros/input_notes.h"
 #include "ros/kept_map.h"
 #include "ros/live_settings.h"
@@ -82,6 +83,8 @@ class MappingServer {
   void reportFault();
   /// Adds a scan, also where memory must first be gained for it.
   ScanStats addToMap(const Scan& scan);
+  /// Adds the scan of a cloud, and keeps it if there is a journal.
+  ScanStats addToMap(const WaitingCloud& waiting, const PlacedScan& placed);
   /// Counts a cloud as dropped and logs the reason, each sentence at most once in 5 s.
   void drop(const WaitingCloud& cloud, DropReason reason, const std::string& why);
   /// Assesses the points of each input since the last call, and logs warnings.
@@ -120,6 +123,7 @@ class MappingServer {
   bool warned_of_far_place_ = false;
 
   std::unique_ptr<PoseSource> poses_;
+  std::unique_ptr<CorrectedPoses> corrected_;  ///< nullptr without a journal
   std::vector<ros::Subscriber> cloud_subscribers_;
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_publisher_;

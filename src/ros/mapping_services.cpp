@@ -55,6 +55,7 @@ void MappingServer::reset() {
   kept_->reset();
   trajectory_.clear();
   wholeMapChanged();
+  status_publisher_.publish(status());
   ROS_INFO("The map was reset");
 }
 

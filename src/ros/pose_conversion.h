@@ -17,6 +17,15 @@ inline Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& t) {
   return T;
 }
 
+inline Eigen::Isometry3d toIsometry(const geometry_msgs::Pose& pose) {
+  geometry_msgs::Transform t;
+  t.translation.x = pose.position.x;
+  t.translation.y = pose.position.y;
+  t.translation.z = pose.position.z;
+  t.rotation = pose.orientation;
+  return toIsometry(t);
+}
+
 inline geometry_msgs::Transform toTransform(const Eigen::Isometry3d& T) {
   const Eigen::Quaterniond q(T.linear());
   geometry_msgs::Transform t;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "ros/pose_conversion.h"
+
 namespace bki_mapping::ros_interface {
 namespace {
 
@@ -24,6 +26,15 @@ void SensorTrajectory::keepWithin(const Eigen::Vector3d& centre, double edge) {
     return (placeOf(pose) - centre).cwiseAbs().maxCoeff() > 0.5 * edge;
   };
   poses_.erase(std::remove_if(poses_.begin(), poses_.end(), left), poses_.end());
+}
+
+void SensorTrajectory::correct(const std::vector<StampedMotion>& poses) {
+  for (SensorPose& each : poses_) {
+    const std::uint64_t stamp = each.stamp.toNSec();
+    const auto found = std::lower_bound(poses.begin(), poses.end(), stamp,
+                                        [](const StampedMotion& p, std::uint64_t s) { return p.stamp < s; });
+    if (found != poses.end() && found->stamp == stamp) each.pose = toPose(found->motion);
+  }
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "journal/corrected_path.h"
 #include "ros/server_snapshot.h"
 
 namespace bki_mapping::ros_interface {
@@ -19,6 +20,8 @@ class SensorTrajectory {
   void append(const SensorPose& pose, double step);
   /// Removes the poses outside of a cube. @param centre map frame [m]. @param edge [m].
   void keepWithin(const Eigen::Vector3d& centre, double edge);
+  /// Replaces the poses of scans that have moved. @param poses of scans in the map frame, by rising stamp.
+  void correct(const std::vector<StampedMotion>& poses);
   void clear() { poses_.clear(); }
   const std::vector<SensorPose>& poses() const { return poses_; }
 

@@ -199,6 +199,7 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
                      "Set true for listeners that do not read the updates."),
   };
   appendParameters(parameters, "distance_section/", &C::distance_section, distanceSectionParameters());
+  appendParameters(parameters, "", &C::correction, correctionParameters());
   return parameters;
 }
 

@@ -11,6 +11,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/query/column_map.h"
+#include "ros/correction_config.h"
 #include "ros/distance_section_config.h"
 #include "ros/input_config.h"
 #include "ros/scan_queue.h"
@@ -46,6 +47,7 @@ struct ServerConfig {
   HeightReference occupancy_height = HeightReference::kMap;
   bool full_projected_map = false;  ///< whether projected_map is sent whole each time
   DistanceSectionConfig distance_section;
+  CorrectionConfig correction;
   /// What inputs do not set for themselves; the only input where `inputs` names none.
   InputConfig input;
   /// Settings of each named input, by name: parameter and value. See allInputs.
