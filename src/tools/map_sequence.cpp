@@ -18,6 +18,7 @@
 #include "tools/map_output.h"
 #include "tools/run_report.h"
 #include "tools/sequence_options.h"
+#include "tools/trajectory_updates.h"
 
 namespace {
 
@@ -43,6 +44,7 @@ po::options_description options() {
       "report", tools::textOption("FILE.json"), "report of the run")(
       "print-config", po::bool_switch(), "print the effective parameters as YAML, and exit")(
       "print-classes", po::bool_switch(), "print the file of the class table, and exit");
+  tools::addJournal(options);
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -157,14 +159,17 @@ int mapSequence(const po::variables_map& given) {
     if (given.count("output")) warnOfParts(path);
   }
 
+  const auto journal = tools::JournalledMapping::begin(given, mapper);
   std::vector<tools::ScanReport> scans;
   std::vector<std::size_t> mapped;
   std::size_t refused = 0, end = first;
   LabelWatch labels;
   for (; end < last && !interruption.requested(); ++end) {
     try {
-      const Scan scan = sequence.read(end).scan();
-      scans.push_back({sequence.name(end), mapper.integrate(scan)});
+      const SequenceFrame frame = sequence.read(end);
+      const Scan scan = frame.scan();
+      scans.push_back(
+          {sequence.name(end), journal ? journal->integrate(sequence, end, frame) : mapper.integrate(scan)});
       mapped.push_back(end);
       tools::warn(labels.report(mapper, scan, scans.back().stats.counts));
       drive.addScan(scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
@@ -177,6 +182,7 @@ int mapSequence(const po::variables_map& given) {
     tools::showProgress(scans.size(), last - first, progressText(scans.back()));
   }
   const bool stopped = end < last;
+  if (journal) journal->finish();
   if (stopped && end == first) {
     throw tools::Stopped("stopped before the first scan; nothing was written");
   }
@@ -197,6 +203,7 @@ int mapSequence(const po::variables_map& given) {
   if (given.count("report"))
     writeTextFile(given["report"].as<std::string>(), tools::reportJson(mapper, scans));
   std::cout << tools::summaryText(mapper, scans);
+  if (journal) std::cout << journal->summary();
   if (refused > 0) {
     std::cerr << "map_sequence: " << refused << " of " << counted(end - first, "scan")
               << (refused == 1 ? " was" : " were") << " refused\n";

@@ -172,6 +172,39 @@ class Sequences(unittest.TestCase):
         self.fails('line 1 has no pose', *along, never, '--poses-in', 'lidar', '--trajectory', self.write('gap.txt', '', text_of(first[0])))
         self.assertFalse(os.path.exists(never))
 
+    def test_a_trajectory_is_corrected_on_the_way(self):
+        self.make('--scans', '8', '--speed', '20')
+        truth = [[row[:3] + [round(row[3] * 1024) / 1024] for row in pose] for pose in self.poses]
+        drifted = [product(pose, [[1, 0, 0, 0], [0, 1, 0, 0.2 * n], [0, 0, 1, 0]]) for n, pose in enumerate(truth)]
+        half = truth[:4] + [product(truth[3], product(inverse(drifted[3]), pose)) for pose in drifted[4:]]
+        for name, poses in (('truth', truth), ('half', half), ('drifted', drifted)):
+            self.write(f'{name}.txt', *map(text_of, poses))
+        updates = self.write('updates.txt', '# scan, poses', '3 half.txt', '', '7 truth.txt')
+        common = ('--config', 'robot', '--journal', '0.01', '--poses-in', 'lidar')
+        wanted, _ = self.mapped('--poses', os.path.join(self.drive, 'truth.txt'), *common)
+        wrong, _ = self.mapped('--poses', os.path.join(self.drive, 'drifted.txt'), *common)
+        self.assertNotEqual(wrong, wanted)
+        options = ('--poses', os.path.join(self.drive, 'drifted.txt'), '--trajectory-updates', updates, *common)
+        corrected, _ = self.mapped(*options)
+        self.assertTrue(corrected == wanted, 'the map is not that of the true poses')
+        said = self.succeeds('map_sequence', '--sequence', self.drive, *options).stdout
+        self.assertIn('8 scans kept in ', said)
+        self.assertIn('2 corrections made ', said)
+
+    def test_updates_of_a_trajectory_that_cannot_be_read(self):
+        def refused(words, *lines):
+            self.fails(words, 'map_sequence', '--sequence', self.drive, '--poses-in', 'lidar', '--poses',
+                       os.path.join(self.drive, 'poses.txt'), '--trajectory-updates', self.write('updates.txt', *lines))
+        refused("line 2: must be the number of a scan and a file of poses, such as '120 poses_120.txt'",
+                '1 poses.txt', 'two poses.txt')
+        refused('line 1: must be the number of a scan and a file of poses', '3')
+        refused('line 2: scan 1 comes after a later one; sort the lines by scan', '2 poses.txt', '1 poses.txt')
+        refused('none.txt; paths are relative to the list', '1 none.txt')
+        self.fails('give the first poses in it, too, with --poses', 'map_sequence', '--sequence', self.drive,
+                   '--trajectory-updates', self.path('none.txt'))
+        self.fails('--correction-tolerance needs --trajectory-updates', 'map_sequence', '--sequence', self.drive,
+                   '--correction-tolerance', '1')
+
     def test_poses_of_the_other_sensor_are_noticed(self):
         self.write('calib.txt', 'Tr: ' + text_of(TR))
         of_camera = [text_of(product(product(TR, pose), inverse(TR))) for pose in self.poses]
