@@ -4,7 +4,7 @@ if(NOT BKI_MAPPING_LAB AND NOT BKI_MAPPING_DEMO)
 endif()
 bki_mapping_room(simulation FOLDER lab/simulation SOURCES
     city.cpp drive_file.cpp furniture.cpp lidar.cpp oncoming.cpp plots.cpp relief.cpp rooms.cpp scene.cpp
-    shape_index.cpp street.cpp street_along.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp way.cpp
+    shape_index.cpp street.cpp street_along.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp way.cpp weather.cpp
   LINK bki_mapping_sequence bki_mapping_settings)
 target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
 bki_mapping_join(bki_mapping_simulation)
@@ -17,7 +17,7 @@ find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp
     occupants.cpp octomap_mapper.cpp octomap_settings.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp
-    reliability.cpp semantic_evaluation.cpp truth_evaluation.cpp
+    reliability.cpp semantic_evaluation.cpp trace_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation bki_mapping_beams)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})

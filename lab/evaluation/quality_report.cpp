@@ -127,10 +127,31 @@ Json presenceJson(const PresenceQuality& p) {
   return json;
 }
 
+Json tracesJson(const TraceQuality& traces) {
+  Json json = {{"points", traces.points}, {"by_distance", Json::array()}};
+  for (std::size_t bin = 0; bin < TraceQuality::kDistances.size(); ++bin) {
+    const TraceQuality::UpTo& near = traces.up_to[bin];
+    json["by_distance"].push_back({{"up_to", TraceQuality::kDistances[bin]},
+                                   {"points", near.after[0].points},
+                                   {"left_after_1s", near.after[0].fraction()},
+                                   {"left_after_10s", near.after[1].fraction()},
+                                   {"left_at_end", near.at_end.fraction()}});
+  }
+  return json;
+}
+
+/// Adds them to the figures, if there are any.
+void addTraces(const std::optional<TracesOfKinds>& traces, Json& figures) {
+  if (!traces) return;
+  if (traces->particles.points > 0) figures["particles"] = tracesJson(traces->particles);
+  if (traces->images.points > 0) figures["images"] = tracesJson(traces->images);
+}
+
 Json octomapJson(const OctomapQuality& octomap) {
   Json figures = dynamicsJson(octomap.dynamics);
   figures["settings"] = octomap.settings;
   figures["presence"] = presenceJson(octomap.presence);
+  addTraces(octomap.traces, figures);
   figures["occupancy_calibration_error"] = octomap.occupancy.error();
   figures["occupancy_reliability"] = reliabilityJson(octomap.occupancy);
   if (octomap.truth) figures["truth"] = trueSpaceJson(*octomap.truth);
@@ -199,6 +220,25 @@ void addPresence(const PresenceQuality& presence, Table& table) {
   table.text("to clear, once beams come near again: " + delayText(presence.clear));
 }
 
+std::string tracesText(const TraceQuality& traces, const std::string& what) {
+  const auto percent = [](const Traces& part) { return figureText(100.0 * part.fraction()); };
+  std::string text = std::to_string(traces.points) + " of " + std::to_string(traces.all_points) +
+                     " points are of " + what + "; in occupied voxels after 1 s, after 10 s, at the end [%]:";
+  for (std::size_t bin = 0; bin < TraceQuality::kDistances.size(); ++bin) {
+    const TraceQuality::UpTo& near = traces.up_to[bin];
+    text += " within " + numberText(TraceQuality::kDistances[bin]) + " m " + percent(near.after[0]) + ", " +
+            percent(near.after[1]) + ", " + percent(near.at_end) + ";";
+  }
+  text.pop_back();
+  return text;
+}
+
+void addTraces(const std::optional<TracesOfKinds>& traces, Table& table) {
+  if (!traces) return;
+  if (traces->particles.points > 0) table.text(tracesText(traces->particles, "particles"));
+  if (traces->images.points > 0) table.text(tracesText(traces->images, "images in panes"));
+}
+
 void addOctomap(const OctomapQuality& octomap, Table& table) {
   const DynamicsQuality& d = octomap.dynamics;
   const auto percent = [](double fraction) { return figureText(100.0 * fraction); };
@@ -214,6 +254,7 @@ void addOctomap(const OctomapQuality& octomap, Table& table) {
                             : "") +
              "; " + std::to_string(octomap.bytes) + " bytes; median " + figureText(octomap.median.wall) +
              " ms a scan");
+  addTraces(octomap.traces, table);
 }
 
 void addCloud(const CloudQuality& cloud, Table& table) {
@@ -285,6 +326,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
   table.percent("AA", d.accuracy(), "sqrt(SA DA)");
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   addPresence(quality.presence, table);
+  addTraces(quality.traces, table);
   table.percent("mIoU of the map", s.map.meanIou(), "at the labelled points");
   table.percent("mIoU of the input", s.input.meanIou(), "of the labels given to the mapper");
   table.percent("  present: map", s.map_of_present.meanIou(), "without the points of what has moved away");
@@ -359,6 +401,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
                                   {"iou_input", s.input.iou(c.id)}});
   }
   figures["presence"] = presenceJson(quality.presence);
+  addTraces(quality.traces, figures);
   figures["probability_reliability"] = reliabilityJson(s.probability);
   figures["class_probability_reliability"] = reliabilityJson(s.class_probability);
   figures["occupancy_reliability"] = reliabilityJson(quality.occupancy);

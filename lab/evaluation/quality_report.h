@@ -11,6 +11,7 @@
 #include "evaluation/presence_evaluation.h"
 #include "evaluation/scan_timer.h"
 #include "evaluation/semantic_evaluation.h"
+#include "evaluation/trace_evaluation.h"
 #include "evaluation/truth_evaluation.h"
 
 namespace bki_mapping {
@@ -21,6 +22,11 @@ struct JudgedMap {
   DynamicsQuality dynamics;
 };
 
+/// What a simulated drive leaves of what is not there.
+struct TracesOfKinds {
+  TraceQuality particles, images;
+};
+
 /// The same scans in an OctoMap.
 struct OctomapQuality {
   std::string settings;  ///< as given
@@ -28,8 +34,9 @@ struct OctomapQuality {
   PresenceQuality presence;
   Reliability occupancy;
   std::optional<TruthQuality> truth;  ///< what needs no classes
-  ScanTime median;                    ///< of a scan
-  std::size_t bytes = 0;              ///< of memory
+  std::optional<TracesOfKinds> traces;
+  ScanTime median;        ///< of a scan
+  std::size_t bytes = 0;  ///< of memory
 };
 
 struct MapQuality {
@@ -41,6 +48,7 @@ struct MapQuality {
   std::optional<CloudQuality> cloud;  ///< compared with a ground-truth cloud
   std::vector<OctomapQuality> octomaps;
   std::optional<TruthQuality> truth;               ///< only for simulated drives
+  std::optional<TracesOfKinds> traces;             ///< likewise
   std::map<ClassId, std::size_t> voxels_by_class;  ///< occupied ones
   ScanTime median, yardstick;                      ///< of a scan, and of the yardstick on the same scans
   std::size_t bytes = 0;                           ///< of memory

@@ -34,6 +34,8 @@ void forEachSetting(Config& config, Visit&& visit) {
   visit("label_noise", config.lidar.label_noise);
   visit("rate", config.lidar.rate);
   visit("noise_seed", config.lidar.seed);
+  visit("steam", config.weather.steam);
+  visit("glass", config.weather.glass);
 }
 
 }  // namespace
@@ -47,6 +49,8 @@ void writeDriveFile(const std::string& folder, const DriveConfig& config) {
   YAML::Emitter out;
   out.SetDoublePrecision(17);
   out << YAML::BeginMap << YAML::Key << "scene" << YAML::Value << nameOf(config.scene);
+  out << YAML::Key << "weather" << YAML::Value << nameOf(config.weather);
+  out << YAML::Key << "particle_labels" << YAML::Value << nameOf(config.weather.labels);
   forEachSetting(
       config, [&](const char* name, const auto& value) { out << YAML::Key << name << YAML::Value << value; });
   out << YAML::EndMap;
@@ -60,8 +64,13 @@ std::optional<DriveConfig> readDriveFile(const std::string& folder) {
     const YAML::Node file = loadYamlFile(path);
     DriveConfig config;
     config.scene = sceneKindNamed(file["scene"].as<std::string>());
+    if (file["weather"]) setWeather(file["weather"].as<std::string>(), config.weather);
+    if (file["particle_labels"])
+      config.weather.labels = particleLabelsNamed(file["particle_labels"].as<std::string>());
     forEachSetting(config, [&](const char* name, auto& value) {
-      if (name == std::string("height") && !file[name]) return;  // a file of an earlier version
+      for (const char* later : {"height", "steam", "glass"}) {
+        if (name == std::string(later) && !file[name]) return;  // a file of an earlier version
+      }
       value = file[name].template as<std::decay_t<decltype(value)>>();
     });
     if (config.scene == SceneKind::kTrajectory)

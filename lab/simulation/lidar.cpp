@@ -12,18 +12,14 @@
 #include "parallel/thread_pool.h"
 #include "simulation/rooms.h"
 #include "simulation/street_along.h"
+#include "simulation/street_parts.h"
 
 namespace bki_mapping::simulation {
 namespace {
 
-struct Return {
-  double range = 0.0;  ///< [m]; 0: no return
-  std::uint32_t label = 0;
-};
-
 Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const Eigen::Vector3d& origin,
             const Eigen::Vector3d& direction, double time, double max_range) {
-  Return nearest{max_range, 0};
+  Return nearest{max_range, 0, nullptr};
   if (const auto ground = scene.ground.hit(origin, direction, max_range)) {
     nearest.range = *ground;
     nearest.label = scene.ground.labelAt(origin.x() + nearest.range * direction.x(),
@@ -31,7 +27,7 @@ Return cast(const Scene& scene, const std::vector<const Shape*>& shapes, const E
   }
   for (const Shape* shape : shapes) {
     const auto range = shape->hit(origin, direction, time);
-    if (range && *range < nearest.range) nearest = {*range, shape->label};
+    if (range && *range < nearest.range) nearest = {*range, shape->label, shape};
   }
   return nearest.range < max_range ? nearest : Return{};
 }
@@ -60,6 +56,36 @@ std::vector<const Shape*> shapesInFan(const Scene& scene, const Eigen::Vector3d&
     if (within || std::isinf(spread)) shapes.push_back(&shape);
   }
   return shapes;
+}
+
+/// The normal of the wall that a point is on, if there is a pane of glass; 0 if there is none. Panes are 1.4
+/// m wide and high, and 3 m apart.
+Eigen::Vector3d paneNormal(const Shape& house, const Eigen::Vector3d& point, double time) {
+  const Eigen::Vector3d from_centre = point - house.centreAt(time);
+  const Eigen::Array3d faces = from_centre.array().abs() / house.half.array();
+  const int axis = faces.x() > faces.y() ? 0 : 1;
+  const auto isInPane = [](double at) {
+    const double within = at - 3.0 * std::floor(at / 3.0);
+    return within > 0.8 && within < 2.2;
+  };
+  if (faces.z() > faces[axis] || !isInPane(point.z()) || !isInPane(point[1 - axis])) return {0.0, 0.0, 0.0};
+  return std::copysign(1.0, from_centre[axis]) * Eigen::Vector3d::Unit(axis);
+}
+
+/// What a beam that meets a pane sees: the pane, nothing in the dark room behind it, or what the pane
+/// mirrors. That appears in the direction of the beam, beyond the wall.
+Return seenInPane(const Scene& scene, const Return& wall, const Eigen::Vector3d& origin,
+                  const Eigen::Vector3d& direction, double time, double max_range, BeamDice& dice) {
+  const Eigen::Vector3d at = origin + wall.range * direction, normal = paneNormal(*wall.shape, at, time);
+  if (normal.isZero()) return wall;
+  const double kind = dice.next();
+  if (kind < 0.3) return wall;
+  if (kind < 0.7) return {};
+  const Eigen::Vector3d away = direction - 2.0 * normal.dot(direction) * normal;
+  const double left = max_range - wall.range;
+  const Return image = cast(scene, shapesInFan(scene, at, away, time, left), at, away, time, left);
+  if (image.range == 0.0) return {};
+  return {wall.range + image.range, kImage | image.label, image.shape};
 }
 
 /// The label of a shape chosen at random. @param pick uniform on [0, 1).
@@ -165,7 +191,8 @@ LidarConfig lidarNamed(const std::string& name) {
 }
 
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
-                   double time, std::uint64_t scan) {
+                   double time, std::uint64_t scan, const WeatherConfig& conditions) {
+  const Weather weather(conditions, lidar.max_range);
   const Eigen::Vector3d origin = T_world_sensor.translation();
   const auto beams = static_cast<std::size_t>(lidar.beams), columns = static_cast<std::size_t>(lidar.columns);
   const double step = lidar.beams > 1 ? (lidar.highest - lidar.lowest) / (lidar.beams - 1) : 0.0;
@@ -185,7 +212,19 @@ SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Is
     const double spread = std::max(spreadOf(middle, world(0)), spreadOf(middle, world(beams - 1)));
     const auto shapes = shapesInFan(scene, origin, middle, time, lidar.max_range, spread);
     for (std::size_t beam = 0; beam < beams; ++beam) {
-      returns[column * beams + beam] = cast(scene, shapes, origin, world(beam), time, lidar.max_range);
+      const Eigen::Vector3d direction = world(beam);
+      const std::size_t r = column * beams + beam;
+      BeamDice dice(lidar.seed, scan, r);
+      Return seen = cast(scene, shapes, origin, direction, time, lidar.max_range);
+      if (conditions.glass && seen.label == kBuilding && seen.shape)
+        seen = seenInPane(scene, seen, origin, direction, time, lidar.max_range, dice);
+      seen = weather.seenThrough(seen, -direction.z(), dice);
+      if (conditions.steam) {
+        const double end = seen.range > 0.0 ? seen.range : lidar.max_range;
+        const double range = findSteam(shapes, origin, direction, time, end, dice);
+        if (range > 0.0) seen = weather.particleAt(range, dice);
+      }
+      returns[r] = seen;
     }
   });
   SequenceFrame frame;
@@ -229,8 +268,8 @@ SequenceFrame Drive::frame(std::size_t i) const {
     const Eigen::Vector2d at = T_world_sensor(i).translation().head<2>();
     near = {scene_.ground, shapesNear(scene_.shapes, *index_, at, config_.lidar.max_range, timeOf(i))};
   }
-  SequenceFrame frame =
-      scan(index_ ? std::as_const(near) : scene_, config_.lidar, T_world_sensor(i), timeOf(i), i);
+  SequenceFrame frame = scan(index_ ? std::as_const(near) : scene_, config_.lidar, T_world_sensor(i),
+                             timeOf(i), i, config_.weather);
   frame.T_map_sensor = T_world_sensor(0).inverse() * T_world_sensor(i);
   frame.stamp = Sequence::kFirstStamp + static_cast<std::uint64_t>(std::llround(timeOf(i) * 1e9));
   return frame;

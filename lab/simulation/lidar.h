@@ -4,6 +4,7 @@
 #include "bki_mapping/sequence/sequence.h"
 #include "simulation/scene.h"
 #include "simulation/shape_index.h"
+#include "simulation/weather.h"
 
 namespace bki_mapping::simulation {
 
@@ -26,9 +27,10 @@ LidarConfig lidarNamed(const std::string& name);
 
 /// Simulates one revolution without motion distortion: all beams are taken at the same time and pose.
 /// @param time [s]. @param scan index of the scan, which seeds its noise.
-/// @return points in the sensor frame with raw SemanticKITTI labels; the caller sets pose and stamp.
+/// @return points in the sensor frame with raw SemanticKITTI labels; the caller sets pose and stamp. Labels
+/// of what is not there say so (isParticle, isImage).
 SequenceFrame scan(const Scene& scene, const LidarConfig& lidar, const Eigen::Isometry3d& T_world_sensor,
-                   double time, std::uint64_t scan);
+                   double time, std::uint64_t scan, const WeatherConfig& conditions = {});
 
 /// The settings that determine a drive: equal settings give equal scans.
 struct DriveConfig {
@@ -41,6 +43,7 @@ struct DriveConfig {
   /// Poses of the sensor in the world frame, whose z axis points up, for SceneKind::kTrajectory; at least
   /// `scans`.
   std::vector<Eigen::Isometry3d> trajectory = {};
+  WeatherConfig weather = {};
 
   double duration() const { return static_cast<double>(scans) / lidar.rate; }  ///< [s]
 };

@@ -6,6 +6,7 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "core/float_origin.h"
 #include "sequence/pcd_file.h"
+#include "simulation/weather.h"
 
 namespace bki_mapping {
 namespace {
@@ -36,6 +37,7 @@ void TruthCloud::add(const Scan& scan) {
     if (!std::isfinite(range)) ++not_finite;
     if (!(range < kMostRange)) continue;
     const std::uint32_t label = scan.labels[i];
+    if (simulation::isNothing(label)) continue;
     const bool own_car = range < kOwnCar && without_class.contains(label);
     points.push_back(relative(scan, i));
     moving.push_back(own_car || moves.contains(label));

@@ -37,7 +37,8 @@ struct TruthCloud {
 
   /// Adds a scan with raw labels of SemanticKITTI, as the benchmark makes its clouds from them: 252 to 259
   /// move, and so do points without a class (0, 1) within 3 m, which are of the car itself. Points 50 m away
-  /// and farther are left out, because their labels are not reliable.
+  /// and farther are left out, because their labels are not reliable,
+  /// and so is what simulated weather and panes add.
   void add(const Scan& scan);
 
   /// Sets the origin of the points if it is not yet set. @param near a place in the cloud [m].

@@ -80,13 +80,30 @@ std::string voxelRow(const GridGeometry& geometry, const VoxelIndex& voxel, cons
   return numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
 }
 
+/// Follows what is not there on a simulated drive.
+struct TracesEvaluation {
+  explicit TracesEvaluation(const GridGeometry& geometry)
+      : particles(geometry, simulation::isParticle, simulation::isNothing),
+        images(geometry, simulation::isImage, simulation::isNothing) {}
+  void add(const Scan& scan, Occupants& map) {
+    particles.add(scan, map);
+    images.add(scan, map);
+  }
+  TracesOfKinds quality(Occupants& map) const { return {particles.quality(map), images.quality(map)}; }
+  TraceEvaluation particles, images;
+};
+
 /// An OctoMap of the same scans, and what only it has.
 struct OctomapRun {
   OctomapRun(const std::string& given, const GridGeometry& geometry, const KittiLabels& moving)
-      : settings(given), mapper(geometry.resolution(), octomapSettings(given)), presence(geometry, moving) {}
+      : settings(given),
+        mapper(geometry.resolution(), octomapSettings(given)),
+        presence(geometry, moving),
+        traces(geometry) {}
   std::string settings;  ///< as given
   OctomapMapper mapper;
   PresenceEvaluation presence;
+  TracesEvaluation traces;
   ScanTimes times;
 };
 
@@ -97,6 +114,7 @@ struct Evaluation {
   SemanticEvaluation semantics;
   OccupancyEvaluation occupancy;
   std::optional<TruthEvaluation> truth;
+  std::optional<TracesEvaluation> traces;  ///< of a simulated drive
   std::optional<CloudEvaluation> cloud;
   std::list<OctomapRun> octomaps;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
@@ -153,6 +171,7 @@ struct Evaluation {
     quality.dynamics = dynamics.compare(map, rules, taken());
     MapOccupants occupants(map, rules);
     quality.presence = presence.quality(occupants, takenFor());
+    if (traces) quality.traces = traces->quality(occupants);
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
     quality.semantics = semantics.compare(map, rules, still_there);
@@ -163,8 +182,9 @@ struct Evaluation {
       if (truth) space = truth->compare(octomap.mapper, end);
       quality.octomaps.push_back({octomap.settings, dynamics.compare(octomap.mapper, taken()),
                                   octomap.presence.quality(octomap.mapper, takenFor()),
-                                  occupancy.compare(octomap.mapper, left), space, octomap.times.median(),
-                                  octomap.mapper.bytes()});
+                                  occupancy.compare(octomap.mapper, left), space, std::nullopt,
+                                  octomap.times.median(), octomap.mapper.bytes()});
+      if (traces) quality.octomaps.back().traces = octomap.traces.quality(octomap.mapper);
     }
     quality.bytes = map.bytes();
     if (cloud) quality.cloud = cloud->compare(map, rules);
@@ -320,6 +340,7 @@ int evaluate(const po::variables_map& given) {
                         SemanticEvaluation(geometry, moving),
                         OccupancyEvaluation(geometry, moving),
                         std::nullopt,
+                        std::nullopt,
                         cloudEvaluation(given, sequence, mapper.config()),
                         {}};
   if (given.count("octomap")) {
@@ -328,6 +349,7 @@ int evaluate(const po::variables_map& given) {
   }
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
+  if (config) evaluation.traces.emplace(geometry);
   // A map that drifts is in no frame of the true scene.
   if (config && !given.count("pose-drift")) {
     drive.emplace(*config);
@@ -353,13 +375,22 @@ int evaluate(const po::variables_map& given) {
     const ScanStats stats = mapper.integrate(input);
     times.add({stats.totalMs(), timer.elapsed().processor});
     ++done;
+    if (evaluation.traces) {
+      MapOccupants occupants(mapper.map(), mapper.rules());
+      evaluation.traces->add(scan, occupants);
+    }
     for (OctomapRun& octomap : evaluation.octomaps) {
       octomap.times.add(octomap.mapper.integrate(input));
+      if (evaluation.traces) octomap.traces.add(scan, octomap.mapper);
+    }
+    std::vector<std::uint32_t> predicted = input.labels;
+    if (evaluation.traces) removeNothing(simulation::isNothing, scan, predicted);  // the rest is there
+    for (OctomapRun& octomap : evaluation.octomaps) {
       if (sequence.labelled()) octomap.presence.add(scan, mapper.classes(), octomap.mapper);
     }
     tools::warn(watch.report(mapper, input, stats.counts));
     if (sequence.labelled()) {
-      evaluation.add(scan, input.labels, mapper.classes());
+      evaluation.add(scan, predicted, mapper.classes());
       MapOccupants occupants(mapper.map(), mapper.rules());
       evaluation.presence.add(scan, mapper.classes(), occupants);
     } else {

@@ -45,6 +45,14 @@ po::options_description options() {
       "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1, in rooms 0.5")(
       "height", po::value<double>()->value_name("M"),
       "height of the sensor above the ground [m]; default: 1.73, in rooms 0.35")(
+      "weather", tools::textOption("KIND,RATE")->default_value("dry"),
+      "dry; rain or snow and its water [mm/h], such as rain,10; fog or dust and how far one sees [m], such "
+      "as "
+      "fog,50")("particle-labels", tools::textOption("NAME")->default_value("vegetation"),
+                "label of drops, flakes, fog, dust and steam: vegetation, car, person, unlabelled, mixed, or "
+                "airborne, a class of their own (raw label 110)")("steam", po::bool_switch(),
+                                                                  "cars that move leave steam behind")(
+      "glass", po::bool_switch(), "houses have windows, which beams pass or are mirrored by")(
       "layout", tools::textOption("NAME")->default_value("semantic_kitti"),
       "semantic_kitti, or dynamic_map: pcd/ and gt_cloud.pcd, as the DynamicMap benchmark has them")(
       "seed", tools::countOption("--seed", 0)->value_name("N")->default_value(1),
@@ -84,6 +92,10 @@ simulation::DriveConfig driveConfig(const po::variables_map& given, const LidarP
   drive.lidar.range_noise = given["range-noise"].as<double>();
   drive.lidar.label_noise = given["label-noise"].as<double>();
   drive.lidar.seed = drive.seed;
+  simulation::setWeather(given["weather"].as<std::string>(), drive.weather);
+  drive.weather.labels = simulation::particleLabelsNamed(given["particle-labels"].as<std::string>());
+  drive.weather.steam = given["steam"].as<bool>();
+  drive.weather.glass = given["glass"].as<bool>();
   return drive;
 }
 
