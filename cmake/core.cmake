@@ -63,7 +63,7 @@ bki_mapping_core_room(query SOURCES
     frontiers.cpp nearest_obstacle.cpp points.cpp rays.cpp region_frontiers.cpp section.cpp shapes.cpp state_map.cpp
   LINK bki_mapping_rules)
 bki_mapping_core_room(points SOURCES
-    cell_merger.cpp downsample.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
+    cell_merger.cpp downsample.cpp isolated_points.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 bki_mapping_core_room(beams SOURCES
     beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp occlusion.cpp

@@ -31,7 +31,7 @@ std::vector<std::string> flagsOf(const SemanticClass& c) {
   std::vector<std::string> flags;
   for (const auto& [set, name] :
        {std::pair(c.unlabelled, "unlabelled"), std::pair(c.dynamic, "dynamic"), std::pair(c.living, "living"),
-        std::pair(c.ground, "ground"), std::pair(c.ignored, "ignored")}) {
+        std::pair(c.ground, "ground"), std::pair(c.ignored, "ignored"), std::pair(c.airborne, "airborne")}) {
     if (set) flags.emplace_back(name);
   }
   return flags;

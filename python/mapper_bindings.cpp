@@ -274,9 +274,12 @@ void addStats(py::module& m) {
   count("unknown_label", &C::unknown_label,
         "Points dropped because the class table does not list their label.");
   count("unlabelled", &C::unlabelled, "Points of the unlabelled class that were dropped.");
+  count("airborne", &C::airborne, "Points of classes with the flag airborne.");
+  count("isolated", &C::isolated, "Points taken for drops, flakes, fog or dust: rules/particles_within.");
   count("no_direction", &C::no_direction, "Beams without a return whose direction is not known.");
   count("no_returns", &C::no_returns, "Beams without a return.");
   stats.def_readonly("hits", &S::hits, "Hits after down-sampling.")
+      .def_readonly("half_range", &S::half_range, "Range within which half of the used points are [m].")
       .def_readonly("free_count", &S::free_count, "Free samples after down-sampling, or beams.")
       .def_readonly("blocks", &S::blocks, "Blocks that the scan touched.")
       .def_readonly("saturated", &S::saturated,

@@ -95,14 +95,28 @@ bool areShares(const ClassShare* begin, const ClassShare* end) {
   return std::all_of(begin, end, [](const ClassShare& s) { return isProbability(s.share); });
 }
 
+/// The range within which half of the points are [m]. @param points number of them; 0 gives 0.
+double medianOf(const std::vector<RangeHistogram>& chunks, std::size_t points) {
+  if (points == 0) return 0.0;
+  const double half = 0.5 * static_cast<double>(points);
+  double before = 0.0;
+  for (std::size_t metre = 0; metre < RangeHistogram().size(); ++metre) {
+    double here = 0.0;
+    for (const RangeHistogram& chunk : chunks) here += chunk[metre];
+    if (before + here >= half) return static_cast<double>(metre) + (half - before) / here;
+    before += here;
+  }
+  return static_cast<double>(RangeHistogram().size());
+}
+
 }  // namespace
 
 PointCounts& PointCounts::operator+=(const PointCounts& other) {
   for (const auto count :
        {&PointCounts::points, &PointCounts::used, &PointCounts::not_finite, &PointCounts::at_sensor,
         &PointCounts::too_near, &PointCounts::beyond_max, &PointCounts::outside_map,
-        &PointCounts::unknown_label, &PointCounts::unlabelled, &PointCounts::no_direction,
-        &PointCounts::no_returns, &PointCounts::labels_not_in_table}) {
+        &PointCounts::unknown_label, &PointCounts::unlabelled, &PointCounts::airborne, &PointCounts::isolated,
+        &PointCounts::no_direction, &PointCounts::no_returns, &PointCounts::labels_not_in_table}) {
     this->*count += other.*count;
   }
   return *this;
@@ -114,6 +128,11 @@ void ScanPreprocessor::sortPoints(const ScanView& scan, const ClassTable& classe
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const RangeLimits limits(sensor, scan.no_returns_at_max_range);
   ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
+  ClassSet airborne, ground;
+  for (const SemanticClass& c : classes.classes()) {
+    airborne[c.id] = c.airborne;
+    ground[c.id] = c.ground;
+  }
   PointCounts counts;
   counts.points = last - first;
   for (std::size_t i = first; i < last; ++i) {
@@ -129,7 +148,15 @@ void ScanPreprocessor::sortPoints(const ScanView& scan, const ClassTable& classe
     } else if (scan.soft && !areShares(scan.soft->begin(i), scan.soft->end(i))) {
       ++counts.not_finite;
     } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
+      const bool is_alone = isolated_ && (*isolated_)[i];
+      const bool is_airborne = airborne[*id];
+      if (is_airborne || (is_alone && !ground[*id])) {
+        ++(is_airborne ? counts.airborne : counts.isolated);
+        into.cut.add(point, kFreeClass);
+        continue;
+      }
       ++counts.used;
+      ++into.ranges[std::min(static_cast<std::size_t>(range), into.ranges.size() - 1)];
       into.hits.add(point, *id);
       if (scan.soft) into.used.push_back({static_cast<std::uint32_t>(i), *id});
     }
@@ -171,6 +198,9 @@ const PreprocessedScan& ScanPreprocessor::process(const ScanView& scan, const Cl
                                 " points but soft labels for " + std::to_string(scan.soft->size()) +
                                 "; give each point its soft labels");
   }
+  const bool seeks = config_.rules.enabled && config_.rules.particles_within > 0.0;
+  isolated_ = seeks ? &isolation_.find(scan.points, static_cast<float>(config_.rules.particles_within), pool)
+                    : nullptr;
   const Chunks chunks(scan.points.size());
   if (used_.size() < chunks.count()) used_.resize(chunks.count());
   for (auto& used : used_) used.clear();
@@ -179,14 +209,16 @@ const PreprocessedScan& ScanPreprocessor::process(const ScanView& scan, const Cl
   hits_.start(scan.origin, chunks.count(), pool, ordered);
   cut_.start(scan.origin, chunks.count() + 1, pool, true);
   counts_.assign(chunks.count(), {});
+  ranges_.assign(chunks.count(), {});
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
     sortPoints(scan, classes, chunks.begin(c), chunks.end(c),
-               {hits_.open(c, worker), cut_.open(c, worker), used_[c], counts_[c]});
+               {hits_.open(c, worker), cut_.open(c, worker), used_[c], counts_[c], ranges_[c]});
     hits_.close(c, worker);
     cut_.close(c, worker);
   });
   processed_.counts = {};
   for (const PointCounts& counts : counts_) processed_.counts += counts;
+  processed_.half_range = medianOf(ranges_, processed_.counts.used);
   addNoReturns(scan, cut_.open(no_returns, 0));
   cut_.close(no_returns, 0);
   hits_.finish(pool);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include "beams/beams.h"
 #include "bki_mapping/core/class_table.h"
@@ -10,6 +11,7 @@
 #include "bki_mapping/mapping/scan_stats.h"
 #include "mapping/soft_merge.h"
 #include "points/downsample.h"
+#include "points/isolated_points.h"
 
 namespace bki_mapping {
 
@@ -22,7 +24,11 @@ struct PreprocessedScan {
   std::size_t hit_count = 0;
   Beams beams;  ///< one to each hit, then those cut at max_range
   PointCounts counts;
+  double half_range = 0.0;  ///< ScanStats::half_range
 };
+
+/// Number of points by their range, in steps of a metre; the last one is all that are farther away.
+using RangeHistogram = std::array<std::uint32_t, 300>;
 
 /// Filters and down-samples scans. Keeps its memory from scan to scan.
 class ScanPreprocessor {
@@ -50,6 +56,7 @@ class ScanPreprocessor {
     Downsampler::Input& cut;
     std::vector<UsedPoint>& used;
     PointCounts& counts;
+    RangeHistogram& ranges;
   };
   /// Sorts the points `first` to `last` - 1 into hits, cut beams and counts.
   void sortPoints(const ScanView& scan, const ClassTable& classes, std::size_t first, std::size_t last,
@@ -67,6 +74,9 @@ class ScanPreprocessor {
   GridGeometry cells_;                        ///< the finer of the voxels and the down-sampling cells
   std::vector<std::vector<UsedPoint>> used_;  ///< of each chunk, for soft labels
   std::vector<PointCounts> counts_;           ///< of each chunk
+  IsolatedPoints isolation_;
+  const std::vector<std::uint8_t>* isolated_ = nullptr;  ///< of the present scan, if they are sought
+  std::vector<RangeHistogram> ranges_;                   ///< of each chunk
   Downsampler hits_, cut_;
   std::vector<MergedPoints> soft_;  ///< the hits by class, if some have several
   PointGroups hit_groups_;

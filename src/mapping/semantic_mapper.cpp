@@ -296,6 +296,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
       p.preprocessor.process(scan, *classes_, *pool_, p.free_space->needsBeams() || occludes);
   stats.counts = processed.counts;
   stats.hits = processed.hit_count;
+  stats.half_range = processed.half_range;
   stats.observe_ms = watch.lap();
 
   p.hits.setPoints(scan.origin, p.preprocessor.hitGroups(), *pool_);

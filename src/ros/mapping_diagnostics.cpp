@@ -1,7 +1,10 @@
 #include "ros/mapping_diagnostics.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "bki_mapping/core/named_parameter.h"
+#include "core/percent.h"
 #include "ros/load_advice.h"
 #include "ros/point_account.h"
 
@@ -44,6 +47,13 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
   if (const std::string advice = loadAdvice(config, now.integration_median_ms, now.received_hz);
       !advice.empty()) {
     warn(advice);
+  }
+  constexpr double kMany = 0.03;  // in dry weather, at most a hundredth are isolated
+  if (now.weather_particles > kMany) {
+    warn(percentText(now.weather_particles) +
+         " of the returns are rain, snow, fog or dust, and half of the "
+         "others are within " +
+         numberText(std::round(now.weather_half_range)) + " m; slow down");
   }
   // A map may be empty at one report because it was reset.
   if (now.blocks == 0 && before.blocks == 0 && before.integrated > 0 &&
@@ -96,6 +106,9 @@ void MappingDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& out) 
   out.add("scans to be moved", now_.correction_to_go);
   out.add("scans that could not be moved", now_.correction_failed);
   out.add("last refused corrected_path", now_.last_correction_refusal);
+  out.add("weather: particles", now_.weather_particles);
+  out.add("weather: beams without a return", now_.weather_no_returns);
+  out.add("weather: half of the returns within [m]", now_.weather_half_range);
   out.add("blocks", now_.blocks);
   out.add("map [bytes]", now_.map_bytes);
   out.add("map file", now_.map_file_fault);

@@ -76,6 +76,13 @@ std::string sentenceOf(const PointKind& kind, const PointAccount& account, const
   if (count == &PointCounts::unlabelled) {
     return "are of the unlabelled class; check the labels, or set unlabelled_points to occupied";
   }
+  if (count == &PointCounts::airborne) {
+    return "are of classes with the flag airborne; wait for better weather, or check the labels";
+  }
+  if (count == &PointCounts::isolated) {
+    return "are hits near which few other beams end, as those of rain and snow; wait for better weather, or "
+           "set rules/particles_within to 0 if the sensor is no lidar with rows";
+  }
   return "are too far from the map's origin; check that clouds are in metres, and tf";
 }
 
@@ -93,6 +100,8 @@ const std::vector<PointKind>& pointKinds() {
       {"outside the map", &C::outside_map, &S::points_outside_map, false},
       {"unknown label", &C::unknown_label, &S::points_unknown_label, false},
       {"unlabelled", &C::unlabelled, &S::points_unlabelled, true},
+      {"airborne", &C::airborne, &S::points_airborne, true},
+      {"isolated", &C::isolated, &S::points_isolated, true},
   };
   return kinds;
 }

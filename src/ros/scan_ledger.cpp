@@ -4,6 +4,14 @@
 #include "ros/point_account.h"
 
 namespace bki_mapping::ros_interface {
+namespace {
+
+/// 0 of nothing.
+float fractionOf(double part, double all) {
+  return all > 0.0 ? static_cast<float>(part / all) : 0.0f;
+}
+
+}  // namespace
 
 const std::vector<DropKind>& dropKinds() {
   using S = MappingStatus;
@@ -41,6 +49,12 @@ void ScanLedger::integrated(const std_msgs::Header& header, const ScanStats& sta
   status_.points_used += stats.counts.used;
   status_.points_no_returns += stats.counts.no_returns;
   for (const PointKind& kind : pointKinds()) status_.*kind.in_status += stats.counts.*kind.in_scan;
+  const PointCounts& counts = stats.counts;
+  const auto particles = static_cast<double>(counts.airborne + counts.isolated);
+  const auto none = static_cast<double>(counts.no_returns + counts.no_direction);
+  status_.weather_particles = fractionOf(particles, particles + static_cast<double>(counts.used));
+  status_.weather_no_returns = fractionOf(none, static_cast<double>(counts.points));
+  status_.weather_half_range = static_cast<float>(stats.half_range);
   status_.labels_not_in_table += stats.counts.labels_not_in_table;
   status_.integration_ms = static_cast<float>(stats.totalMs());
   integration_.add(stats.totalMs());

@@ -44,10 +44,24 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           "The same for classes with the flag living: people, riders, animals. They take a few scans "
           "to leave a voxel, and stop more often than they stay."),
       realParameter(
+          "fixed_stands_after", &C::fixed_stands_after, NumberRange::atLeast(1.0).upTo(1000.0), "scans",
+          Changes::kWhileMapping,
+          "The same for classes that cannot move, but for ground; before that, four or five scans that cross "
+          "the voxel clear it. Set it to 2 in snow and fog, of which some hits look like a thing; it costs "
+          "thin things that only one scan hits."),
+      realParameter(
           "together", &C::together, NumberRange::atLeast(0.0).upTo(10.0), "m", Changes::kWhileMapping,
           "How far away the voxels of what can be parked decide together whether it is still there. "
           "It is rounded to whole voxels, at least one and at most seven. Set it to a part of the "
           "things that come and go; 0 lets each voxel decide by itself."),
+      realParameter(
+          "particles_within", &C::particles_within, NumberRange::atLeast(0.0).upTo(30.0), "m",
+          Changes::kWhileMapping,
+          "Up to which distance from the sensor a hit near which few other beams end is a raindrop, a "
+          "snowflake, fog or dust: it occupies nothing, and its beam clears up to it. Hits of ground are "
+          "none. Set it to 15 in rain and snow, more in fog; a scan then takes up to a third more time. 0 "
+          "lets "
+          "all hits count."),
       truthParameter(
           "latest", &C::latest, Changes::kAtStart,
           "Whether the map knows time: a voxel whose latest look was a hit is occupied, one that has "

@@ -19,6 +19,9 @@ float finite(double gain) {
 constexpr double kGainOfPassing = 3000.0;
 /// Classes that cannot move keep their voxels, however many beams graze them; only looks clear them (12c).
 constexpr double kGainOfFixed = 0.0;
+/// A scan may take a flake for a wall: until enough scans have hit the voxel, four or five that cross it
+/// clear it.
+constexpr double kGainOfUnconfirmed = 3.0;
 /// A fixed class remains where it was hit in one scan of about a hundred (12a).
 constexpr double kRemaining = 0.1;
 /// Of kept to cleared evidence (12b).
@@ -62,6 +65,9 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
                            evidenceToStand(scans, config, resolution));
     } else if (!c.unlabelled) {
       *this = withFreeGain(c.id, kGainOfFixed);
+      const double confirmed = config.fixed_stands_after;  // half a hit may be missing
+      if (confirmed > 1.0 && !c.ground)
+        *this = withConfirmation(c.id, kGainOfUnconfirmed, (confirmed - 0.5) * config.hit());
     }
   }
 }
@@ -69,7 +75,14 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
 StateRules StateRules::withFreeGain(ClassId id, double gain, double stands_after) const {
   StateRules rules = *this;
   rules.free_gains_[id] = finite(gain);
+  rules.standing_gains_[id] = std::min(finite(gain), 1.0f);
   rules.stands_after_[id] = static_cast<float>(stands_after);
+  return rules;
+}
+
+StateRules StateRules::withConfirmation(ClassId id, double gain, double confirmed) const {
+  StateRules rules = withFreeGain(id, gain, confirmed);
+  rules.standing_gains_[id] = 0.0f;
   return rules;
 }
 
@@ -104,8 +117,8 @@ StateRules StateRules::withLatest(bool decides) const {
 }
 
 bool StateRules::decidesAs(const StateRules& other) const {
-  return free_gains_ == other.free_gains_ && stands_after_ == other.stands_after_ &&
-         hit_of_scan_ == other.hit_of_scan_ &&
+  return free_gains_ == other.free_gains_ && standing_gains_ == other.standing_gains_ &&
+         stands_after_ == other.stands_after_ && hit_of_scan_ == other.hit_of_scan_ &&
          (neighbourhood_ratio_ == 0.0f ||
           (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_ &&
            neighbourhood_reach_ == other.neighbourhood_reach_)) &&

@@ -19,10 +19,10 @@ struct BlockPlanes {
   struct Plane {
     const EvidenceUnits* units;
     ClassId id;
-    float gain;          ///< StateRules::freeGain of a voxel without hits
-    float stands_after;  ///< StateRules::standsAfter
-    bool fixed;          ///< whether the class cannot move, and so may remain by (12a)
-    bool asks;           ///< whether voxels whose likeliest class this is ask their neighbourhood (12b)
+    float gain;                         ///< StateRules::freeGain of a voxel without hits
+    float standing_gain, stands_after;  ///< StateRules::standingGain, standsAfter
+    bool fixed;                         ///< whether the class cannot move, and so may remain by (12a)
+    bool asks;  ///< whether voxels whose likeliest class this is ask their neighbourhood (12b)
   };
 
   const SemanticMap* map;

@@ -79,7 +79,7 @@ template <bool kPosterior>
   for (std::size_t p = 0; p < planes.count; ++p) {
     const BlockPlanes::Plane& plane = planes.planes[p];
     const Mask stands = hits >= plane.stands_after;
-    const FloatVec gain = IfThenElse(stands, Set(std::min(plane.gain, 1.0f)), Set(plane.gain));
+    const FloatVec gain = IfThenElse(stands, Set(plane.standing_gain), Set(plane.gain));
     found.gain = IfThenElse(found.label == plane.id, gain, found.gain);
   }
 }

@@ -128,8 +128,13 @@ BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Bloc
       continue;
     }
     const float gain = rules.freeGain(id, -1.0f);
-    planes.planes[planes.count++] = {
-        block.plane(p), id, gain, rules.standsAfter(id), rules.isFixed(id), rules.asksNeighbourhood(id)};
+    planes.planes[planes.count++] = {block.plane(p),
+                                     id,
+                                     gain,
+                                     rules.standingGain(id),
+                                     rules.standsAfter(id),
+                                     rules.isFixed(id),
+                                     rules.asksNeighbourhood(id)};
   }
   return planes;
 }

@@ -33,9 +33,11 @@ void setFlag(const std::string& file, const std::string& flag, SemanticClass& c)
     c.ground = true;
   } else if (flag == "ignored") {
     c.ignored = true;
+  } else if (flag == "airborne") {
+    c.airborne = true;
   } else {
     fail(file, "flag '" + flag + "' is unknown" +
-                   nearestWord(flag, {"unlabelled", "dynamic", "living", "ground", "ignored"}));
+                   nearestWord(flag, {"unlabelled", "dynamic", "living", "ground", "ignored", "airborne"}));
   }
 }
 
@@ -107,6 +109,7 @@ SemanticClass parseClass(const std::string& file, const YAML::Node& node, std::s
   }
   for (const YAML::Node& flag : flags) setFlag(file, flag.as<std::string>(), c);
   if (c.ground && c.ignored) fail(file, "class '" + c.name + "' is flagged both ground and ignored");
+  if (c.ground && c.airborne) fail(file, "class '" + c.name + "' is flagged both ground and airborne");
   if (node["free_gain"]) {
     c.free_gain = node["free_gain"].as<double>();
     if (!(*c.free_gain > 0.0 && std::isfinite(*c.free_gain)))

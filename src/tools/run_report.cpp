@@ -54,6 +54,8 @@ Json scanJson(const ScanReport& scan) {
             {"outside_map", c.outside_map},
             {"unknown_label", c.unknown_label},
             {"unlabelled", c.unlabelled},
+            {"airborne", c.airborne},
+            {"isolated", c.isolated},
             {"no_direction", c.no_direction}}},
           {"labels_not_in_table", c.labels_not_in_table},
           {"hits", s.hits},
@@ -88,6 +90,7 @@ std::string leftOutText(const std::vector<ScanReport>& scans, const MapperConfig
       {sum.outside_map, "outside of the map"},
       {sum.unknown_label, "with labels that the class table does not list (see --classes and label_values)"},
       {sum.unlabelled, "unlabelled"},
+      {sum.airborne, "of airborne classes"},
       {sum.no_direction, "without a direction"}};
   std::string text;
   for (const auto& [count, reason] : reasons) {

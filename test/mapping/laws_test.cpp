@@ -489,6 +489,14 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   const auto hits = [&](double scans) { return static_cast<float>(scans * config.rules.hit()); };
   EXPECT_EQ(rulesOf().freeGain(0, 0.0f), 1.0f) << "what is unlabelled";
   EXPECT_EQ(rulesOf().freeGain(1, hits(0.1)), 0.0f) << "what cannot move stays";
+  config.rules.fixed_stands_after = 2.0;
+  EXPECT_EQ(rulesOf().freeGain(1, hits(1.0)), 3.0f) << "once two scans have hit it";
+  EXPECT_EQ(rulesOf().freeGain(1, hits(2.0)), 0.0f);
+  EXPECT_FALSE(rulesOf().canLeave(1));
+  classes[1].ground = true;
+  EXPECT_EQ(rulesOf().freeGain(1, hits(1.0)), 0.0f) << "ground at once";
+  classes[1].ground = false;
+  config.rules.fixed_stands_after = 1.0;
   EXPECT_GT(rulesOf().freeGain(2, hits(3.0)), 1000.0f) << "it may pass";
   EXPECT_EQ(rulesOf().freeGain(2, hits(4.0)), 1.0f) << "it stands";
   EXPECT_EQ(rulesOf().freeGain(kFreeClass, 5.0f), 1.0f);

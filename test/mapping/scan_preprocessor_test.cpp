@@ -57,6 +57,67 @@ TEST(PreprocessedScan, CountsEveryReason) {
   EXPECT_NEAR(processed.beams.ends[1].x(), 50.0f, 1e-4f);
 }
 
+TEST(PreprocessedScan, PointsOfAirborneClassesOnlyClear) {
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();
+  classes[2].airborne = true;
+  const std::uint32_t snow = classes[2].raw.front(), other = classes[1].raw.front();
+  ThreadPool pool(2);
+  ScanPreprocessor preprocessor(plainConfig());
+  const PreprocessedScan& processed =
+      preprocessor.process(scanOf({{2, 0, 0}, {3, 0, 0}}, {snow, other}), ClassTable("snow", classes), pool);
+  EXPECT_EQ(processed.counts.airborne, 1u);
+  EXPECT_EQ(processed.counts.used, 1u);
+  EXPECT_EQ(processed.hit_count, 1u);
+  ASSERT_EQ(processed.beams.ends.size(), 2u) << "both beams clear";
+  EXPECT_EQ(processed.beams.ends[1], Eigen::Vector3f(2, 0, 0)) << "as far as it was seen";
+}
+
+TEST(PreprocessedScan, IsolatedPointsOnlyClearUnlessTheyAreGround) {
+  std::vector<SemanticClass> classes = reference::smallTable()->classes();
+  const std::uint32_t plant = classes[1].raw.front();
+  Scan scan;  // a wall, and something before it
+  for (int row = 0; row < 8; ++row) {
+    for (int column = -40; column < 40; ++column)
+      scan.points.emplace_back(10.0f, 0.05f * static_cast<float>(column), 0.2f * static_cast<float>(row));
+  }
+  scan.points[300] *= 0.3f;
+  scan.labels.assign(scan.points.size(), plant);
+  const auto isolatedIn = [&](const MapperConfig& config) {
+    ThreadPool pool(2);
+    ScanPreprocessor preprocessor(config);
+    const PreprocessedScan& processed = preprocessor.process(scan, ClassTable("plants", classes), pool);
+    EXPECT_EQ(processed.beams.ends.size(), scan.points.size());
+    EXPECT_EQ(processed.counts.used + processed.counts.isolated, scan.points.size());
+    EXPECT_EQ(processed.hit_count, processed.counts.used);
+    return processed.counts.isolated;
+  };
+  MapperConfig config = plainConfig();
+  config.rules.enabled = true;
+  EXPECT_EQ(isolatedIn(config), 0u) << "the default";
+  config.rules.particles_within = 15.0;
+  EXPECT_EQ(isolatedIn(config), 1u);
+  config.rules.enabled = false;
+  EXPECT_EQ(isolatedIn(config), 0u) << "the paper's";
+  config.rules.enabled = true;
+  config.rules.particles_within = 2.5;
+  EXPECT_EQ(isolatedIn(config), 0u) << "it is 3 m away";
+  config.rules.particles_within = 15.0;
+  classes[1].ground = true;
+  EXPECT_EQ(isolatedIn(config), 0u) << "no drop is ground";
+}
+
+TEST(PreprocessedScan, KnowsWithinWhichRangeHalfOfTheHitsAre) {
+  Scan scan;
+  for (int n = 0; n < 100; ++n) {
+    scan.points.emplace_back(0.0f, n < 60 ? 4.5f : 33.0f, 0.0f);
+    scan.labels.push_back(10);
+  }
+  const double half = preprocess(scan, plainConfig()).half_range;
+  EXPECT_GT(half, 4.0);
+  EXPECT_LE(half, 5.0);
+  EXPECT_EQ(preprocess({}, plainConfig()).half_range, 0.0);
+}
+
 TEST(PreprocessedScan, PointsAtTheSensorsRangeAreNoReturnsWhereTheScanSaysSo) {
   MapperConfig config = plainConfig();
   config.sensor_model.max_range = 50.0;

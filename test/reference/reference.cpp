@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "parallel/counter_random.h"
+#include "points/isolated_points.h"
 
 namespace bki_mapping::reference {
 namespace {
@@ -70,6 +71,76 @@ std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<P
   return result;
 }
 
+namespace {
+
+/// Where a direction is: its row and column of cells, the half of its cell, and how many columns the row has.
+struct Direction {
+  int row, column, half, columns;
+};
+
+Direction directionOf(const DirectionCells& cells, const Eigen::Vector3f& point) {
+  const std::uint32_t of_point = cells.cellOf(point, point.norm());
+  const auto cell = static_cast<int>(of_point);
+  int begin = 0;
+  for (int row = 0;; ++row) {
+    const double z = (row + 0.5) / 58.0 - 1.0;
+    const int columns = std::max(static_cast<int>(std::round(kPi * 116.0 * std::sqrt(1.0 - z * z))), 1);
+    if (cell < begin + columns) return {row, cell - begin, cells.halfOf(point, of_point), columns};
+    begin += columns;
+  }
+}
+
+/// How far a place is from where a part of another row is, if both rows are parts of a circle. @param at, of
+/// of so many parts. @param to, parts the same of the other row.
+int partsBetween(int at, int of, int to, int parts) {
+  const int apart = std::abs(to - (2 * at + 1) * parts / (2 * of));
+  return std::min(apart, parts - apart);
+}
+
+}  // namespace
+
+std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, double within) {
+  const DirectionCells cells;
+  const auto isBeam = [&](std::size_t i) { return points[i].norm() >= 1e-3f && points[i].norm() < 1e6f; };
+  std::vector<Direction> directions(points.size());
+  std::vector<int> slices(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!isBeam(i)) continue;
+    directions[i] = directionOf(cells, points[i]);
+    slices[i] = IsolatedPoints::sliceOf(points[i].norm());
+  }
+  std::vector<bool> isolated(points.size(), false);
+  for (int pass = 0; pass < 2; ++pass) {
+    const std::vector<bool> before = isolated;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!isBeam(i) || slices[i] >= IsolatedPoints::sliceOf(static_cast<float>(within))) continue;
+      int beams = 0, around = 0, near = 0, in_row[2] = {0, 0}, in_column[2] = {0, 0};  // all, near
+      for (std::size_t j = 0; j < points.size(); ++j) {
+        if (j == i || !isBeam(j)) continue;
+        const Direction &here = directions[i], &there = directions[j];
+        const int aside = partsBetween(here.column, here.columns, there.column, there.columns);
+        const int halves = partsBetween(2 * here.column + here.half, 2 * here.columns,
+                                        2 * there.column + there.half, 2 * there.columns);
+        const bool whole = there.columns <= 5;
+        if (std::abs(there.row - here.row) > 2 || (aside > 2 && !whole)) continue;
+        const bool counts = std::abs(slices[j] - slices[i]) <= 1 && !before[j];
+        ++beams;
+        if (slices[j] < slices[i] - 2) continue;
+        ++around;
+        near += counts;
+        if (there.row == here.row) ++in_row[0], in_row[1] += counts;
+        if (halves <= 1) ++in_column[0], in_column[1] += counts;
+      }
+      const auto isLine = [](const int(&strip)[2]) {
+        return strip[1] >= std::max(static_cast<double>(0.15f) * strip[0], 3.0);
+      };
+      isolated[i] = before[i] || (beams >= 10 && near < std::max(std::sqrt(around), 1.0) && !isLine(in_row) &&
+                                  !isLine(in_column));
+    }
+  }
+  return isolated;
+}
+
 ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const MapperConfig& config)
     : config_(applied(config)),
       geometry_(config.resolution),
@@ -78,6 +149,9 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
   const SensorModelConfig sensor = scan.sensor_model.value_or(config.sensor_model);
   const double max_range = sensor.max_range;
   std::vector<Point> raw, cut;
+  const bool seeks = config.rules.enabled && config.rules.particles_within > 0.0;
+  const std::vector<bool> isolated = seeks ? isolatedPoints(scan.points, config.rules.particles_within)
+                                           : std::vector<bool>(scan.points.size(), false);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d p = scan.points[i].cast<double>();
     const double range = p.norm();
@@ -96,6 +170,11 @@ ScanReference::ScanReference(const Scan& scan, const ClassTable& classes, const 
     if (!id && config.unknown_labels == UnknownLabels::kUnlabelled) id = classes.unlabelled();
     if (!id || (id == classes.unlabelled() && config.unlabelled_points == UnlabelledPoints::kIgnore))
       continue;
+    const SemanticClass& known = *classes.find(*id);
+    if (known.airborne || (isolated[i] && !known.ground)) {
+      cut.push_back({p, 255});
+      continue;
+    }
     raw.push_back({p, *id});
     if (scan.soft.empty()) continue;
     for (const ClassShare* s = scan.soft.begin(i); s != scan.soft.end(i); ++s) {

@@ -46,6 +46,9 @@ double sparseKernel(double d, double length, double scale);
 
 std::vector<Point> downsample(const Eigen::Vector3d& origin, const std::vector<Point>& points, double cell);
 
+/// Equation 3b: for each point relative to the sensor [m], whether it is isolated. Compares each with each.
+std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, double within);
+
 /// The evidence of one scan, summed at any voxel on request.
 class ScanReference {
  public:

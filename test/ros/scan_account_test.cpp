@@ -104,7 +104,8 @@ TEST(ScanLedger, CountsEveryKindOfPoint) {
   // Covers all reasons: one that is not in the table would be missing from the sum.
   EXPECT_EQ(counts.points, counts.used + counts.not_finite + counts.at_sensor + counts.too_near +
                                counts.beyond_max + counts.outside_map + counts.unknown_label +
-                               counts.unlabelled + counts.no_direction + counts.no_returns);
+                               counts.unlabelled + counts.airborne + counts.isolated + counts.no_direction +
+                               counts.no_returns);
   ScanLedger ledger;
   for (int i = 0; i < 2; ++i) ledger.integrated({}, stats, 0.0, {});
   const MappingStatus status = ledger.status({}, 0);
@@ -112,6 +113,24 @@ TEST(ScanLedger, CountsEveryKindOfPoint) {
   for (const PointKind& kind : pointKinds()) {
     EXPECT_EQ(status.*kind.in_status, 2 * counts.*kind.in_scan) << kind.name;
   }
+}
+
+TEST(ScanLedger, TellsTheWeatherOfTheLastCloud) {
+  ScanLedger ledger;
+  EXPECT_EQ(ledger.status({}, 0).weather_particles, 0.0f);
+  ScanStats stats;
+  stats.counts.points = 200;
+  stats.counts.used = 120;
+  stats.counts.airborne = 10;
+  stats.counts.isolated = 20;
+  stats.counts.no_returns = 40;
+  stats.counts.no_direction = 10;
+  stats.half_range = 12.5;
+  ledger.integrated({}, stats, 0.0, {});
+  const MappingStatus status = ledger.status({}, 0);
+  EXPECT_FLOAT_EQ(status.weather_particles, 0.2f);
+  EXPECT_FLOAT_EQ(status.weather_no_returns, 0.25f);
+  EXPECT_FLOAT_EQ(status.weather_half_range, 12.5f);
 }
 
 UnlistedLabels unlisted(const std::map<std::int64_t, std::size_t>& counts) {

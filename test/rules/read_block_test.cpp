@@ -96,6 +96,10 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
   for (std::size_t id = 0; kind.gains && id < kind.classes; ++id) {
     const double gain = kGains[random() % std::size(kGains)];
     const double stands_after = std::exp2(static_cast<double>(random() % 20) - 10.0);
+    if (kind.stays && random() % 4 == 0) {
+      rules = rules.withConfirmation(static_cast<ClassId>(id), gain, stands_after);
+      continue;
+    }
     rules = kind.stays ? rules.withFreeGain(static_cast<ClassId>(id), gain, stands_after)
                        : rules.withFreeGain(static_cast<ClassId>(id), gain);
   }

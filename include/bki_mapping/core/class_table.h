@@ -32,7 +32,9 @@ struct SemanticClass {
   bool ground = false;                  ///< robots can drive on it
   bool ignored = false;                 ///< navigation ignores it: it is neither ground nor an obstacle
   std::optional<double> free_gain;      ///< replaces the gain of the mapper's settings, > 0
-  bool living = false;                  ///< people, riders, animals: `dynamic`, but never parked
+  /// Rain, snow, fog, dust: never occupies, and its beams clear up to it. Map files do not store it.
+  bool airborne = false;
+  bool living = false;  ///< people, riders, animals: `dynamic`, but never parked
   /// Cost of driving on it, as nav_msgs/OccupancyGrid counts: 0, freely, to 100, never. Above 0 only with
   /// `ground`. Belongs to the vehicle, not to the map: map files do not store it.
   int cost = 0;

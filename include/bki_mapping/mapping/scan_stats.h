@@ -17,6 +17,8 @@ struct PointCounts {
   std::size_t outside_map = 0;    ///< too far from the map's origin for an index
   std::size_t unknown_label = 0;  ///< not in the class table, with unknown_labels `ignore`
   std::size_t unlabelled = 0;     ///< of the unlabelled class, with unlabelled_points `ignore`
+  std::size_t airborne = 0;       ///< of a class with the flag airborne: their beams clear up to them
+  std::size_t isolated = 0;       ///< drops, flakes, fog or dust by rules/particles_within: likewise
   std::size_t no_direction = 0;   ///< beams without a return whose direction is not known
   std::size_t no_returns = 0;     ///< beams without a return, which clear up to the sensor's range
   /// Points whose label is not in the class table; they are also counted above.
@@ -29,6 +31,7 @@ struct PointCounts {
 struct ScanStats {
   PointCounts counts;
   std::size_t hits = 0;        ///< after down-sampling
+  double half_range = 0.0;     ///< range within which half of the used points are [m]; 0 if there are none
   std::size_t free_count = 0;  ///< free samples after down-sampling, or beams
   std::size_t blocks = 0;      ///< blocks touched
   std::size_t not_finite = 0;  ///< sums left out because they were not finite

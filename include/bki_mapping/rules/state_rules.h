@@ -17,24 +17,27 @@ namespace bki_mapping {
 /// another one.
 class StateRules {
  public:
-  StateRules() { free_gains_.fill(1.0f), stands_after_.fill(0.0f); }
+  StateRules() { free_gains_.fill(1.0f), standing_gains_.fill(1.0f), stands_after_.fill(0.0f); }
   /// @param resolution edge of a voxel [m].
   StateRules(const RulesConfig& config, const ClassTable& classes, double resolution);
 
-  /// Gain on the evidence for `free`; 1 unless set. A gain above 1 is that of what passes; from some evidence
-  /// of hits on, the thing stands, and the gain is 1 (Equation 12).
+  /// Gain on the evidence for `free`; 1 unless set. It may change from some evidence of hits on: a gain above
+  /// 1 is that of what passes, and 1 when it stands; the gain of what cannot move becomes 0 (Equation 12).
   /// @param id of the class with the most evidence. @param hits the evidence for that class.
   float freeGain(ClassId id, float hits) const {
-    const float gain = free_gains_[id];
-    return gain > 1.0f && hits >= stands_after_[id] ? 1.0f : gain;
+    return hits >= stands_after_[id] ? standing_gains_[id] : free_gains_[id];
   }
-  /// Evidence of hits from which on a gain above 1 is 1; infinite if it never is.
+  /// Evidence of hits from which on the gain is standingGain(); infinite if it never is.
   float standsAfter(ClassId id) const { return stands_after_[id]; }
-  /// Whether the gain of a class without hits is above 1, as that of classes that can move should be.
-  bool canLeave(ClassId id) const { return free_gains_[id] > 1.0f; }
+  float standingGain(ClassId id) const { return standing_gains_[id]; }
+  /// Whether the gain of a class without hits is above 1, as that of classes that can move should be, and not
+  /// only until a second scan confirms the first.
+  bool canLeave(ClassId id) const { return free_gains_[id] > 1.0f && standing_gains_[id] > 0.0f; }
   /// @param stands_after evidence of hits, for a gain above 1.
   StateRules withFreeGain(ClassId id, double gain,
                           double stands_after = std::numeric_limits<double>::infinity()) const;
+  /// Of a class that cannot move: the gain is 0, but `gain` with less evidence of hits than `confirmed`.
+  StateRules withConfirmation(ClassId id, double gain, double confirmed) const;
 
   /// Gain with which a fixed class, one that cannot move, keeps a voxel that its likeliest class has left; 0,
   /// the default: such a voxel is free (Equation 12a).
@@ -79,7 +82,7 @@ class StateRules {
   bool decidesAs(const StateRules& other) const;
 
  private:
-  std::array<float, 256> free_gains_, stands_after_;
+  std::array<float, 256> free_gains_, standing_gains_, stands_after_;
   float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
   int neighbourhood_reach_ = 2;
   ClassSet fixed_, asking_;

@@ -1,0 +1,124 @@
+/// @file Finds the points of a scan near which few other beams end: drops, flakes, fog and dust.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bki_mapping/core/types.h"
+#include "parallel/thread_pool.h"
+
+namespace bki_mapping {
+
+/// The directions into which beams are sorted. Cells are about a degree high and wide; their rows have equal
+/// heights in the sine of the elevation.
+class DirectionCells {
+ public:
+  DirectionCells();
+
+  /// The cell of a direction. @param point of any length > 0.
+  std::uint32_t cellOf(const Eigen::Vector3f& point, float length) const;
+  std::uint32_t size() const { return begin_.back(); }
+  /// Which half of its cell a direction is in: 0 or 1, by rising azimuth.
+  std::uint8_t halfOf(const Eigen::Vector3f& point, std::uint32_t cell) const;
+
+  /// A row of cells.
+  struct Row {
+    std::uint32_t begin;  ///< its first cell
+    int columns;
+  };
+  Row rowOf(std::uint32_t cell) const {
+    const std::size_t row = row_of_[cell];
+    return {begin_[row], static_cast<int>(begin_[row + 1] - begin_[row])};
+  }
+  /// Calls visit(first, last, row) for ranges of cells of a row which together are the cells up to kReach
+  /// rows and columns away from a cell, itself among them, each once.
+  template <typename Visit>
+  void visitAround(std::uint32_t cell, Visit&& visit) const {
+    const Row own = rowOf(cell);
+    const int column = static_cast<int>(cell - own.begin), middle_row = row_of_[cell];
+    for (int r = std::max(middle_row - kReach, 0); r <= std::min(middle_row + kReach, kRows - 1); ++r) {
+      const Row row = rowOf(begin_[static_cast<std::size_t>(r)]);
+      const int n = row.columns, middle = (2 * column + 1) * n / (2 * own.columns);
+      const int low = middle - kReach, high = middle + kReach;
+      const auto visitColumns = [&](int first, int last) {
+        visit(row.begin + static_cast<std::uint32_t>(first), row.begin + static_cast<std::uint32_t>(last),
+              row);
+      };
+      if (n <= 2 * kReach + 1) {
+        visitColumns(0, n - 1);
+        continue;
+      }
+      visitColumns(std::max(low, 0), std::min(high, n - 1));
+      if (low < 0) visitColumns(low + n, n - 1);
+      if (high >= n) visitColumns(0, high - n);
+    }
+  }
+
+  /// Rows of lidars with 16 of them are 2 degrees apart: two cells.
+  static constexpr int kReach = 2;
+  static constexpr int kRows = 116;
+
+ private:
+  int columnsOf(int row) const {
+    return static_cast<int>(begin_[static_cast<std::size_t>(row) + 1] -
+                            begin_[static_cast<std::size_t>(row)]);
+  }
+  std::array<std::uint32_t, kRows + 1> begin_ = {};  ///< the first cell of each row, and their number
+  std::vector<std::uint8_t> row_of_;                 ///< of each cell
+};
+
+/// Finds isolated points, Equation 3b in docs/method.md. The result depends on the set of the points alone.
+/// Keeps its memory from scan to scan.
+class IsolatedPoints {
+ public:
+  /// @param points relative to the sensor [m]; those that are not finite, or at the sensor, are no beams.
+  /// @param within points in the slice of this range, or farther away, are not isolated; at most kFarthest
+  /// [m].
+  /// @return for each point, whether it is isolated; valid until the next call.
+  const std::vector<std::uint8_t>& find(Span<const Eigen::Vector3f> points, float within, ThreadPool& pool);
+
+  /// Slices of depth: as thick as a 64th to a 128th of the range plus 2 m, so that the noise of a lidar is
+  /// less than one. The last one is all that is farther than kFarthest.
+  static constexpr int kSlices = 256;
+  static int sliceOf(float range);
+  static constexpr float kFarthest = 30.0f;  ///< [m]
+
+  /// A line through n beams side by side meets about sqrt(n) of them: so many must end near a point.
+  static constexpr float kOfSquareRoot = 1.0f;
+  /// Or this part, and at least so many, of the beams in a strip: those of the same row of cells, or, in all
+  /// rows, those up to one half of a column away.
+  static constexpr float kOfStrip = 0.15f, kLeastOfStrip = 3.0f;
+  /// With fewer beams around, whatever their range, nothing is isolated.
+  static constexpr std::uint32_t kFewestAround = 10;
+
+ private:
+  /// The beams of half a cell that end in the same slice.
+  struct Group {
+    std::uint8_t half, slice;
+    std::uint8_t isolated, isolated_after;  ///< after the first pass, and after both
+    std::uint32_t beams;
+  };
+  void sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool);
+  void makeGroups(std::uint32_t cell);
+  /// Decides about the groups of a cell: by all groups around it or, in the second pass, by those that are
+  /// not isolated.
+  void decide(std::uint32_t cell, int last_slice, bool second);
+  /// Whether so many beams end near each group of a cell that nothing else matters: a fast answer for most.
+  bool areAllSupported(std::uint32_t cell, int last_slice) const;
+  void markPoints(std::uint32_t cell);
+
+  DirectionCells cells_;
+  std::vector<std::uint32_t> cell_of_;            ///< of each point
+  std::vector<std::uint8_t> half_of_, slice_of_;  ///< of each point
+  std::vector<std::uint32_t> begin_;              ///< position of the first beam, and group, of each cell
+  std::vector<std::uint32_t> point_of_;           ///< of each beam, by cell
+  std::vector<Group> groups_;                     ///< of each cell, from its `begin_` on
+  std::vector<std::uint16_t> group_count_;        ///< of each cell
+  std::vector<std::uint8_t> any_isolated_;        ///< in each cell
+  std::vector<std::uint8_t> isolated_;            ///< of each point
+};
+
+}  // namespace bki_mapping

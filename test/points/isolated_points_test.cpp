@@ -1,0 +1,198 @@
+// Isolated points: equal to a comparison of each point with each, whatever the threads and the order; flakes
+// are, and surfaces, poles and wires are not.
+#include "points/isolated_points.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "reference/reference.h"
+
+namespace bki_mapping {
+namespace {
+
+using Points = std::vector<Eigen::Vector3f>;
+
+std::vector<std::uint8_t> isolatedOf(const Points& points, float within = 15.0f, int threads = 2) {
+  ThreadPool pool(threads);
+  IsolatedPoints isolation;
+  return isolation.find(points, within, pool);
+}
+
+std::size_t countIn(const std::vector<std::uint8_t>& isolated) {
+  return static_cast<std::size_t>(std::count(isolated.begin(), isolated.end(), 1));
+}
+
+Eigen::Vector3f beam(double azimuth, double elevation, double range) {
+  return (range * Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation),
+                                  std::sin(azimuth) * std::cos(elevation), std::sin(elevation)))
+      .cast<float>();
+}
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+/// A scan of rows 2 degrees apart or denser inside of a cylinder, in which a function may put something
+/// nearer.
+template <typename Range>
+Points scanOf(int rows, double lowest, double highest, int columns, Range&& range) {
+  Points points;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const double azimuth = 2.0 * M_PI * column / columns;
+      const double elevation = (lowest + (highest - lowest) * row / (rows - 1)) * kDegree;
+      const double wall = 12.0 / std::cos(elevation);
+      points.push_back(beam(azimuth, elevation, range(azimuth, elevation, wall)));
+    }
+  }
+  return points;
+}
+
+TEST(IsolatedPoints, EqualAComparisonOfEachWithEach) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::size_t found = 0, others = 0;
+  for (int round = 0; round < 12; ++round) {
+    const double flakes = 0.02 * (1 + round % 4), highest = round % 3 == 0 ? 89.0 : 15.0;
+    Points points = scanOf(
+        16 + 8 * (round % 3), -15.0 - 20.0 * (round % 4), highest, 120,
+        [&](double, double, double wall) { return unit(random) < flakes ? 1.0 + 8.0 * unit(random) : wall; });
+    points.emplace_back(0.0f, 0.0f, 0.0f);
+    points.emplace_back(std::numeric_limits<float>::quiet_NaN(), 1.0f, 1.0f);
+    points.emplace_back(std::numeric_limits<float>::infinity(), 1.0f, 1.0f);
+    points.emplace_back(0.0f, 0.0f, 3.0f);
+    points.emplace_back(0.0f, 0.0f, -3.0f);
+    for (const float within : {15.0f, 5.0f, 30.0f}) {
+      const std::vector<bool> expected = reference::isolatedPoints(points, within);
+      const std::vector<std::uint8_t> isolated = isolatedOf(points, within);
+      ASSERT_EQ(isolated.size(), points.size());
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        ASSERT_EQ(isolated[i] != 0, expected[i]) << round << ", " << within << ", " << points[i].transpose();
+      }
+      found += countIn(isolated);
+      others += isolated.size() - countIn(isolated);
+    }
+  }
+  EXPECT_GT(found, 300u);
+  EXPECT_GT(others, 500u);
+}
+
+TEST(IsolatedPoints, DependOnNeitherThreadsNorOrder) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const Points points = scanOf(32, -25.0, 5.0, 600, [&](double, double, double wall) {
+    return unit(random) < 0.05 ? 1.0 + 6.0 * unit(random) : wall;
+  });
+  const std::vector<std::uint8_t> isolated = isolatedOf(points, 15.0f, 1);
+  EXPECT_EQ(isolatedOf(points, 15.0f, 3), isolated);
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::shuffle(order.begin(), order.end(), random);
+  Points shuffled;
+  for (const std::size_t i : order) shuffled.push_back(points[i]);
+  const std::vector<std::uint8_t> of_shuffled = isolatedOf(shuffled);
+  for (std::size_t n = 0; n < order.size(); ++n) ASSERT_EQ(of_shuffled[n], isolated[order[n]]);
+}
+
+TEST(IsolatedPoints, AreFlakesBeforeAWall) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (const int rows : {16, 64}) {
+    std::vector<bool> is_flake;
+    const Points points = scanOf(rows, -15.0, 15.0, 1800, [&](double, double, double wall) {
+      is_flake.push_back(unit(random) < 0.03);
+      return is_flake.back() ? 1.5 + 7.0 * unit(random) : wall;
+    });
+    const std::vector<std::uint8_t> isolated = isolatedOf(points);
+    std::size_t flakes = 0, found = 0, wrong = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      flakes += is_flake[i];
+      (is_flake[i] ? found : wrong) += isolated[i];
+    }
+    EXPECT_GT(found, flakes * 99 / 100) << rows << " rows";
+    EXPECT_EQ(wrong, 0u) << rows << " rows: the wall stays";
+  }
+}
+
+TEST(IsolatedPoints, AreNoPoleNoWireAndNoBar) {
+  // 16 rows, 1800 columns: a pole 2.4 cm thick, and a bar as thick, 3 m away.
+  const double half = std::atan(0.012 / 3.0);
+  for (double at = 1.0; at < 1.05; at += 0.001) {
+    const auto pole = [&](double azimuth, double, double wall) {
+      return std::abs(azimuth - at) <= half ? 3.0 : wall;
+    };
+    EXPECT_EQ(countIn(isolatedOf(scanOf(16, -15.0, 15.0, 1800, pole))), 0u) << at;
+  }
+  const auto bar = [&](double azimuth, double elevation, double wall) {
+    return std::abs(elevation + 3.0 * kDegree) <= half && azimuth < 1.0 ? 3.0 : wall;
+  };
+  EXPECT_EQ(countIn(isolatedOf(scanOf(16, -15.0, 15.0, 1800, bar))), 0u);
+}
+
+TEST(IsolatedPoints, AreOnlyThoseWithinTheDistanceAndAmongOthers) {
+  const auto flakeAt = [](double range) {
+    return scanOf(16, -15.0, 15.0, 900,
+                  [range, n = 0](double, double, double wall) mutable { return ++n == 7000 ? range : wall; });
+  };
+  EXPECT_EQ(countIn(isolatedOf(flakeAt(4.0))), 1u);
+  EXPECT_EQ(countIn(isolatedOf(flakeAt(4.0), 3.5f)), 0u);
+  EXPECT_EQ(countIn(isolatedOf(flakeAt(9.0), 8.0f)), 0u);
+  EXPECT_EQ(countIn(isolatedOf({{3, 0, 0}, {3, 1, 0}, {0, 5, 1}})), 0u) << "too few to tell";
+  EXPECT_TRUE(isolatedOf({}).empty());
+}
+
+TEST(DirectionCells, CoverTheSphereAndAreAboutADegreeWide) {
+  const DirectionCells cells;
+  std::set<std::uint32_t> seen;
+  for (double elevation = -89.9; elevation < 90.0; elevation += 0.2) {
+    const bool at_pole = std::abs(elevation) > 85.0;  // columns are narrow there
+    for (double azimuth = 0.0; azimuth < 360.0; azimuth += 0.2) {
+      const Eigen::Vector3f point = beam(azimuth * kDegree, elevation * kDegree, 7.0);
+      const std::uint32_t cell = cells.cellOf(point, point.norm());
+      ASSERT_LT(cell, cells.size());
+      seen.insert(cell);
+      // Half a degree aside is at most one row and one column farther.
+      const Eigen::Vector3f aside = beam(azimuth * kDegree, (elevation + 0.5) * kDegree, 7.0);
+      const std::uint32_t other = cells.cellOf(aside, aside.norm());
+      bool around = false;
+      cells.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
+        around |= other >= first && other <= last;
+      });
+      ASSERT_TRUE(around || at_pole) << azimuth << ", " << elevation;
+    }
+  }
+  EXPECT_EQ(seen.size(), cells.size());
+}
+
+TEST(DirectionCells, EachOfThoseAroundIsVisitedOnce) {
+  const DirectionCells cells;
+  for (std::uint32_t cell = 0; cell < cells.size(); ++cell) {
+    std::set<std::uint32_t> visited;
+    std::size_t visits = 0;
+    cells.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
+      for (std::uint32_t c = first; c <= last; ++c) visited.insert(c), ++visits;
+    });
+    ASSERT_EQ(visited.size(), visits) << cell;
+    ASSERT_TRUE(visited.count(cell)) << cell;
+    ASSERT_LE(visits, 25u) << cell;
+  }
+}
+
+TEST(IsolatedPoints, SlicesRiseWithTheRange) {
+  EXPECT_EQ(IsolatedPoints::sliceOf(0.0f), 0);
+  for (float range = 0.0f; range < 40.0f; range += 0.01f) {
+    const int slice = IsolatedPoints::sliceOf(range), farther = IsolatedPoints::sliceOf(range + 0.01f);
+    ASSERT_TRUE(farther == slice || farther == slice + 1) << range;
+    if (range + (range + 2.0f) / 32.0f > IsolatedPoints::kFarthest) continue;
+    ASSERT_GT(IsolatedPoints::sliceOf(range + (range + 2.0f) / 32.0f), slice) << range;
+  }
+  EXPECT_EQ(IsolatedPoints::sliceOf(30.0f), IsolatedPoints::kSlices - 1);
+  EXPECT_EQ(IsolatedPoints::sliceOf(1e5f), IsolatedPoints::kSlices - 1);
+}
+
+}  // namespace
+}  // namespace bki_mapping
