@@ -16,9 +16,9 @@
 namespace bki_mapping {
 namespace {
 
-using Points = std::vector<Eigen::Vector3f>;
+using PointList = std::vector<Eigen::Vector3f>;
 
-std::vector<std::uint8_t> isolatedOf(const Points& points, float within = 15.0f, int threads = 2) {
+std::vector<std::uint8_t> isolatedOf(const PointList& points, float within = 15.0f, int threads = 2) {
   ThreadPool pool(threads);
   IsolatedPoints isolation;
   return isolation.find(points, within, pool);
@@ -39,8 +39,8 @@ constexpr double kDegree = 3.14159265358979323846 / 180.0;
 /// A scan of rows 2 degrees apart or denser inside of a cylinder, in which a function may put something
 /// nearer.
 template <typename Range>
-Points scanOf(int rows, double lowest, double highest, int columns, Range&& range) {
-  Points points;
+PointList scanOf(int rows, double lowest, double highest, int columns, Range&& range) {
+  PointList points;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const double azimuth = 2.0 * M_PI * column / columns;
@@ -58,7 +58,7 @@ TEST(IsolatedPoints, EqualAComparisonOfEachWithEach) {
   std::size_t found = 0, others = 0;
   for (int round = 0; round < 12; ++round) {
     const double flakes = 0.02 * (1 + round % 4), highest = round % 3 == 0 ? 89.0 : 15.0;
-    Points points = scanOf(
+    PointList points = scanOf(
         16 + 8 * (round % 3), -15.0 - 20.0 * (round % 4), highest, 120,
         [&](double, double, double wall) { return unit(random) < flakes ? 1.0 + 8.0 * unit(random) : wall; });
     points.emplace_back(0.0f, 0.0f, 0.0f);
@@ -84,7 +84,7 @@ TEST(IsolatedPoints, EqualAComparisonOfEachWithEach) {
 TEST(IsolatedPoints, DependOnNeitherThreadsNorOrder) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const Points points = scanOf(32, -25.0, 5.0, 600, [&](double, double, double wall) {
+  const PointList points = scanOf(32, -25.0, 5.0, 600, [&](double, double, double wall) {
     return unit(random) < 0.05 ? 1.0 + 6.0 * unit(random) : wall;
   });
   const std::vector<std::uint8_t> isolated = isolatedOf(points, 15.0f, 1);
@@ -92,7 +92,7 @@ TEST(IsolatedPoints, DependOnNeitherThreadsNorOrder) {
   std::vector<std::size_t> order(points.size());
   std::iota(order.begin(), order.end(), 0);
   std::shuffle(order.begin(), order.end(), random);
-  Points shuffled;
+  PointList shuffled;
   for (const std::size_t i : order) shuffled.push_back(points[i]);
   const std::vector<std::uint8_t> of_shuffled = isolatedOf(shuffled);
   for (std::size_t n = 0; n < order.size(); ++n) ASSERT_EQ(of_shuffled[n], isolated[order[n]]);
@@ -103,7 +103,7 @@ TEST(IsolatedPoints, AreFlakesBeforeAWall) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (const int rows : {16, 64}) {
     std::vector<bool> is_flake;
-    const Points points = scanOf(rows, -15.0, 15.0, 1800, [&](double, double, double wall) {
+    const PointList points = scanOf(rows, -15.0, 15.0, 1800, [&](double, double, double wall) {
       is_flake.push_back(unit(random) < 0.03);
       return is_flake.back() ? 1.5 + 7.0 * unit(random) : wall;
     });

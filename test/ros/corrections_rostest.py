@@ -15,6 +15,7 @@ from bki_mapping.srv import SaveMap
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from std_srvs.srv import Empty
+from tf2_msgs.msg import TFMessage
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [FOLDER, os.path.join(FOLDER, '../../scripts')]
@@ -55,15 +56,18 @@ class Mapper:
 
     def __init__(self, test, name, **parameters):
         self.name = name
-        defaults = {'config': 'robot', 'resolution': 0.4, 'journal': True, 'correction/tolerance': 0.0}
+        defaults = {'config': 'robot', 'resolution': 0.4, 'journal': True, 'correction/tolerance': 0.0,
+                    'tf_timeout': 10.0}
         for parameter, value in {**defaults, **parameters}.items():
             rospy.set_param(f'/{name}/{parameter}', value)
         self.status = Listener(f'/{name}/status', MappingStatus)
         self.path = rospy.Publisher(f'/{name}_path', Path, queue_size=10)
         self.robot = Robot(f'/{name}_cloud', frame=f'{name}_sensor')
+        # Transforms of its own, so that connect() waits for this mapper and not for another one.
+        self.robot.poses = rospy.Publisher(f'/{name}_tf', TFMessage, queue_size=100)
         self.folder = tempfile.mkdtemp()
         self.node = subprocess.Popen([program('mapping_node'), f'__name:={name}', f'cloud_in:=/{name}_cloud',
-                                      f'corrected_path:=/{name}_path'],
+                                      f'corrected_path:=/{name}_path', f'/tf:=/{name}_tf'],
                                      start_new_session=True)  # where the scheduler groups sessions, as roslaunch does
         test.addCleanup(self.end)
         self.robot.connect()
