@@ -10,10 +10,10 @@
 namespace bki_mapping::simulation {
 namespace {
 
-constexpr double kSpeed = 8.0;     ///< [m/s]
-constexpr double kLeft = 3.0;      ///< from the way of the sensor to the lane of the cars [m]
-constexpr double kLongest = 40.0;  ///< from when a car appears to when it meets the sensor [s]
-constexpr double kLeg = 0.25;      ///< duration of a leg [s]
+constexpr double kOncomingSpeed = 8.0;  ///< [m/s]
+constexpr double kLeft = 3.0;           ///< from the way of the sensor to the lane of the cars [m]
+constexpr double kLongest = 40.0;       ///< from when a car appears to when it meets the sensor [s]
+constexpr double kLeg = 0.25;           ///< duration of a leg [s]
 constexpr double kCarLength = 4.3, kCarWidth = 1.8;  ///< as addCar makes them [m]
 
 /// The sensor's place at any time; before its first scan and after its last one it rests.
@@ -51,7 +51,7 @@ struct OncomingCar {
   double length;                         ///< of the way there [m]
   double appears = 0.0, vanishes = 0.0;  ///< [s]
 
-  double lengthAt(double time) const { return length - kSpeed * (time - meets); }
+  double lengthAt(double time) const { return length - kOncomingSpeed * (time - meets); }
   Footprint placeAt(double time, const Way& way) const {
     const WayPoint there = way.at(lengthAt(time));
     return {there.beside(kLeft), {0.5 * kCarLength, 0.5 * kCarWidth}, there.heading + kPi};

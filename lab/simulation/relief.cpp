@@ -11,7 +11,7 @@
 namespace bki_mapping::simulation {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 /// A plane through the points as far as they determine it, level across a straight way.
 /// @return its slopes along x and y, and its height at the origin.
@@ -85,7 +85,7 @@ Relief::Relief(const std::vector<Eigen::Vector3d>& way, const std::vector<Eigen:
     for (int column = 0; column < columns_; ++column) {
       const Eigen::Vector2d low = corner_ + kTile * Eigen::Vector2d(column, row);
       const Eigen::AlignedBox2d box(low, low + Eigen::Vector2d::Constant(kTile));
-      double nearest = kInfinity;
+      double nearest = kEndless;
       of_points.forEachNear(box.center(), 0.5 * kTile + kReach, [&](std::uint32_t i) {
         nearest = std::min(nearest, box.exteriorDistance(Eigen::Vector2d(points[i].head<2>())));
       });
@@ -109,11 +109,11 @@ Relief::Relief(const std::vector<Eigen::Vector3d>& way, const std::vector<Eigen:
 Relief::Node Relief::at(double x, double y) const {
   constexpr double kTile = kEdge * kCells;
   const double u = (x - corner_.x()) / kTile, v = (y - corner_.y()) / kTile;
-  if (!(u >= 0.0 && v >= 0.0 && u < columns_ && v < rows_)) return {-kInfinity, kInfinity};
+  if (!(u >= 0.0 && v >= 0.0 && u < columns_ && v < rows_)) return {-kEndless, kEndless};
   const int column = static_cast<int>(u), row = static_cast<int>(v);
   const std::int32_t tile = tile_of_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
                                      static_cast<std::size_t>(column)];
-  if (tile < 0) return {-kInfinity, kInfinity};
+  if (tile < 0) return {-kEndless, kEndless};
   const double in_x = (u - column) * kCells, in_y = (v - row) * kCells;
   const int i = std::min(static_cast<int>(in_x), kCells - 1),
             j = std::min(static_cast<int>(in_y), kCells - 1);
@@ -137,7 +137,7 @@ std::optional<double> Relief::hit(const Eigen::Vector3d& origin, const Eigen::Ve
   double from = 0.0, gap = above(0.0);
   if (!(gap > 0.0)) return std::nullopt;
   // Nothing of the ground is shorter than half the distance of its nodes, so no step misses anything.
-  while (from < max_range && gap < kInfinity) {
+  while (from < max_range && gap < kEndless) {
     const double to = from + 0.5 * kEdge, there = above(to);
     if (there <= 0.0) {
       double low = from, high = to, gap_low = gap, gap_high = there;

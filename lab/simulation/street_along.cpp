@@ -17,7 +17,7 @@
 namespace bki_mapping::simulation {
 namespace {
 
-constexpr double kLane = 1.5;         ///< from the axis of the street to the way of the sensor [m]
+constexpr double kToAxis = 1.5;       ///< from the axis of the street to the way of the sensor [m]
 constexpr double kParked = 4.2;       ///< from the axis to the middle of parked cars [m]
 constexpr double kMostAhead = 120.0;  ///< by which the street is longer than the way at both ends [m]
 
@@ -32,7 +32,7 @@ std::shared_ptr<const Relief> reliefUnder(const std::vector<Eigen::Vector3d>& po
   std::vector<Eigen::Vector3d> below = positions;
   for (Eigen::Vector3d& point : below) point.z() -= height;
   std::vector<Eigen::Vector2d> axis;
-  for (double s = way.begin(); s <= way.end(); s += 1.0) axis.push_back(way.at(s).beside(kLane));
+  for (double s = way.begin(); s <= way.end(); s += 1.0) axis.push_back(way.at(s).beside(kToAxis));
   auto relief = std::make_shared<const Relief>(below, axis);
   constexpr double kLeast = 0.3;  // [m]
   for (std::size_t i = 0; i < positions.size(); ++i) {
@@ -86,9 +86,9 @@ std::vector<Eigen::Vector3d> keptFree(const std::vector<Eigen::Vector3d>& positi
 }
 
 /// Places what street_parts makes, for a street along x, into a street along a way.
-class Builder {
+class StreetBuilder {
  public:
-  Builder(const std::vector<Eigen::Vector3d>& positions, const Way& way, Scene& scene)
+  StreetBuilder(const std::vector<Eigen::Vector3d>& positions, const Way& way, Scene& scene)
       : way_(way), first_(firstPasses(way)), plots_(keptFree(positions, way)), scene_(scene) {}
 
   const Plots& plots() const { return plots_; }
@@ -101,7 +101,7 @@ class Builder {
   /// stands [m]. @return whether they are added.
   bool add(double s, std::vector<Shape> shapes, double from_way, double gap) {
     const WayPoint here = way_.at(s);
-    const Eigen::Vector2d origin = here.beside(kLane);
+    const Eigen::Vector2d origin = here.beside(kToAxis);
     const Eigen::Rotation2Dd turn(here.heading);
     Eigen::AlignedBox2d bounds;
     for (const Shape& shape : shapes) {
@@ -169,15 +169,15 @@ class Builder {
 
 /// Calls visit(s) along the way at random distances, where a street is laid out.
 template <typename Visit>
-void forEachPlace(const Builder& builder, const Way& way, double first, double least, double most, Dice& dice,
-                  Visit&& visit) {
+void forEachPlace(const StreetBuilder& builder, const Way& way, double first, double least, double most,
+                  Dice& dice, Visit&& visit) {
   for (double s = way.begin() + first; s < way.end(); s += dice.between(least, most)) {
     if (builder.isNew(s)) visit(s);
   }
 }
 
 /// Houses, and hedges or fences between them. Where a house has no room, as in a bend, a smaller one may.
-void addHousesAlong(const Way& way, double side, Dice& dice, Builder& builder) {
+void addHousesAlong(const Way& way, double side, Dice& dice, StreetBuilder& builder) {
   for (double s = way.begin(); s < way.end() - 9.0;) {
     double width = dice.between(9.0, 18.0);
     const double gap = dice.between(3.0, 7.0), depth = dice.between(7.0, 10.0),
@@ -202,7 +202,7 @@ void addHousesAlong(const Way& way, double side, Dice& dice, Builder& builder) {
   }
 }
 
-void addStanding(const Way& way, double side, Dice& dice, Builder& builder) {
+void addStanding(const Way& way, double side, Dice& dice, StreetBuilder& builder) {
   addHousesAlong(way, side, dice, builder);
   forEachPlace(builder, way, 4.0, 11.0, 17.0, dice, [&](double s) {
     std::vector<Shape> tree;
@@ -227,7 +227,7 @@ void addStanding(const Way& way, double side, Dice& dice, Builder& builder) {
 }
 
 /// People who stand, or walk to and fro on the pavement.
-void addPeople(const Way& way, double side, Dice& dice, Builder& builder) {
+void addPeople(const Way& way, double side, Dice& dice, StreetBuilder& builder) {
   forEachPlace(builder, way, 0.0, 12.0, 25.0, dice, [&](double s) {
     const double y = side * dice.between(6.6, 7.6), speed = dice.between(0.8, 1.6),
                  pace = dice.between(5.0, 12.0);
@@ -248,7 +248,7 @@ Scene makeStreetAlong(const DriveConfig& config) {
   const Way way(positions, std::min(config.lidar.max_range + 10.0, kMostAhead));
   Scene scene;
   scene.ground.relief = reliefUnder(positions, way, config.height);
-  Builder builder(positions, way, scene);
+  StreetBuilder builder(positions, way, scene);
   Dice dice(config.seed);
   for (const double side : {-1.0, 1.0}) {
     addStanding(way, side, dice, builder);
