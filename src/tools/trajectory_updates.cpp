@@ -88,7 +88,11 @@ void JournalledMapping::readUpdates(const std::string& path) {
 }
 
 ScanStats JournalledMapping::integrate(const Sequence& sequence, std::size_t i, const SequenceFrame& frame) {
-  RoundedScan rounded = corrector_.round(frame.scan(), frame.T_map_sensor);
+  // From the points as they were recorded: to and from the map's axes, some would be rounded to others.
+  SequenceFrame in_sensor_frame = frame;
+  in_sensor_frame.T_map_sensor.setIdentity();
+  RoundedScan rounded = corrector_.round(in_sensor_frame.scan(), in_sensor_frame.T_map_sensor);
+  rounded.T_map_sensor = roundedPose(frame.T_map_sensor);
   ScanStats stats = mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
   stats.counts += rounded.left_out;
   corrector_.addScan(std::move(rounded.scan), 0, rounded.T_map_sensor, rounded.T_map_sensor,
