@@ -40,8 +40,8 @@ function(bki_mapping_precompile_files target)
 endfunction()
 
 # Joined, targets in which no scan is computed are compiled with -Og, which takes four fifths of the time of -O1. They may use
-# precompiled headers only of each other. The ROS shell then publishes a map, and export_map writes files, in half more processor
-# time; mapping takes as long as before.
+# precompiled headers only of each other. export_map then takes half more processor time than with -O3; mapping takes as long as
+# before.
 function(bki_mapping_light)
   if(BKI_MAPPING_JOIN)
     foreach(target ${ARGN})
