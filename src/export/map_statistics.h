@@ -21,6 +21,10 @@ struct MapStatistics {
   GridIndex low{1, 1, 1}, high{0, 0, 0};
 
   std::uint64_t known() const { return free + occupied; }
+  /// @param bytes of the file. Infinite or NaN without known voxels.
+  double bytesPerKnownVoxel(std::uint64_t bytes) const {
+    return static_cast<double>(bytes) / static_cast<double>(known());
+  }
   /// The space of the voxels [m]; empty without voxels.
   Eigen::AlignedBox3d bounds(double resolution) const;
 };

@@ -15,14 +15,13 @@
 #include "core/counted.h"
 #include "export/map_picture.h"
 #include "export/map_statistics.h"
-#include "export/ordered_json.h"
+#include "export/statistics_json.h"
 #include "tools/options.h"
 
 namespace {
 
 using namespace bki_mapping;
 namespace po = tools::po;
-using Json = OrderedJson;
 
 po::options_description options() {
   po::options_description options("Options");
@@ -35,12 +34,6 @@ po::options_description options() {
   return options;
 }
 
-Json boxJson(const Eigen::AlignedBox3d& box) {
-  if (box.isEmpty()) return nullptr;
-  const Eigen::Vector3d &low = box.min(), &high = box.max();
-  return {{"min", {low.x(), low.y(), low.z()}}, {"max", {high.x(), high.y(), high.z()}}};
-}
-
 /// The drives by their first scans, since ids may be random; those without scans come last.
 std::vector<DriveRecord> drivesByTime(MapFile& file) {
   std::vector<DriveRecord> drives = file.drives();
@@ -49,46 +42,6 @@ std::vector<DriveRecord> drivesByTime(MapFile& file) {
     return std::tie(a.first_stamp, a.id) < std::tie(b.first_stamp, b.id);
   });
   return drives;
-}
-
-Json driveJson(const DriveRecord& drive) {
-  return {{"id", drive.id},
-          {"name", drive.name},
-          {"part", drive.part},
-          {"scans", drive.scans},
-          {"first_stamp_ns", drive.first_stamp},
-          {"last_stamp_ns", drive.last_stamp},
-          {"bounds", boxJson(drive.bounds)}};
-}
-
-double bytesPerVoxel(const MapFile& file, const MapStatistics& found) {
-  return static_cast<double>(file.size().bytes) / static_cast<double>(found.known());
-}
-
-Json statisticsJson(MapFile& file, const MapStatistics& found) {
-  const MapInfo& info = file.info();
-  Json by_class = Json::object(), drives = Json::array();
-  for (const SemanticClass& c : info.classes->classes()) {
-    const auto count = found.occupied_by_class.find(c.id);
-    by_class[c.name] = count == found.occupied_by_class.end() ? 0 : count->second;
-  }
-  for (const DriveRecord& drive : drivesByTime(file)) drives.push_back(driveJson(drive));
-  const Json per_voxel = found.known() > 0 ? Json(bytesPerVoxel(file, found)) : Json();
-  return {{"file", file.path()},
-          {"program", info.program},
-          {"frame", info.frame},
-          {"resolution", info.resolution},
-          {"prior", info.prior},
-          {"class_table", info.classes->name()},
-          {"bounds", boxJson(found.bounds(info.resolution))},
-          {"voxels", {{"free", found.free}, {"occupied", found.occupied}, {"occluded", found.occluded}}},
-          {"voxels_by_class", by_class},
-          {"blocks", found.blocks},
-          {"tiles", found.tiles},
-          {"file_bytes", file.size().bytes},
-          {"map_bytes", found.memory_bytes},
-          {"file_bytes_per_known_voxel", per_voxel},
-          {"drives", drives}};
 }
 
 std::string timeText(std::uint64_t stamp) {
@@ -127,7 +80,7 @@ void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
       << "size: " << static_cast<double>(file.size().bytes) / 1e6 << " MB in the file, "
       << static_cast<double>(found.memory_bytes) / 1e6 << " MB in memory";
   if (found.known() > 0) {
-    out << ", " << std::setprecision(2) << bytesPerVoxel(file, found)
+    out << ", " << std::setprecision(2) << found.bytesPerKnownVoxel(file.size().bytes)
         << " bytes of the file for each known voxel" << std::setprecision(1);
   }
   out << "\ndrives:\n";
@@ -200,7 +153,7 @@ int inspect(const po::variables_map& given) {
   const GridIndex last = lastDrawn(found, file.info().resolution, most);
   print(std::cout, file, found);
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found).dump(2) + "\n");
+    writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found, drivesByTime(file)));
   }
   draw(file, rules, found, last, top, profile);
   return 0;
