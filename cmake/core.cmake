@@ -76,19 +76,12 @@ bki_mapping_core_room(mapping SOURCES
     former_parameters.cpp parameters.cpp scan_preprocessor.cpp semantic_mapper.cpp sensor_height.cpp soft_merge.cpp
   LINK bki_mapping_free_space)
 
-bki_mapping_core_room(journal SOURCES
-    corrected_path.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp sensor_scan.cpp
-  LINK bki_mapping_mapping)
-
 bki_mapping_kernels(rules limit_kernels)
 bki_mapping_kernels(rules view_kernels)
 bki_mapping_kernels(update sum_kernels)
 bki_mapping_kernels(query distance_kernels)
 bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
 bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/sparse_kernel.h)
-
-find_package(ZLIB REQUIRED)
-target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
 
 # Class tables and parameters from YAML.
 find_package(yaml-cpp REQUIRED)
@@ -101,6 +94,16 @@ bki_mapping_join(bki_mapping_settings)
 bki_mapping_light(bki_mapping_settings)
 bki_mapping_precompile(bki_mapping_settings
   <Eigen/Geometry> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
+
+# Scans as they were recorded, which follow corrected poses.
+find_package(ZLIB REQUIRED)
+bki_mapping_room(journal SOURCES
+    corrected_path.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp sensor_scan.cpp
+  LINK bki_mapping_mapping)
+target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
+bki_mapping_join(bki_mapping_journal)
+bki_mapping_light(bki_mapping_journal)
+bki_mapping_precompile(bki_mapping_journal REUSE bki_mapping_settings)
 
 # Map files: SQLite and zlib. They name the program that wrote them.
 file(STRINGS package.xml version_line REGEX "<version>")

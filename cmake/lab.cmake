@@ -1,19 +1,9 @@
-# The lab: what measures the mapper, and simulates what it measures with. No robot needs it.
-if(NOT BKI_MAPPING_LAB AND NOT BKI_MAPPING_DEMO)
-  return()
-endif()
-bki_mapping_room(simulation FOLDER lab/simulation SOURCES
-    city.cpp drive_file.cpp furniture.cpp lidar.cpp oncoming.cpp plots.cpp relief.cpp rooms.cpp scene.cpp
-    shape_index.cpp street.cpp street_along.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp way.cpp weather.cpp
-  LINK bki_mapping_sequence bki_mapping_settings)
-target_link_libraries(bki_mapping_simulation PRIVATE yaml-cpp)
-bki_mapping_join(bki_mapping_simulation)
-bki_mapping_program(lab/tools simulate_drive bki_mapping_simulation)
+# The lab: what measures the mapper, with the simulation. No robot needs it.
 if(NOT BKI_MAPPING_LAB)
   return()
 endif()
 
-find_package(PCL REQUIRED COMPONENTS common filters io kdtree)
+find_package(PCL QUIET REQUIRED COMPONENTS common filters io kdtree)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp
     occupants.cpp octomap_mapper.cpp octomap_settings.cpp pose_noise.cpp presence_evaluation.cpp quality_report.cpp

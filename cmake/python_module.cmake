@@ -58,6 +58,7 @@ target_link_libraries(bki_mapping_python PRIVATE bki_mapping_city bki_mapping_ex
 target_compile_options(bki_mapping_python PRIVATE -O1)  # the work is done in the libraries
 bki_mapping_warnings(bki_mapping_python)
 bki_mapping_join(bki_mapping_python)
+bki_mapping_light(bki_mapping_python)
 bki_mapping_precompile_files(bki_mapping_python
   <Eigen/Geometry> <map> <memory> <pybind11/numpy.h> <pybind11/pybind11.h> <pybind11/stl.h> <string> <vector>)
 file(RELATIVE_PATH to_libraries /prefix/${BKI_MAPPING_PYTHON_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})

@@ -47,7 +47,7 @@ bki_mapping_room(ros SOURCES
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
-bki_mapping_precompile(bki_mapping_ros ${BKI_MAPPING_ROS_HEADERS})
+bki_mapping_precompile_files(bki_mapping_ros ${BKI_MAPPING_ROS_HEADERS})
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 # Messages first: Ninja 1.11 would generate them after all other libraries, and one processor would wait for their headers.
 add_dependencies(bki_mapping_core ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
@@ -55,14 +55,17 @@ add_dependencies(bki_mapping_core ${PROJECT_NAME}_generate_messages_cpp ${PROJEC
 bki_mapping_join(bki_mapping_ros)
 if(BKI_MAPPING_JOIN AND NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   # Two files take 18 s of processor time less than four. With sanitizers they would take too much memory.
-  set_target_properties(bki_mapping_ros PROPERTIES UNITY_BUILD_BATCH_SIZE 28)
+  set_target_properties(bki_mapping_ros PROPERTIES UNITY_BUILD_BATCH_SIZE 32)
 endif()
 bki_mapping_light(bki_mapping_ros)
 bki_mapping_shell_flags(bki_mapping_ros)
 # bki_mapping_uses_ros(TARGET): includes ROS, so it is compiled as the shell is.
 function(bki_mapping_uses_ros target)
   bki_mapping_shell_flags(${target})
-  bki_mapping_precompile(${target} REUSE bki_mapping_ros)
+  bki_mapping_light(${target})
+  if(NOT BKI_MAPPING_JOIN)
+    bki_mapping_precompile(${target} REUSE bki_mapping_ros)
+  endif()
 endfunction()
 
 add_library(bki_mapping_nodelets SHARED src/ros/mapping_nodelet.cpp)
@@ -79,6 +82,7 @@ add_executable(map_bag src/tools/map_bag.cpp src/tools/bag_files.cpp src/tools/b
 bki_mapping_tool(map_bag bki_mapping_ros bki_mapping_export nlohmann_json::nlohmann_json)
 add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
+bki_mapping_join(play_sequence)
 add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
 add_executable(print_parameters src/tools/print_parameters.cpp)

@@ -1,5 +1,9 @@
 # Sequences, exports and cities, and the programs that need no ROS: PCL's file formats, OctoMap and pictures.
-find_package(PCL REQUIRED COMPONENTS common io)
+# Of pcl_io only PCD files are used: the sensors and windows that it also knows take a second to find.
+foreach(package OpenNI OpenNI2 VTK)
+  set(CMAKE_DISABLE_FIND_PACKAGE_${package} ON)
+endforeach()
+find_package(PCL QUIET REQUIRED COMPONENTS common io)
 find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
 find_package(octomap REQUIRED)
@@ -13,7 +17,7 @@ bki_mapping_room(city SOURCES city_index.cpp region_files.cpp tiled_map.cpp LINK
 target_link_libraries(bki_mapping_city PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_room(export SOURCES
     cleaned_points.cpp display_colors.cpp export_file.cpp grid_export.cpp html_export.cpp html_page.cpp map_export.cpp
-    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp voxel_drives.cpp voxel_points.cpp
+    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp statistics_json.cpp voxel_drives.cpp voxel_points.cpp
   LINK bki_mapping_query bki_mapping_sequence bki_mapping_store)
 target_link_libraries(bki_mapping_export PRIVATE nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB
   ${OCTOMAP_LIBRARIES})
@@ -37,6 +41,7 @@ bki_mapping_join(bki_mapping_tools)
 set_source_files_properties(src/tools/version.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}"
   SKIP_PRECOMPILE_HEADERS ON)
 target_compile_options(bki_mapping_tools PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the other libraries
+bki_mapping_light(bki_mapping_tools)
 bki_mapping_precompile(bki_mapping_tools
   <Eigen/Geometry> <boost/program_options.hpp> <filesystem> <functional> <iostream> <map> <string> <vector>)
 
@@ -49,6 +54,7 @@ function(bki_mapping_program folder name)
   add_executable(${name} ${folder}/${name}.cpp)
   bki_mapping_tool(${name} ${ARGN})
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the libraries
+  bki_mapping_light(${name})
   bki_mapping_precompile(${name} REUSE bki_mapping_tools)
   set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_PROGRAMS ${name})
 endfunction()

@@ -1,6 +1,6 @@
 #include "simulation/relief.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,7 +25,7 @@ Eigen::Vector3d planeThrough(const std::vector<Eigen::Vector3d>& points) {
     square += d.head<2>() * d.head<2>().transpose();
     product += d.z() * d.head<2>();
   }
-  const Eigen::Vector2d slope = square.ldlt().solve(product);
+  const Eigen::Vector2d slope = square.inverse() * product;
   return {slope.x(), slope.y(), mean.z() - slope.dot(mean.head<2>())};
 }
 

@@ -5,7 +5,7 @@ import re
 import unittest
 
 ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
-CMAKE = ('core.cmake', 'tools.cmake', 'ros.cmake', 'costmap.cmake', 'lab.cmake', 'python_module.cmake')
+CMAKE = ('core.cmake', 'tools.cmake', 'ros.cmake', 'costmap.cmake', 'simulation.cmake', 'lab.cmake', 'python_module.cmake')
 
 
 def links():
