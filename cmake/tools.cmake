@@ -1,5 +1,6 @@
 # Sequences, exports and cities, and the programs that need no ROS: PCL's file formats, OctoMap and pictures.
-# Of pcl_io only PCD files are used: the sensors and windows that it also knows take a second to find.
+# Of pcl_io only PCD files are used: the sensors and windows that it also knows take a second to find, and
+# what it says of them is of no use.
 foreach(package OpenNI OpenNI2 VTK)
   set(CMAKE_DISABLE_FIND_PACKAGE_${package} ON)
 endforeach()
