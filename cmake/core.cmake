@@ -95,22 +95,13 @@ bki_mapping_light(bki_mapping_settings)
 bki_mapping_precompile(bki_mapping_settings
   <Eigen/Geometry> <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <string> <vector>)
 
-# Scans as they were recorded, which follow corrected poses.
-find_package(ZLIB REQUIRED)
-bki_mapping_room(journal SOURCES
-    corrected_path.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp sensor_scan.cpp
-  LINK bki_mapping_mapping)
-target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
-bki_mapping_join(bki_mapping_journal)
-bki_mapping_light(bki_mapping_journal)
-bki_mapping_precompile(bki_mapping_journal REUSE bki_mapping_settings)
-
 # Map files: SQLite and zlib. They name the program that wrote them.
 file(STRINGS package.xml version_line REGEX "<version>")
 string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${version_line}")
 find_package(SQLite3 REQUIRED)
+find_package(ZLIB REQUIRED)
 bki_mapping_room(store SOURCES
-    database.cpp drive_cover.cpp drive_overlap.cpp grid_transform.cpp map_clear.cpp map_file.cpp map_file_state.cpp map_info.cpp map_keeper.cpp
+    database.cpp drive_cover.cpp drive_overlap.cpp grid_transform.cpp journal_rows.cpp map_clear.cpp map_file.cpp map_file_state.cpp map_info.cpp map_keeper.cpp
     map_merge.cpp mapper_file.cpp migration.cpp new_map_file.cpp records.cpp schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp
     tile_store.cpp whole_map.cpp
   LINK bki_mapping_settings)
@@ -124,3 +115,13 @@ if(BKI_MAPPING_JOIN)
   # Of a class whose members are of the unnamed namespace of an included file.
   target_compile_options(bki_mapping_store PRIVATE -Wno-subobject-linkage)
 endif()
+
+# Scans as they were recorded, which follow corrected poses.
+bki_mapping_room(journal SOURCES
+    corrected_path.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp sensor_scan.cpp
+    stored_journal.cpp
+  LINK bki_mapping_store)
+target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
+bki_mapping_join(bki_mapping_journal)
+bki_mapping_light(bki_mapping_journal)
+bki_mapping_precompile(bki_mapping_journal REUSE bki_mapping_settings)

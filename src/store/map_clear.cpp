@@ -30,6 +30,11 @@ ClearedFile clearParts(MapFile& file, const Eigen::AlignedBox3d& box, MapFile::C
   return cleared;
 }
 
+/// Scans of the journal have no evidence in the box any more, wherever they move.
+void noteCleared(MapFile& file, const Eigen::AlignedBox3d& box, MapFile::Change& change) {
+  if (!file.scans().empty()) change.addClearedBox(box);
+}
+
 }  // namespace
 
 ClearedFile clearBoxOfFile(const std::string& path, const Eigen::AlignedBox3d& box,
@@ -41,6 +46,7 @@ ClearedFile clearBoxOfFile(const std::string& path, const Eigen::AlignedBox3d& b
     MapFile file(path, MapFile::Access::kUpdate);
     MapFile::Change change = file.change();
     const ClearedFile cleared = clearParts(file, box, change, false);
+    noteCleared(file, box, change);
     change.commit();
     return cleared;
   }
@@ -48,6 +54,8 @@ ClearedFile clearBoxOfFile(const std::string& path, const Eigen::AlignedBox3d& b
   NewMapFile copy(output, file.info());
   for (const DriveRecord& drive : file.drives()) copy.content().putDrive(drive);
   const ClearedFile cleared = clearParts(file, box, copy.content(), true);
+  copyJournal(file, copy.content());
+  noteCleared(file, box, copy.content());
   copy.commit();
   return cleared;
 }

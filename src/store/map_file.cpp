@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "store/database.h"
+#include "store/journal_rows.h"
 #include "store/map_file_state.h"
 #include "store/records.h"
 #include "store/schema.h"
@@ -104,6 +105,26 @@ bool MapFile::addTileTo(SemanticMap& map, const TileKey& key) {
   return true;
 }
 
+bool MapFile::hasJournal() const {
+  return state_->version >= kFirstVersionWithJournal;
+}
+
+std::vector<ScanRecord> MapFile::scans() {
+  return hasJournal() ? readScans(state_->database) : std::vector<ScanRecord>();
+}
+
+std::string MapFile::scanContent(std::uint64_t number) {
+  return readScanContent(state_->database, number);
+}
+
+std::vector<std::string> MapFile::settings() {
+  return hasJournal() ? readSettings(state_->database) : std::vector<std::string>();
+}
+
+std::vector<Eigen::AlignedBox3d> MapFile::clearedBoxes() {
+  return hasJournal() ? readCleared(state_->database) : std::vector<Eigen::AlignedBox3d>();
+}
+
 struct MapFile::Change::State {
   MapFile::State& file;
   Totals totals;
@@ -165,9 +186,50 @@ void MapFile::Change::putDrive(const DriveRecord& drive) {
   state_->totals.drives += 1;
 }
 
+void MapFile::Change::requireJournal() const {
+  if (state_->file.version >= kFirstVersionWithJournal) return;
+  throw MapFileError(state_->file.database.name() + " has version " + std::to_string(state_->file.version) +
+                     " of the format, which has no journal of scans; convert it with migrate_map, or do "
+                     "without the journal");
+}
+
+void MapFile::Change::addScan(const ScanRecord& scan, const std::string& content) {
+  requireJournal();
+  if (scan.settings >= state_->totals.settings || scan.cleared > state_->totals.cleared) {
+    throw std::invalid_argument("scan " + std::to_string(scan.number) +
+                                " refers to settings or boxes that the file does not have");
+  }
+  insertScan(state_->file.database, scan, content, state_->totals);
+}
+
+void MapFile::Change::moveScan(const ScanRecord& scan) {
+  requireJournal();
+  updateScan(state_->file.database, scan, state_->totals);
+}
+
+int MapFile::Change::addSettings(const std::string& parameters) {
+  requireJournal();
+  checkText("the settings", parameters);
+  insertSettings(state_->file.database, parameters, state_->totals);
+  return static_cast<int>(state_->totals.settings) - 1;
+}
+
+int MapFile::Change::addClearedBox(const Eigen::AlignedBox3d& box) {
+  requireJournal();
+  if (box.min().hasNaN() || box.max().hasNaN())
+    throw std::invalid_argument("a corner of the box is not a number");
+  insertCleared(state_->file.database, box, state_->totals);
+  return static_cast<int>(state_->totals.cleared);
+}
+
+void MapFile::Change::eraseJournal() {
+  if (state_->file.version < kFirstVersionWithJournal) return;
+  bki_mapping::eraseJournal(state_->file.database, state_->totals);
+}
+
 void MapFile::Change::commit() {
   MapFile::State& file = state_->file;
-  writeTotals(file.database, state_->totals);
+  writeTotals(file.database, file.version, state_->totals);
   state_->done = true;
   file.commit(state_->totals);
 }

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "store/journal_rows.h"
 #include "store/tile_rows.h"
 
 namespace bki_mapping {
@@ -11,7 +12,7 @@ namespace bki_mapping {
 void MapFile::State::readAll(std::int64_t version_of_file) {
   version = version_of_file;
   TableRow table;
-  totals = readTotals(database);
+  totals = readTotals(database, version);
   checkTotals();
   Totals found;
   const std::uint32_t map_row = readMapRow(database, version, info, table);
@@ -26,14 +27,15 @@ void MapFile::State::readAll(std::int64_t version_of_file) {
     throw damaged(database.name(), error.what());
   }
   readTileList(database, totals.tiles, found);
+  if (version >= kFirstVersionWithJournal) readJournal(database, totals, found);
   if (!(found == totals)) throw damaged(database.name(), "rows of its tables are missing or changed");
 }
 
 void MapFile::State::checkTotals() const {
   const std::int64_t size = database.fileSize();
   bool too_many = totals.classes > static_cast<std::int64_t>(kMaxClasses);
-  for (const std::int64_t count :
-       {totals.classes, totals.drives, totals.tiles, totals.blocks, totals.planes}) {
+  for (const std::int64_t count : {totals.classes, totals.drives, totals.tiles, totals.blocks, totals.planes,
+                                   totals.scans, totals.settings, totals.cleared}) {
     too_many |= count < 0 || count > size;
   }
   // The lists of blocks and planes are never compressed.
@@ -66,7 +68,7 @@ void MapFile::State::commit(const Totals& next) {
 
 bool MapFile::State::settle() {
   if (!attempted_) return false;
-  const Totals found = readTotals(database);
+  const Totals found = readTotals(database, version);
   const bool made = found == *attempted_ && !(found == totals);
   totals = found;
   attempted_.reset();

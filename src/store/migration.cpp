@@ -16,20 +16,27 @@ namespace {
 void toVersion2(Database& database) {
   MapInfo info;
   TableRow table;
-  Totals totals = readTotals(database);
+  Totals totals = readTotals(database, 1);
   totals.checksums -= readMapRow(database, 1, info, table);
-  replaceMapTable(database);
+  changeSchema(database, 2);
   totals.checksums += writeMapRow(database, info, table);
-  writeTotals(database, totals);
+  writeTotals(database, 2, totals);
 }
 
 /// Tiles may hold looks; those of version 2 have none.
 void toVersion3(Database&) {}
 
+/// Adds the journal, without scans.
+void toVersion4(Database& database) {
+  const Totals totals = readTotals(database, 3);
+  changeSchema(database, 4);
+  writeTotals(database, 4, totals);
+}
+
 /// All steps up to kFormatVersion. Whoever adds a version adds the step that leads to it, and a file of the
 /// previous version in test/store/data.
 const std::vector<MigrationStep>& allSteps() {
-  static const std::vector<MigrationStep> steps = {{1, toVersion2}, {2, toVersion3}};
+  static const std::vector<MigrationStep> steps = {{1, toVersion2}, {2, toVersion3}, {3, toVersion4}};
   return steps;
 }
 

@@ -60,7 +60,7 @@ struct NewMapFile::State {
     for (const SemanticClass& c : info.classes->classes()) {
       state->totals.checksums += writeClassRow(insert, state->totals.classes++, c);
     }
-    writeTotals(state->database, state->totals);
+    writeTotals(state->database, kFormatVersion, state->totals);
     state->database.run("COMMIT");
     state->info = info;
     file = MapFile(std::move(state));

@@ -82,12 +82,17 @@ void visitDrive(Visit& visit, Drive& drive, Corner& low, Corner& high) {
 }
 
 template <typename Visit, typename Row>
-void visitTotals(Visit& visit, Row& totals) {
+void visitTotals(Visit& visit, std::int64_t version, Row& totals) {
   visit(totals.classes);
   visit(totals.drives);
   visit(totals.tiles);
   visit(totals.blocks);
   visit(totals.planes);
+  if (version >= kFirstVersionWithJournal) {
+    visit(totals.scans);
+    visit(totals.settings);
+    visit(totals.cleared);
+  }
   visit(totals.checksums);
 }
 
@@ -113,11 +118,6 @@ void readRows(Database& database, const std::string& table, std::optional<std::i
   if (expected && rows != *expected) {
     throw damaged(database.name(), "the table '" + table + "' has the wrong number of rows");
   }
-}
-
-void checkText(const std::string& what, const std::string& text) {
-  if (text.size() <= kLongestText && text.find('\0') == std::string::npos) return;
-  throw std::invalid_argument(what + " of a map file is longer than 1 MB, or has a zero byte");
 }
 
 }  // namespace
@@ -240,24 +240,31 @@ std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64
   return drives;
 }
 
-void writeTotals(Database& database, const Totals& totals) {
+void writeTotals(Database& database, std::int64_t version, const Totals& totals) {
   database.run("DELETE FROM total");
-  Statement insert = database.prepare("INSERT INTO total VALUES (?,?,?,?,?,?,?)");
+  Statement insert =
+      database.prepare(version >= kFirstVersionWithJournal ? "INSERT INTO total VALUES (?,?,?,?,?,?,?,?,?,?)"
+                                                           : "INSERT INTO total VALUES (?,?,?,?,?,?,?)");
   RowWriter row(insert);
-  visitTotals(row, totals);
+  visitTotals(row, version, totals);
   row.finish();
   insert.step();
 }
 
-Totals readTotals(Database& database) {
+Totals readTotals(Database& database, std::int64_t version) {
   Statement select = database.prepare("SELECT * FROM total");
   if (!select.step()) throw damaged(database.name(), "the table 'total' is empty");
   Totals totals;
   RowReader row(select, database.name());
-  visitTotals(row, totals);
+  visitTotals(row, version, totals);
   row.finish();
   if (select.step()) throw damaged(database.name(), "the table 'total' has two rows");
   return totals;
+}
+
+void checkText(const std::string& what, const std::string& text) {
+  if (text.size() <= kLongestText && text.find('\0') == std::string::npos) return;
+  throw std::invalid_argument(what + " of a map file is longer than 1 MB, or has a zero byte");
 }
 
 void checkInfo(const MapInfo& info) {

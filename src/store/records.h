@@ -14,8 +14,8 @@
 
 namespace bki_mapping {
 
-/// zlib's CRC-32 of a row's values: integers and real numbers as 8 bytes, little-endian; texts as their
-/// length, an integer, followed by their bytes; NULL as nothing.
+/// zlib's CRC-32 of a row's values: integers and real numbers as 8 bytes, little-endian; texts and blobs as
+/// their length, an integer, followed by their bytes; NULL as nothing.
 class RowChecksum {
  public:
   void add(std::int64_t value);
@@ -43,6 +43,11 @@ class RowWriter {
   void operator()(const std::optional<double>& field) {
     if (field) return put(*field);
     statement_.bindNull(column_++);
+  }
+  /// @param bytes must stay until the statement has run.
+  void blob(const std::string& bytes) {
+    checksum_.add(bytes);
+    statement_.bindBytes(column_++, bytes);
   }
   /// @return the checksum.
   std::uint32_t finish() {
@@ -94,9 +99,15 @@ class RowReader {
       (*this)(field.emplace());
     }
   }
+  void blob(std::string& bytes) {
+    const Statement::Bytes found = statement_.bytes(column_++);
+    bytes.assign(reinterpret_cast<const char*>(found.data), found.size);
+    text_size_ += static_cast<std::int64_t>(found.size);
+    checksum_.add(bytes);
+  }
   /// @return the checksum. @throws MapFileError if it is wrong.
   std::uint32_t finish() const;
-  /// The size of all texts of the row [bytes].
+  /// The size of all texts and blobs of the row [bytes].
   std::int64_t textSize() const { return text_size_; }
 
  private:
@@ -110,12 +121,14 @@ class RowReader {
 /// The number of rows of the other tables: without it, a lost row would go unnoticed.
 struct Totals {
   std::int64_t classes = 0, drives = 0, tiles = 0, blocks = 0, planes = 0;
+  std::int64_t scans = 0, settings = 0, cleared = 0;  ///< of the journal; 0 before kFirstVersionWithJournal
   /// Sum of the checksums of all rows of the other tables.
   std::int64_t checksums = 0;
 
   bool operator==(const Totals& o) const {
     return classes == o.classes && drives == o.drives && tiles == o.tiles && blocks == o.blocks &&
-           planes == o.planes && checksums == o.checksums;
+           planes == o.planes && scans == o.scans && settings == o.settings && cleared == o.cleared &&
+           checksums == o.checksums;
   }
 };
 
@@ -131,8 +144,9 @@ std::uint32_t writeMapRow(Database& database, const MapInfo& info, const TableRo
 std::uint32_t readMapRow(Database& database, std::int64_t version, MapInfo& info, TableRow& table);
 std::uint32_t writeClassRow(Statement& insert, std::int64_t position, const SemanticClass& c);
 std::uint32_t writeDriveRow(Statement& insert, const DriveRecord& drive);
-void writeTotals(Database& database, const Totals& totals);
-Totals readTotals(Database& database);
+/// @param version of the file.
+void writeTotals(Database& database, std::int64_t version, const Totals& totals);
+Totals readTotals(Database& database, std::int64_t version);
 
 /// All rows of a table, sorted by position or id. @param expected the number of rows, if it is known.
 /// @param[in,out] checksums the checksums of the rows are added to it.
@@ -144,5 +158,7 @@ std::vector<DriveRecord> readDrives(Database& database, std::optional<std::int64
 /// @throws std::invalid_argument in one sentence if a value is not allowed.
 void checkInfo(const MapInfo& info);
 void checkDrive(const DriveRecord& drive);
+/// @param what begins the sentence.
+void checkText(const std::string& what, const std::string& text);
 
 }  // namespace bki_mapping

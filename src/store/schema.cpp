@@ -1,9 +1,7 @@
 #include "store/schema.h"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
-#include <iterator>
 #include <string>
 
 namespace bki_mapping {
@@ -11,6 +9,9 @@ namespace {
 
 struct SchemaEntry {
   const char *type, *name, *sql;
+  std::int64_t first = 1, last = kFormatVersion;  ///< versions that have it
+
+  bool isOf(std::int64_t version) const { return first <= version && version <= last; }
 };
 
 // Sorted by name. The index covers the list of tiles, so that a list is read without any content.
@@ -19,30 +20,42 @@ constexpr SchemaEntry kSchema[] = {
      "CREATE TABLE class (position INTEGER, id INTEGER, name TEXT, red INTEGER, green INTEGER, blue INTEGER, "
      "raw TEXT, any_raw INTEGER, unlabelled INTEGER, dynamic INTEGER, ground INTEGER, ignored INTEGER, "
      "free_gain REAL, checksum INTEGER)"},
+    {"table", "cleared",
+     "CREATE TABLE cleared (number INTEGER PRIMARY KEY, min_x REAL, min_y REAL, min_z REAL, max_x REAL, "
+     "max_y REAL, max_z REAL, checksum INTEGER)",
+     kFirstVersionWithJournal},
     {"table", "drive",
      "CREATE TABLE drive (id TEXT, name TEXT, part INTEGER, scans INTEGER, first_stamp INTEGER, last_stamp "
      "INTEGER, min_x REAL, min_y REAL, min_z REAL, max_x REAL, max_y REAL, max_z REAL, checksum INTEGER)"},
     {"table", "map",
      "CREATE TABLE map (resolution REAL, unit_exponent INTEGER, prior REAL, frame TEXT, class_table TEXT, "
-     "label_mask INTEGER, parameters TEXT, program TEXT, checksum INTEGER)"},
+     "parameters TEXT, program TEXT, checksum INTEGER)",
+     1, 1},
+    {"table", "map",
+     "CREATE TABLE map (resolution REAL, unit_exponent INTEGER, prior REAL, frame TEXT, class_table TEXT, "
+     "label_mask INTEGER, parameters TEXT, program TEXT, checksum INTEGER)",
+     2},
+    {"table", "scan",
+     "CREATE TABLE scan (number INTEGER PRIMARY KEY, drive TEXT, stamp INTEGER, sensor TEXT, settings "
+     "INTEGER, cleared INTEGER, jump INTEGER, reach REAL, pose BLOB, odometry BLOB, tiles BLOB, bytes "
+     "INTEGER, content_checksum INTEGER, checksum INTEGER, content BLOB)",
+     kFirstVersionWithJournal},
+    {"table", "settings",
+     "CREATE TABLE settings (number INTEGER PRIMARY KEY, parameters TEXT, checksum INTEGER)",
+     kFirstVersionWithJournal},
     {"table", "tile",
      "CREATE TABLE tile (part INTEGER, z INTEGER, y INTEGER, x INTEGER, blocks INTEGER, planes INTEGER, "
      "checksum INTEGER, content BLOB)"},
     {"index", "tile_list", "CREATE UNIQUE INDEX tile_list ON tile (part, z, y, x, blocks, planes, checksum)"},
     {"table", "total",
      "CREATE TABLE total (classes INTEGER, drives INTEGER, tiles INTEGER, blocks INTEGER, planes INTEGER, "
-     "checksums INTEGER, checksum INTEGER)"},
+     "checksums INTEGER, checksum INTEGER)",
+     1, kFirstVersionWithJournal - 1},
+    {"table", "total",
+     "CREATE TABLE total (classes INTEGER, drives INTEGER, tiles INTEGER, blocks INTEGER, planes INTEGER, "
+     "scans INTEGER, settings INTEGER, cleared INTEGER, checksums INTEGER, checksum INTEGER)",
+     kFirstVersionWithJournal},
 };
-
-/// Of version 1, whose other tables are those above.
-constexpr char kMapTable1[] =
-    "CREATE TABLE map (resolution REAL, unit_exponent INTEGER, prior REAL, frame TEXT, class_table TEXT, "
-    "parameters TEXT, program TEXT, checksum INTEGER)";
-
-const SchemaEntry& mapTable() {
-  return *std::find_if(std::begin(kSchema), std::end(kSchema),
-                       [](const SchemaEntry& entry) { return std::strcmp(entry.name, "map") == 0; });
-}
 
 constexpr char kMagic[] = "SQLite format 3";  // ends in a zero byte, in the file, too
 
@@ -61,7 +74,9 @@ std::int64_t bigEndian(const Database::Header& header, std::size_t position, std
 void createSchema(Database& database) {
   database.run(("PRAGMA application_id = " + std::to_string(kApplicationId)).c_str());
   database.run(("PRAGMA user_version = " + std::to_string(kFormatVersion)).c_str());
-  for (const SchemaEntry& entry : kSchema) database.run(entry.sql);
+  for (const SchemaEntry& entry : kSchema) {
+    if (entry.isOf(kFormatVersion)) database.run(entry.sql);
+  }
 }
 
 std::int64_t checkIdentity(const Database& database) {
@@ -96,18 +111,20 @@ void checkComplete(const Database& database) {
 void checkSchema(const Database& database, std::int64_t version) {
   Statement select = database.prepare("SELECT type, name, sql FROM sqlite_master ORDER BY name");
   for (const SchemaEntry& entry : kSchema) {
-    const char* const sql = &entry == &mapTable() && version == 1 ? kMapTable1 : entry.sql;
+    if (!entry.isOf(version)) continue;
     if (!select.step() || select.text(0) != entry.type || select.text(1) != entry.name ||
-        select.text(2) != sql) {
+        select.text(2) != entry.sql) {
       throw damaged(database.name(), "its tables are not those of a map");
     }
   }
   if (select.step()) throw damaged(database.name(), "it has tables that do not belong to a map");
 }
 
-void replaceMapTable(Database& database) {
-  database.run("DROP TABLE map");
-  database.run(mapTable().sql);
+void changeSchema(Database& database, std::int64_t version) {
+  for (const SchemaEntry& entry : kSchema) {
+    if (entry.last == version - 1) database.run((std::string("DROP TABLE ") + entry.name).c_str());
+    if (entry.first == version) database.run(entry.sql);
+  }
 }
 
 }  // namespace bki_mapping

@@ -9,9 +9,11 @@ namespace bki_mapping {
 
 /// "BKIM", the application_id in the header of the file.
 constexpr std::int64_t kApplicationId = 0x424b494d;
-constexpr std::int64_t kFormatVersion = 3;
+constexpr std::int64_t kFormatVersion = 4;
 /// Before it, tiles have no looks (bki_mapping/map/looks.h).
 constexpr std::int64_t kFirstVersionWithLooks = 3;
+/// Before it, files have no journal (bki_mapping/store/scan_record.h).
+constexpr std::int64_t kFirstVersionWithJournal = 4;
 
 /// Marks an empty database as a map file, and creates the tables.
 void createSchema(Database& database);
@@ -23,7 +25,7 @@ std::int64_t checkIdentity(const Database& database);
 void checkComplete(const Database& database);
 /// Checks that the file has the tables of a version, and no others.
 void checkSchema(const Database& database, std::int64_t version);
-/// Replaces the table `map` of a file of an older version by an empty one of kFormatVersion.
-void replaceMapTable(Database& database);
+/// Makes the tables of a version of those of the version before. Tables whose columns differ are then empty.
+void changeSchema(Database& database, std::int64_t version);
 
 }  // namespace bki_mapping

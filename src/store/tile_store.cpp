@@ -85,6 +85,7 @@ TileStore::Call TileStore::clear() {
       for (const TileEntry& tile : file.tiles(part)) change.eraseTile({tile.index, part});
     }
     for (const DriveRecord& drive : file.drives()) change.eraseDrive(drive.id);
+    change.eraseJournal();
     return true;
   };
   return enqueue({work, 0, std::nullopt, true});

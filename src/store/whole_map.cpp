@@ -42,7 +42,14 @@ void copyMap(MapFile& file, const std::string& path) {
       copy.content().writeTile(map, {tile.index, part});
     }
   }
+  copyJournal(file, copy.content());
   copy.commit();
+}
+
+void copyJournal(MapFile& file, MapFile::Change& copy) {
+  for (const std::string& parameters : file.settings()) copy.addSettings(parameters);
+  for (const Eigen::AlignedBox3d& box : file.clearedBoxes()) copy.addClearedBox(box);
+  for (const ScanRecord& scan : file.scans()) copy.addScan(scan, file.scanContent(scan.number));
 }
 
 StoredMap loadMap(const std::string& path, std::size_t memory_limit) {

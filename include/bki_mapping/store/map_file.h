@@ -13,6 +13,7 @@
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/grid_geometry.h"
 #include "bki_mapping/map/semantic_map.h"
+#include "bki_mapping/store/scan_record.h"
 
 namespace bki_mapping {
 
@@ -139,6 +140,18 @@ class MapFile {
   /// @throws std::bad_alloc; the map may then lack some blocks of the tile.
   bool addTileTo(SemanticMap& map, const TileKey& key);
 
+  // The journal: the scans in the map that can be moved to other poses. Not every scan has to be in it.
+  /// Whether the file's version has a journal.
+  bool hasJournal() const;
+  /// Sorted by number.
+  std::vector<ScanRecord> scans();
+  /// The points of a scan of the journal, packed as docs/map_file.md says.
+  std::string scanContent(std::uint64_t number);
+  /// The parameters with which scans of the journal were integrated, as YAML, by number.
+  std::vector<std::string> settings();
+  /// Boxes of the map that were cleared, in order (map frame [m]).
+  std::vector<Eigen::AlignedBox3d> clearedBoxes();
+
   /// A change of the file. commit() makes it durable as a whole; without it, the change is undone. The file
   /// must outlive the change, and can have only one change at a time. Do not commit a change one of whose
   /// functions has thrown: it may lack the tile or drive that was to be replaced.
@@ -155,6 +168,19 @@ class MapFile {
     /// @throws std::invalid_argument if the record is invalid.
     void putDrive(const DriveRecord& drive);
     void eraseDrive(const std::string& id);
+
+    // The journal; these throw MapFileError if the file's version has none.
+    /// Adds a scan with a number that the journal does not have. @param content its packed points.
+    /// @throws std::invalid_argument if the record is invalid.
+    void addScan(const ScanRecord& scan, const std::string& content);
+    /// Replaces all of a scan but its content. @throws std::invalid_argument likewise.
+    void moveScan(const ScanRecord& scan);
+    /// Adds settings, as YAML. @return their number.
+    int addSettings(const std::string& parameters);
+    /// Notes that a box is being cleared; the caller clears it. @return the number of boxes now.
+    int addClearedBox(const Eigen::AlignedBox3d& box);
+    /// Forgets all scans, settings and boxes; the map stays as it is. Does nothing if the version has none.
+    void eraseJournal();
     /// Writes the change to the disk, and returns when it is durable. The object must not be used afterwards.
     /// If the function throws, the change is not made; MapFile::change() describes the one exception.
     void commit();
@@ -163,6 +189,7 @@ class MapFile {
     friend class MapFile;
     struct State;
     explicit Change(MapFile& file);
+    void requireJournal() const;
     std::unique_ptr<State> state_;
   };
   /// Begins a change. @throws std::logic_error if the file is open for reading only.
@@ -214,6 +241,9 @@ void saveMap(const std::string& path, const MapInfo& info, const std::vector<Dri
 
 /// Copies a map file with all its parts, as NewMapFile does. @throws MapFileError, and as NewMapFile.
 void copyMap(MapFile& file, const std::string& path);
+
+/// Adds the journal of a file to another, which has none. @throws MapFileError.
+void copyJournal(MapFile& file, MapFile::Change& copy);
 
 /// Reads a whole map (part 0) and checks every byte of it.
 /// @param memory_limit for the map [bytes]; 0: no limit. @throws MapFileError, also if the map would exceed
