@@ -13,8 +13,8 @@ def read_planes(file, part=0):
     as an array [z, y, x]."""
     database = sqlite3.connect(pathlib.Path(file).absolute().as_uri() + '?mode=ro', uri=True)
     (application,), (version,) = (database.execute(f'PRAGMA {name}').fetchone() for name in ('application_id', 'user_version'))
-    if application != 0x424b494d or version not in (1, 2, 3):
-        raise ValueError(f'{file} is not a map file of version 1 to 3')
+    if application != 0x424b494d or version not in (1, 2, 3, 4):
+        raise ValueError(f'{file} is not a map file of version 1 to 4')
     exponent, = database.execute('SELECT unit_exponent FROM map').fetchone()
     for z, y, x, blocks, planes, content in database.execute(
             'SELECT z, y, x, blocks, planes, content FROM tile WHERE part = ? ORDER BY z, y, x', (part,)):

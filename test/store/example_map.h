@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -102,6 +103,46 @@ inline std::vector<DriveRecord> exampleDrives() {
   second.id = "9e02";
   second.part = 1;  // without name, scans and bounds
   return {first, second};
+}
+
+/// The journal that files have since version 4. Its scans are of drive 3f1c.
+inline std::vector<std::string> exampleSettings() {
+  return {"resolution: 0.25\n", "resolution: 0.25\nfree_space:\n  mode: none\n"};
+}
+inline std::vector<Eigen::AlignedBox3d> exampleCleared() {
+  const double endless = std::numeric_limits<double>::infinity();
+  return {{Eigen::Vector3d(-1.0, 2.0, -endless), Eigen::Vector3d(1.5, 2.5, endless)}};
+}
+inline std::vector<ScanRecord> exampleScans() {
+  ScanRecord first, second;
+  first.number = 7;
+  first.drive = "3f1c";
+  first.stamp = 1'700'000'000'000'000'001;
+  first.reach = 81.5;
+  first.T_map_sensor.translation() = Eigen::Vector3d(4.0, -1.0 / 3.0, 1.75);
+  first.tiles = {{-1, -1, -1}, {0, 0, 0}, {1, 0, 0}};
+  second = first;
+  second.number = 300;
+  second.stamp = 1'700'000'027'000'000'000;
+  second.sensor = "velodyne";
+  second.settings = second.cleared = 1;
+  second.jump = true;
+  second.T_map_sensor.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  second.T_odometry_sensor.translation().x() = -0.125;
+  second.tiles = {{0, 0, -70000}, {4000000, 0, 0}, {-1, 100, 0}};
+  return {first, second};
+}
+/// Byte n of the content of a scan is n * number mod 251. (No scan is packed so; a map file does not look
+/// into the content.) The second one takes more than a page.
+inline std::string exampleContent(std::uint64_t number) {
+  std::string content(number == 7 ? 100 : 10000, '\0');
+  for (std::size_t n = 0; n < content.size(); ++n) content[n] = static_cast<char>(n * number % 251);
+  return content;
+}
+inline void addExampleJournal(MapFile::Change& change) {
+  for (const std::string& settings : exampleSettings()) change.addSettings(settings);
+  for (const Eigen::AlignedBox3d& box : exampleCleared()) change.addClearedBox(box);
+  for (const ScanRecord& scan : exampleScans()) change.addScan(scan, exampleContent(scan.number));
 }
 
 }  // namespace bki_mapping

@@ -19,9 +19,10 @@ struct FileContent {
   std::string info;  ///< the rows of the tables `map` and `class`
   std::vector<DriveRecord> drives;
   std::map<int, std::map<GridIndex, std::string>> parts;  ///< as reference::contentOf
+  std::string journal;
 
   bool operator==(const FileContent& other) const {
-    return info == other.info && drives == other.drives && parts == other.parts;
+    return info == other.info && drives == other.drives && parts == other.parts && journal == other.journal;
   }
 };
 
@@ -37,6 +38,23 @@ inline std::string textOf(const MapInfo& info) {
     for (const int channel : c.color) text << '|' << channel;
     for (const std::uint32_t raw : c.raw) text << '|' << raw;
     if (c.free_gain) text << '|' << *c.free_gain;
+  }
+  return text.str();
+}
+
+inline std::string journalOf(MapFile& file) {
+  std::ostringstream text;
+  text.precision(17);
+  for (const std::string& settings : file.settings()) text << settings << '|';
+  for (const Eigen::AlignedBox3d& box : file.clearedBoxes()) {
+    text << box.min().transpose() << '|' << box.max().transpose() << '|';
+  }
+  for (const ScanRecord& scan : file.scans()) {
+    text << scan.number << '|' << scan.drive << '|' << scan.stamp << '|' << scan.sensor << '|'
+         << scan.settings << '|' << scan.cleared << '|' << scan.jump << '|' << scan.reach << '|'
+         << scan.T_map_sensor.matrix() << '|' << scan.T_odometry_sensor.matrix();
+    for (const GridIndex& tile : scan.tiles) text << '|' << tile.x << ',' << tile.y << ',' << tile.z;
+    text << '|' << file.scanContent(scan.number) << '\n';
   }
   return text.str();
 }
@@ -58,7 +76,7 @@ inline void writeFile(const std::string& path, const std::string& bytes) {
 
 /// Reads all of a file.
 inline FileContent contentOf(MapFile& file) {
-  FileContent content{textOf(file.info()), file.drives(), {}};
+  FileContent content{textOf(file.info()), file.drives(), {}, journalOf(file)};
   for (const int part : file.parts()) content.parts[part] = reference::contentOf(readPart(file, part));
   return content;
 }

@@ -38,9 +38,18 @@ class Forgery {
   /// Makes all checksums of rows and all totals right.
   void sign() {
     std::int64_t sum = 0;
-    for (const std::string table : {"map", "class", "drive"}) {
+    const std::pair<const char*, std::string> kTables[] = {
+        {"*", "map"},
+        {"*", "class"},
+        {"*", "drive"},
+        {"*", "settings"},
+        {"*", "cleared"},
+        {"number, drive, stamp, sensor, settings, cleared, jump, reach, pose, odometry, tiles, bytes, "
+         "content_checksum, checksum",
+         "scan"}};
+    for (const auto& [all_columns, table] : kTables) {
       std::vector<std::pair<std::int64_t, std::uint32_t>> checksums;
-      forEachRow("SELECT *, rowid FROM " + table, [&](sqlite3_stmt* row) {
+      forEachRow(std::string("SELECT ") + all_columns + ", rowid FROM " + table, [&](sqlite3_stmt* row) {
         const int columns = sqlite3_column_count(row);
         checksums.emplace_back(sqlite3_column_int64(row, columns - 1), checksumOf(row, columns - 2));
         sum += checksums.back().second;
@@ -54,13 +63,14 @@ class Forgery {
                [&](sqlite3_stmt* row) { sum += checksumOf(row, 7); });
     run("UPDATE total SET classes = (SELECT count(*) FROM class), drives = (SELECT count(*) FROM drive), "
         "tiles = (SELECT count(*) FROM tile), blocks = (SELECT sum(blocks) FROM tile), "
-        "planes = (SELECT sum(planes) FROM tile), checksums = " +
+        "planes = (SELECT sum(planes) FROM tile), scans = (SELECT count(*) FROM scan), "
+        "settings = (SELECT count(*) FROM settings), cleared = (SELECT count(*) FROM cleared), checksums = " +
         std::to_string(sum));
     signTotals();
   }
   void signTotals() {
     std::uint32_t checksum = 0;
-    forEachRow("SELECT * FROM total", [&](sqlite3_stmt* row) { checksum = checksumOf(row, 6); });
+    forEachRow("SELECT * FROM total", [&](sqlite3_stmt* row) { checksum = checksumOf(row, 9); });
     run("UPDATE total SET checksum = " + std::to_string(checksum));
   }
 
@@ -84,7 +94,8 @@ class Forgery {
           checksum.add(sqlite3_column_double(row, c));
           break;
         case SQLITE_TEXT:
-          checksum.add(std::string(reinterpret_cast<const char*>(sqlite3_column_text(row, c)),
+        case SQLITE_BLOB:
+          checksum.add(std::string(static_cast<const char*>(sqlite3_column_blob(row, c)),
                                    static_cast<std::size_t>(sqlite3_column_bytes(row, c))));
           break;
         default:

@@ -52,13 +52,16 @@ std::string randomValue(Random& random) {
 }
 
 std::string randomChange(Random& random) {
-  static const std::array<std::string, 5> kTables{"map", "class", "drive", "tile", "total"};
-  static const std::array<std::string, 35> kColumns{
-      "resolution", "unit_exponent", "prior",  "frame",     "class_table", "label_mask", "parameters",
-      "program",    "position",      "id",     "name",      "red",         "raw",        "any_raw",
-      "unlabelled", "dynamic",       "ground", "free_gain", "part",        "scans",      "first_stamp",
-      "min_x",      "max_z",         "z",      "y",         "x",           "blocks",     "planes",
-      "checksum",   "content",       "tiles",  "checksums", "drives",      "classes",    "ignored"};
+  static const std::array<std::string, 8> kTables{"map",   "class", "drive",    "tile",
+                                                  "total", "scan",  "settings", "cleared"};
+  static const std::array<std::string, 43> kColumns{
+      "resolution",      "unit_exponent", "prior",  "frame",     "class_table", "label_mask", "parameters",
+      "program",         "position",      "id",     "name",      "red",         "raw",        "any_raw",
+      "unlabelled",      "dynamic",       "ground", "free_gain", "part",        "scans",      "first_stamp",
+      "min_x",           "max_z",         "z",      "y",         "x",           "blocks",     "planes",
+      "checksum",        "content",       "tiles",  "checksums", "drives",      "classes",    "ignored",
+      "number",          "stamp",         "jump",   "reach",     "pose",        "odometry",   "bytes",
+      "content_checksum"};
   const std::string& table = oneOf(kTables, random);
   const std::string row =
       " WHERE rowid = (SELECT rowid FROM " + table + " LIMIT 1 OFFSET " + std::to_string(random() % 4) + ")";

@@ -17,7 +17,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_3.bkm";
+const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_4.bkm";
 
 class HostileFile : public testing::Test {
  protected:
@@ -107,6 +107,21 @@ TEST_F(HostileFile, HasWrongValues) {
       {"UPDATE tile SET content = x''", "too short"},
       {"UPDATE tile SET content = 'text'", "not a blob"},
       {"UPDATE tile SET content = zeroblob(100)", "a length is wrong"},
+      {"UPDATE scan SET pose = zeroblob(96) WHERE number = 7", "is no pose"},
+      {"UPDATE scan SET pose = x'00'", "not 12 numbers"},
+      {"UPDATE scan SET odometry = 7", "not"},
+      {"UPDATE scan SET tiles = x'80'", "cut off"},
+      {"UPDATE scan SET tiles = x'FFFFFFFF0F0000'", "out of range"},
+      {"UPDATE scan SET tiles = x'000000000000'", "not sorted"},
+      {"UPDATE scan SET settings = 2", "does not have"},
+      {"UPDATE scan SET cleared = 2", "does not have"},
+      {"UPDATE scan SET reach = -1.0", "out of range"},
+      {"UPDATE scan SET jump = 2", "out of range"},
+      {"UPDATE scan SET stamp = -1", "out of range"},
+      {"UPDATE scan SET content = x'00' WHERE number = 7", "the checksum of scan 7"},
+      {"UPDATE scan SET number = -1 WHERE number = 7", "out of range"},
+      {"UPDATE settings SET number = 5 WHERE number = 0", "missing"},
+      {"UPDATE cleared SET min_x = NULL", "not a real number"},
       {"UPDATE tile SET content = x'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF'", "a length is wrong"},
       {"INSERT INTO tile SELECT part, z, y, x, blocks, planes, checksum + 1, content FROM tile",
        "out of order"},
@@ -163,7 +178,8 @@ std::string pageOf(std::uint32_t child, bool index, std::size_t head = 0) {
 // A page of a tree refers to the next one some hundred times, that one to the next again, and so on: the rows
 // are countless.
 TEST_F(HostileFile, HasPagesThatContainEachOther) {
-  for (const std::string table : {"sqlite_master", "map", "class", "drive", "total", "tile_list"}) {
+  for (const std::string table :
+       {"sqlite_master", "map", "class", "drive", "total", "tile_list", "scan", "settings", "cleared"}) {
     std::string bytes = readFile(kFile);
     writeFile(path_, bytes);
     std::size_t root = 1;
@@ -221,7 +237,8 @@ TEST_F(HostileFile, ClaimsWhatItHasNoRoomFor) {
        {"UPDATE total SET tiles = 9223372036854775807", "UPDATE total SET tiles = -1",
         "UPDATE total SET drives = 9223372036854775807", "UPDATE total SET classes = 9223372036854775807",
         "UPDATE total SET blocks = 4611686018427387904, planes = 4611686018427387904",
-        "UPDATE total SET planes = 30000"}) {
+        "UPDATE total SET planes = 30000", "UPDATE total SET scans = 9223372036854775807",
+        "UPDATE total SET scans = 1", "UPDATE total SET settings = -1", "UPDATE total SET cleared = 0"}) {
     writeFile(path_, readFile(kFile));
     {
       Forgery forgery(path_);

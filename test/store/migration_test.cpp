@@ -8,6 +8,7 @@
 
 #include "reference/content.h"
 #include "store/example_map.h"
+#include "store/file_content.h"
 #include "store/map_maker.h"
 #include "store/schema.h"
 #include "temporary_folder.h"
@@ -54,6 +55,8 @@ TEST_P(MigrationFrom, CopiesAll) {
   EXPECT_EQ(copy.info().classes->labelMask(), GetParam() == 1 ? ClassTable::kAllBits : kExampleMask);
   EXPECT_NO_THROW(checkSameGrid("old", old.info(), "copy", copy.info()));
   EXPECT_NE(bytesOf(folder / "new.bkm").find("label_mask INTEGER"), std::string::npos) << "since version 2";
+  EXPECT_EQ(journalOf(old), journalOf(copy));
+  EXPECT_EQ(copy.scans().empty(), GetParam() < 4);
   ASSERT_EQ(old.parts(), copy.parts());
   ASSERT_GT(old.parts().size(), 1u);
   for (const int part : old.parts()) {

@@ -6,10 +6,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 
 #include "bki_mapping/store/map_file.h"
 #include "reference/content.h"
 #include "store/example_map.h"
+#include "store/file_content.h"
 #include "store/map_maker.h"
 #include "store/schema.h"
 #include "temporary_folder.h"
@@ -23,12 +25,6 @@ class Version : public testing::TestWithParam<int> {
       BKI_MAPPING_SOURCE_DIR "/test/store/data/version_" + std::to_string(GetParam()) + ".bkm";
 };
 INSTANTIATE_TEST_SUITE_P(All, Version, testing::Range(1, static_cast<int>(kFormatVersion) + 1));
-
-SemanticMap readPart(MapFile& file, int part) {
-  SemanticMap map = file.info().emptyMap();
-  for (const TileEntry& tile : file.tiles(part)) EXPECT_TRUE(file.addTileTo(map, {tile.index, part}));
-  return map;
-}
 
 /// CRC-32 over all planes in the order of block (x, then y, then z) and class: x, y, z, class and the units,
 /// 4 bytes each, little-endian.
@@ -117,7 +113,7 @@ TEST_P(Version, HoldsWhatTheMapIsAbout) {
   EXPECT_EQ(info.unit_exponent, 16);
   EXPECT_EQ(info.frame, "map");
   EXPECT_EQ(info.parameters, "resolution: 0.25\nfree_space:\n  mode: line\n");
-  EXPECT_EQ(info.program, "bki_mapping 0.1.0");
+  EXPECT_EQ(info.program, GetParam() < 4 ? "bki_mapping 0.1.0" : "bki_mapping 0.2.0");
   EXPECT_EQ(info.classes->name(), "example");
   EXPECT_EQ(info.classes->labelMask(), GetParam() == 1 ? ClassTable::kAllBits : kExampleMask);
   ASSERT_EQ(info.classes->size(), 3u);
@@ -152,6 +148,101 @@ TEST_P(Version, HoldsWhatTheMapIsAbout) {
   EXPECT_EQ(drives[1].id, "9e02");
   EXPECT_EQ(drives[1].part, 1);
   EXPECT_TRUE(drives[1].bounds.isEmpty());
+}
+
+TEST_P(Version, HoldsItsJournal) {
+  MapFile file(file_, MapFile::Access::kRead);
+  EXPECT_EQ(file.hasJournal(), GetParam() >= 4);
+  const std::vector<ScanRecord> scans = file.scans();
+  if (GetParam() < 4) {
+    EXPECT_TRUE(scans.empty() && file.settings().empty() && file.clearedBoxes().empty());
+    return;
+  }
+  ASSERT_EQ(scans.size(), 2u);
+  EXPECT_EQ(scans[0].number, 7u);
+  EXPECT_EQ(scans[1].number, 300u);
+  EXPECT_EQ(scans[1].drive, "3f1c");
+  EXPECT_EQ(scans[0].stamp, 1700000000000000001u);
+  EXPECT_EQ(scans[0].sensor, "");
+  EXPECT_EQ(scans[1].sensor, "velodyne");
+  EXPECT_TRUE(scans[0].settings == 0 && scans[0].cleared == 0 && !scans[0].jump);
+  EXPECT_TRUE(scans[1].settings == 1 && scans[1].cleared == 1 && scans[1].jump);
+  EXPECT_EQ(scans[0].reach, 81.5);
+  EXPECT_EQ(scans[0].T_map_sensor(1, 3), -1.0 / 3.0);
+  EXPECT_EQ(scans[0].T_map_sensor(0, 0), 1.0);
+  EXPECT_EQ(scans[1].T_map_sensor(0, 1), -1.0);
+  EXPECT_EQ(scans[1].T_odometry_sensor(0, 3), -0.125);
+  EXPECT_EQ(scans[0].tiles, (std::vector<GridIndex>{{-1, -1, -1}, {0, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(scans[1].tiles, (std::vector<GridIndex>{{0, 0, -70000}, {4000000, 0, 0}, {-1, 100, 0}}));
+  const std::string content = file.scanContent(300);
+  EXPECT_EQ(content.size(), 10000u);
+  EXPECT_EQ(content[3], static_cast<char>(900 % 251));
+  EXPECT_EQ(file.scanContent(7), exampleContent(7));
+  ASSERT_EQ(file.settings().size(), 2u);
+  EXPECT_EQ(file.settings()[1], "resolution: 0.25\nfree_space:\n  mode: none\n");
+  ASSERT_EQ(file.clearedBoxes().size(), 1u);
+  EXPECT_EQ(file.clearedBoxes()[0].min().z(), -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(file.clearedBoxes()[0].max().x(), 1.5);
+}
+
+TEST_P(Version, KeepsAJournalOrSaysThatItHasNone) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::filesystem::copy_file(file_, path);
+  std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  ScanRecord scan = exampleScans()[1];
+  scan.number = 301;
+  scan.T_map_sensor.translation().x() = 12.0;
+  MapFile file(path, MapFile::Access::kUpdate);
+  if (GetParam() < 4) {
+    MapFile::Change change = file.change();
+    EXPECT_EQ(sentenceOf([&] { change.addSettings("x: 1\n"); }),
+              path + " has version " + std::to_string(GetParam()) +
+                  " of the format, which has no journal of scans; convert it with migrate_map, or do without "
+                  "the journal");
+    EXPECT_NE(sentenceOf([&] { change.addScan(scan, ""); }), "");
+    EXPECT_NO_THROW(change.eraseJournal());
+    return;
+  }
+  {
+    MapFile::Change change = file.change();
+    scan.settings = change.addSettings("x: 1\n");
+    EXPECT_EQ(scan.settings, 2);
+    scan.cleared = change.addClearedBox(exampleCleared()[0]);
+    EXPECT_EQ(scan.cleared, 2);
+    change.addScan(scan, "abc");
+    ScanRecord moved = exampleScans()[0];
+    moved.T_map_sensor.translation().x() = 5.0;
+    moved.tiles = {{2, 0, 0}};
+    change.moveScan(moved);
+    change.commit();
+  }
+  EXPECT_EQ(file.scans().size(), 3u);
+  EXPECT_EQ(file.scans()[0].T_map_sensor.translation().x(), 5.0);
+  EXPECT_EQ(file.scans()[0].tiles, (std::vector<GridIndex>{{2, 0, 0}}));
+  EXPECT_EQ(file.scanContent(7), exampleContent(7));
+  EXPECT_EQ(file.scans()[2].number, 301u);
+  EXPECT_EQ(file.scans()[2].cleared, 2);
+  EXPECT_EQ(file.scanContent(301), "abc");
+  const std::string journal = journalOf(file);
+  { const MapFile closed = std::move(file); }
+  file = MapFile(path, MapFile::Access::kUpdate);  // its checksums are right
+  EXPECT_EQ(journalOf(file), journal);
+  {
+    MapFile::Change change = file.change();
+    ScanRecord wrong = scan;
+    wrong.number = 302;
+    wrong.settings = 3;
+    EXPECT_THROW(change.addScan(wrong, ""), std::invalid_argument) << "there are no such settings";
+    EXPECT_THROW(change.moveScan(wrong), std::invalid_argument) << "there is no such scan";
+    wrong.settings = 0;
+    wrong.T_map_sensor.linear() *= 2.0;
+    EXPECT_THROW(change.addScan(wrong, ""), std::invalid_argument) << "that is no rotation";
+    change.eraseJournal();
+    change.commit();
+  }
+  EXPECT_TRUE(file.scans().empty() && file.settings().empty() && file.clearedBoxes().empty());
+  EXPECT_TRUE(MapFile(std::move(file)).drives() == exampleDrives());
 }
 
 // What write_example_map would write today reads as what it wrote then.
@@ -192,12 +283,12 @@ TEST(NewerVersion, IsRefused) {
   const std::string path = folder / "map.bkm";
   std::filesystem::copy_file(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm", path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\4');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\5');
   for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
     EXPECT_EQ(
         sentenceOf([&] { MapFile(path, access); }),
         path +
-            " was written by a newer version of bki_mapping (format 4, this one knows formats up to 3); "
+            " was written by a newer version of bki_mapping (format 5, this one knows formats up to 4); "
             "use that version or a later one");
   }
 }

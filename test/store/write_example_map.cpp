@@ -16,6 +16,7 @@ int main(int argc, char** argv) try {
   for (const DriveRecord& drive : exampleDrives()) file.content().putDrive(drive);
   for (const GridIndex& tile : tilesOf(sum)) file.content().writeTile(sum, {tile});
   for (const GridIndex& tile : tilesOf(part)) file.content().writeTile(part, {tile, 1});
+  addExampleJournal(file.content());
   file.commit();
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
