@@ -49,7 +49,7 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
       map_(std::move(map)),
       config_(std::make_shared<const MapperConfig>(config)),
       journal_(settings.memory),
-      mover_(std::make_unique<ScanMover>(config, std::move(classes))) {
+      mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
   checkCorrectable(config);
   thread_ = std::thread(&MapCorrector::work, this);
@@ -93,6 +93,7 @@ void MapCorrector::addScan(SensorScan scan, std::size_t sensor, const Eigen::Iso
   const bool seen = looks_ && anyIn(*looks_, entry.regions);
   const Number number = journal_.add(std::move(entry));
   unpacked_.push_back(number);
+  changes_.added.push_back(number);
   if (seen) to_look_.push_back(number);
 }
 
@@ -113,6 +114,7 @@ void MapCorrector::noteForeign(const std::vector<GridIndex>& regions) {
 
 void MapCorrector::reset() {
   journal_.clear();
+  changes_ = {};
   unpacked_.clear();
   dropLooks();
   changed_regions_.clear();
@@ -229,7 +231,7 @@ bool MapCorrector::startMoving(const Eigen::Vector3d& robot) {
   double best_distance = 0.0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
     const JournalScan& scan = journal_.at(n);
-    if (!scan.packed || !scan.off) continue;
+    if (!scan.isPacked() || !scan.off) continue;
     const double distance = std::floor((scan.wanted.translation() - robot).norm() / kEquallyNear);
     if (best && distance > best_distance) continue;
     best = n;
@@ -244,7 +246,7 @@ bool MapCorrector::startMoving(const Eigen::Vector3d& robot) {
   for (Number n = *best; moving.numbers.size() < (alone_ ? 1 : kMovesAtOnce); --n) {
     const JournalScan& scan = journal_.at(n);
     const bool alike = scan.settings == first.settings && scan.cleared_before == first.cleared_before;
-    if (!scan.packed || !scan.off || !alike) break;
+    if (!scan.isPacked() || !scan.off || !alike) break;
     moving.numbers.push_back(n);
     moving.moves.push_back({journal_.placed(n), scan.wanted});
     if (n == journal_.begin()) break;
@@ -288,7 +290,7 @@ bool MapCorrector::startLooking(const Eigen::Vector3d& robot) {
   Looking looking{{}, looks_};
   for (; !to_look_.empty() && looking.scans.size() < kScansAtOnce; to_look_.pop_front()) {
     if (!journal_.has(to_look_.front()) || !journal_.at(to_look_.front()).isKept()) continue;
-    if (!journal_.at(to_look_.front()).packed) break;
+    if (!journal_.at(to_look_.front()).isPacked()) break;
     looking.scans.push_back(journal_.placed(to_look_.front()));
   }
   if (looking.scans.empty()) return false;
@@ -300,7 +302,7 @@ void MapCorrector::lookAtNext() {
   if (to_look_.empty()) return;
   const Number number = to_look_.front();
   if (journal_.has(number) && journal_.at(number).isKept()) {
-    if (!journal_.at(number).packed) return;
+    if (!journal_.at(number).isPacked()) return;
     mover_->addLooks(journal_.placed(number), *looks_);
   }
   to_look_.pop_front();
@@ -411,6 +413,7 @@ std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
     JournalScan& scan = journal_.at(moving.numbers[n]);
     dropLooksOf(scan.regions);
     scan.T_map_sensor = moving.moves[n].to;
+    changes_.moved.insert(moving.numbers[n]);
     mark(scan);
     scan.regions = std::move(moving.moved->regions[n]);
     dropLooksOf(scan.regions);

@@ -24,6 +24,8 @@ struct CorrectedMap {
   std::function<std::vector<GridIndex>(const GridIndex& region, const LooksByBlock& looks)> replace_looks;
   /// Whether scans may be moved now; empty: always.
   std::function<bool()> ready = {};
+  /// Reads a scan of which noteStored() was told; called by the thread that moves scans, too.
+  ScanMover::Fetch fetch = {};
 };
 
 /// Keeps the scans of a map, and moves them to where they belong. A thread of its own computes, for a few
@@ -43,7 +45,7 @@ class MapCorrector {
   struct Settings {
     double quantum = 0.01;    ///< to which points are rounded in the sensor's frame [m]
     double tolerance = -1.0;  ///< scans that no point of which is farther off stay [m]; < 0: resolution / 10
-    std::size_t memory = 0;   ///< of the packed scans [bytes]; 0: no limit
+    std::size_t memory = 0;   ///< of the packed scans in memory [bytes]; 0: no limit
   };
 
   /// @throws as checkCorrectable().
@@ -88,9 +90,21 @@ class MapCorrector {
   /// The poses where the kept scans belong, by rising stamp.
   std::vector<StampedMotion> trajectory() const;
 
+  /// The scans that were added, and moved, since the last call, by number; for a map file.
+  struct Changes {
+    std::vector<ScanJournal::Number> added;
+    std::set<ScanJournal::Number> moved;
+  };
+  Changes takeChanges() { return std::exchange(changes_, {}); }
+  /// Number of scans that were added since takeChanges().
+  std::size_t unsavedScans() const { return changes_.added.size(); }
+  const ScanJournal& journal() const { return journal_; }
+  /// Notes that a scan is on its way to a map file, from which it can be fetched.
+  void noteStored(ScanJournal::Number number) { journal_.setStored(number); }
+
   struct Progress {
     std::uint64_t scans = 0;      ///< in the journal
-    std::uint64_t bytes = 0;      ///< that they take
+    std::uint64_t bytes = 0;      ///< that they take in memory
     std::uint64_t forgotten = 0;  ///< to keep within the limit; they stay where they are
     std::uint64_t paths = 0;      ///< calls of correct()
     std::uint64_t moved = 0;      ///< moves of scans
@@ -164,6 +178,7 @@ class MapCorrector {
   CorrectedMap map_;
   std::shared_ptr<const MapperConfig> config_;
   ScanJournal journal_;
+  Changes changes_;
   std::deque<Number> unpacked_;
   std::set<GridIndex> changed_regions_;  ///< whose looks must be made anew, without those of looks_
   /// The looks of changed regions as far as they have been made; nullptr: none are being made. The thread

@@ -12,23 +12,36 @@ ScanJournal::Number ScanJournal::add(JournalScan scan) {
   scan.wanted = scan.T_map_sensor;
   if (scan.packed) bytes_ += scan.packed->size();
   scans_.push_back(std::move(scan));
-  forgetOldest();
+  keepWithinMemory();
   return end() - 1;
 }
 
 void ScanJournal::setPacked(Number number, std::shared_ptr<const std::string> packed) {
   if (!has(number)) return;
   JournalScan& scan = at(number);
+  scan.scan = nullptr;
+  if (number < resident_) return;
   bytes_ += packed->size();
   scan.packed = std::move(packed);
-  scan.scan = nullptr;
-  forgetOldest();
+  keepWithinMemory();
 }
 
-void ScanJournal::forgetOldest() {
-  while (memory_ > 0 && bytes_ > memory_ && scans_.size() > 1 && scans_.front().packed) {
-    noteForeign(scans_.front().regions);
-    bytes_ -= scans_.front().packed->size();
+void ScanJournal::setStored(Number number) {
+  if (!has(number)) return;
+  at(number).stored = true;
+  keepWithinMemory();
+}
+
+void ScanJournal::keepWithinMemory() {
+  while (memory_ > 0 && bytes_ > memory_ && resident_ + 1 < end()) {
+    JournalScan& oldest = at(resident_);
+    const bool is_first = resident_ == first_;
+    if (!oldest.stored && !(is_first && oldest.packed)) return;
+    if (oldest.packed) bytes_ -= oldest.packed->size();
+    oldest.packed = nullptr;
+    ++resident_;
+    if (oldest.stored) continue;
+    noteForeign(oldest.regions);
     scans_.pop_front();
     ++first_;
     ++forgotten_;
@@ -36,7 +49,7 @@ void ScanJournal::forgetOldest() {
 }
 
 void ScanJournal::clear() {
-  first_ = end();
+  first_ = resident_ = end();
   scans_.clear();
   cleared_.clear();
   foreign_.clear();
@@ -67,7 +80,7 @@ double ScanJournal::errorOf(const JournalScan& scan) {
 PlacedJournalScan ScanJournal::placed(Number number) const {
   const JournalScan& scan = at(number);
   const auto after = cleared_.begin() + static_cast<std::ptrdiff_t>(scan.cleared_before);
-  return {scan.packed, scan.settings, scan.T_map_sensor, {after, cleared_.end()}};
+  return {number, scan.packed, scan.settings, scan.T_map_sensor, {after, cleared_.end()}};
 }
 
 }  // namespace bki_mapping

@@ -19,9 +19,11 @@ namespace bki_mapping {
 
 /// A scan that is in the map.
 struct JournalScan {
-  std::uint64_t stamp = 0;                    ///< [ns]
-  std::shared_ptr<const SensorScan> scan;     ///< until it is packed
-  std::shared_ptr<const std::string> packed;  ///< by packScan(); nullptr until then
+  std::uint64_t stamp = 0;                 ///< [ns]
+  std::shared_ptr<const SensorScan> scan;  ///< until it is packed
+  /// By packScan(); nullptr until then, and again when only the map file has it.
+  std::shared_ptr<const std::string> packed;
+  bool stored = false;  ///< a map file has it
   std::shared_ptr<const MapperConfig> settings;
   std::size_t sensor = 0;  ///< number of the sensor, for the pose of the robot's frame in its frame
   /// The recorded pose of the sensor in a frame that does not jump, and the pose at which the scan is in the
@@ -34,15 +36,16 @@ struct JournalScan {
   bool off = false;                ///< it is to be moved
 
   /// Whether it can be placed elsewhere: it could be packed.
-  bool isKept() const { return scan || packed; }
+  bool isKept() const { return scan || isPacked(); }
+  bool isPacked() const { return packed || stored; }
 };
 
 /// The scans of a map in memory, in the order in which they were integrated. Scans have numbers, which they
 /// keep. Not thread-safe.
 class ScanJournal {
  public:
-  /// @param memory limit for the packed scans [bytes]; when they take more, the oldest are forgotten, and
-  /// stay where they are in the map. 0: no limit.
+  /// @param memory limit for the packed scans [bytes]; when they take more, the oldest are only in the map
+  /// file, or, without one, forgotten: they then stay where they are in the map. 0: no limit.
   explicit ScanJournal(std::size_t memory = 0) : memory_(memory) {}
 
   using Number = std::uint64_t;
@@ -50,6 +53,8 @@ class ScanJournal {
   Number add(JournalScan scan);
   /// Stores the packed form of a scan, unless it has been forgotten.
   void setPacked(Number number, std::shared_ptr<const std::string> packed);
+  /// Notes that a map file has a scan, from which it can be fetched.
+  void setStored(Number number);
   /// Notes that a box of the map was cleared.
   void noteCleared(const Eigen::AlignedBox3d& box) { cleared_.push_back(box); }
   /// Notes that the map has evidence in regions that is not of scans of this journal.
@@ -74,19 +79,22 @@ class ScanJournal {
   JournalScan& at(Number number) { return scans_[number - first_]; }
   bool has(Number number) const { return number >= begin() && number < end(); }
   std::size_t size() const { return scans_.size(); }
-  std::size_t bytes() const { return bytes_; }            ///< of the packed scans
+  std::size_t bytes() const { return bytes_; }            ///< of the packed scans in memory
   std::uint64_t forgotten() const { return forgotten_; }  ///< scans, because of the limit
+  /// The stamps of the first poses after jumps [ns].
+  const std::set<std::uint64_t>& jumps() const { return jumps_; }
   /// The regions where the map has evidence that is not of scans of this journal.
   const std::set<GridIndex>& foreign() const { return foreign_; }
   /// The scan at its pose in the map, for a ScanMover; it must be packed.
   PlacedJournalScan placed(Number number) const;
 
  private:
-  void forgetOldest();
+  void keepWithinMemory();
 
   std::size_t memory_;
   std::deque<JournalScan> scans_;
   Number first_ = 0;
+  Number resident_ = 0;  ///< those before it are in a map file only
   std::size_t bytes_ = 0;
   std::uint64_t forgotten_ = 0;
   std::vector<Eigen::AlignedBox3d> cleared_;

@@ -27,8 +27,12 @@ std::vector<GridIndex> regionsOf(const std::vector<GridIndex>& blocks) {
   return regions;
 }
 
-ScanMover::ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes)
-    : mapper_(asideOf(config), std::move(classes)) {}
+ScanMover::ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes, Fetch fetch)
+    : mapper_(asideOf(config), std::move(classes)), fetch_(std::move(fetch)) {}
+
+SensorScan ScanMover::unpack(const PlacedJournalScan& scan) const {
+  return unpackScan(scan.packed ? *scan.packed : fetch_(scan.number));
+}
 
 void ScanMover::use(const PlacedJournalScan& scan) {
   if (settings_ != scan.settings) mapper_.reconfigure(asideOf(*scan.settings));
@@ -41,7 +45,7 @@ ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
   std::vector<SensorScan> scans;
   for (const ScanMove& move : moves) {
     use(move.scan);
-    scans.push_back(unpackScan(*move.scan.packed));
+    scans.push_back(unpack(move.scan));
     mapper_.withdraw(place(scans.back(), move.scan.T_map_sensor));
   }
   // After all is withdrawn: a block that is empty for a moment loses its looks.
@@ -59,7 +63,7 @@ ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
 void ScanMover::addLooks(const PlacedJournalScan& scan, LooksByRegion& looks) {
   use(scan);
   mapper_.takeMap();  // what a failed call has left
-  mapper_.integrate(place(unpackScan(*scan.packed), scan.T_map_sensor));
+  mapper_.integrate(place(unpack(scan), scan.T_map_sensor));
   for (const Eigen::AlignedBox3d& box : scan.cleared) mapper_.clearBox(box);
   for (const GridIndex& region : mapper_.map().regions()) {
     const auto to = looks.find(region);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -14,7 +16,8 @@ namespace bki_mapping {
 
 /// A scan of a journal at a pose.
 struct PlacedJournalScan {
-  std::shared_ptr<const std::string> packed;     ///< by packScan()
+  std::uint64_t number;                          ///< in the journal
+  std::shared_ptr<const std::string> packed;     ///< by packScan(); nullptr: it is in the map file
   std::shared_ptr<const MapperConfig> settings;  ///< with which it was integrated
   Eigen::Isometry3d T_map_sensor;
   /// Boxes that were cleared after it came into the map, in which it has no evidence (map frame [m]).
@@ -33,8 +36,12 @@ struct ScanMove {
 /// Maps on the side, in one thread. Not thread-safe.
 class ScanMover {
  public:
-  /// @param config of the map that is corrected. @throws as SemanticMapper.
-  ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes);
+  /// Reads a packed scan from the map file by its number in the journal; may wait for the disk.
+  using Fetch = std::function<std::string(std::uint64_t number)>;
+
+  /// @param config of the map that is corrected. @param fetch may be empty if all scans are in memory.
+  /// @throws as SemanticMapper.
+  ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes, Fetch fetch = {});
 
   struct Moved {
     /// Is to be added to the map: it holds the scans at their new poses, less the scans at their old ones.
@@ -53,8 +60,10 @@ class ScanMover {
 
  private:
   void use(const PlacedJournalScan& scan);
+  SensorScan unpack(const PlacedJournalScan& scan) const;
 
   SemanticMapper mapper_;
+  Fetch fetch_;
   std::shared_ptr<const MapperConfig> settings_;  ///< that the mapper has now
 };
 

@@ -263,6 +263,12 @@ std::vector<ScanRecord> readScans(Database& database) {
   return scans;
 }
 
+std::uint64_t readNextNumber(Database& database) {
+  Statement select = database.prepare("SELECT max(number) FROM scan");
+  if (!select.step() || select.isNull(0)) return 0;
+  return static_cast<std::uint64_t>(select.integer(0)) + 1;
+}
+
 std::string readScanContent(Database& database, std::uint64_t number) {
   Statement select = database.prepare("SELECT bytes, content_checksum, content FROM scan WHERE number = ?");
   select.bind(0, static_cast<std::int64_t>(number));

@@ -18,6 +18,8 @@ void readJournal(Database& database, const Totals& expected, Totals& found);
 
 /// The scans, sorted by number.
 std::vector<ScanRecord> readScans(Database& database);
+/// The number above those of all scans.
+std::uint64_t readNextNumber(Database& database);
 /// The packed scan. @throws MapFileDamaged if its checksum is wrong, or there is no such scan.
 std::string readScanContent(Database& database, std::uint64_t number);
 /// Writes a scan that the table does not have, and adds it to the totals.

@@ -109,6 +109,13 @@ bool MapFile::hasJournal() const {
   return state_->version >= kFirstVersionWithJournal;
 }
 
+JournalSize MapFile::journalSize() {
+  const Totals& totals = state_->totals;
+  JournalSize size{0, static_cast<int>(totals.settings), static_cast<int>(totals.cleared)};
+  if (hasJournal()) size.next_number = readNextNumber(state_->database);
+  return size;
+}
+
 std::vector<ScanRecord> MapFile::scans() {
   return hasJournal() ? readScans(state_->database) : std::vector<ScanRecord>();
 }

@@ -27,6 +27,9 @@ constexpr std::chrono::milliseconds kArrivalTime(2);
 /// memory.
 constexpr std::size_t kMostWaiting = 256 << 20;
 
+/// With a journal, a save is due when this much waits for it [bytes].
+constexpr std::size_t kMostUnsaved = 64 << 20;
+
 enum class Here {
   kWhole,    ///< all evidence is in memory; a tile in the file is out of date
   kPart,     ///< the evidence is the sum of what is in memory and in the file
@@ -50,7 +53,7 @@ MapFile openOrCreate(const std::string& path, const MapInfo& info) {
 }  // namespace
 
 struct MapKeeper::State {
-  State(SemanticMapper& of, MapFile file, const DriveRecord& first_drive)
+  State(SemanticMapper& of, MapFile file, const DriveRecord& first_drive, bool journal)
       : mapper(of),
         path(file.path()),
         drive(first_drive),
@@ -62,8 +65,15 @@ struct MapKeeper::State {
       throw std::invalid_argument("the map in " + path + " already holds drive '" + drive.id +
                                   "'; give the new drive another id");
     }
+    if (journal && !file.hasJournal()) {
+      throw MapFileError(path +
+                         " is of a version of the format that has no journal; convert it with "
+                         "migrate_map, or set journal to false");
+    }
     for (const TileEntry& tile : file.tiles()) stored.insert(tile.index);
-    store = std::make_unique<TileStore>(std::move(file));
+    journal_size = file.journalSize();
+    journalled = journal || journal_size.next_number > 0;
+    store = std::make_unique<TileStore>(std::move(file), journalled);
   }
 
   /// Distance of a tile from the window's centre: the largest of its distances on the three axes [m].
@@ -203,6 +213,24 @@ struct MapKeeper::State {
     }
   }
 
+  /// Adds all that change() was given, if need be without the tiles in memory, so that a save holds it.
+  void addAllDifferences() {
+    addDifferences();
+    std::deque<std::pair<GridIndex, SemanticMap>> left;
+    for (auto& [tile, part] : differences) {
+      const auto known = here.find(tile);
+      if (known != here.end() && known->second.here == Here::kDamaged) {
+        left.emplace_back(tile, std::move(part));
+        continue;
+      }
+      if (known != here.end()) giveAway(known);
+      stored.insert(tile);
+      store->add(tile, std::move(part));
+      must_sweep = true;
+    }
+    differences = std::move(left);
+  }
+
   /// Changes those of some tiles whose evidence is, or is partly, in the file.
   /// @param change as in TileStore::changeTiles.
   void changeStored(const std::vector<GridIndex>& tiles, std::function<void(SemanticMap&)> change) {
@@ -259,6 +287,9 @@ struct MapKeeper::State {
   Eviction eviction;
   std::vector<DriveRecord> drives;  ///< the other drives in the map
   std::unique_ptr<TileStore> store;
+  bool journalled = false;  ///< the file has a journal
+  JournalSize journal_size;
+  std::function<JournalChange()> take_journal;
   std::deque<TileStore::Arrival> arrivals;
   std::map<GridIndex, Tile> here;           ///< the tiles that are in memory, or have been requested
   std::set<GridIndex> stored;               ///< the tiles in the file, once all changes are written
@@ -273,8 +304,8 @@ struct MapKeeper::State {
 };
 
 MapKeeper::MapKeeper(SemanticMapper& mapper, const std::string& path, const MapInfo& info,
-                     const DriveRecord& drive)
-    : state_(std::make_unique<State>(mapper, openOrCreate(path, info), drive)) {
+                     const DriveRecord& drive, bool journal)
+    : state_(std::make_unique<State>(mapper, openOrCreate(path, info), drive, journal)) {
   if (mapper.map().size() > 0) throw std::logic_error("the map of the mapper is not empty");
 }
 
@@ -314,8 +345,25 @@ std::vector<GridIndex> MapKeeper::waitForTiles() {
   return std::exchange(state_->moved, {});
 }
 
+void MapKeeper::keepJournal(std::function<JournalChange()> take) {
+  state_->take_journal = std::move(take);
+}
+
+const JournalSize& MapKeeper::journalSize() const {
+  return state_->journal_size;
+}
+
+std::string MapKeeper::scanContent(std::uint64_t number) {
+  return state_->store->scanContent(number);
+}
+
+bool MapKeeper::wantsSave() const {
+  return state_->journalled && state_->store->waitingBytes() > kMostUnsaved;
+}
+
 std::future<void> MapKeeper::save() {
   State& s = *state_;
+  if (s.journalled) s.addAllDifferences();
   std::vector<GridIndex> copies;
   for (auto entry = s.here.begin(); entry != s.here.end();) {
     auto& [index, tile] = *entry;
@@ -330,7 +378,8 @@ std::future<void> MapKeeper::save() {
       entry = s.giveAway(entry);
     }
   }
-  std::future<void> saved = s.store->save(s.mapper.snapshot().map, std::move(copies), s.drive);
+  std::future<void> saved = s.store->save(s.mapper.snapshot().map, std::move(copies), s.drive,
+                                          s.take_journal ? s.take_journal() : JournalChange());
   s.sweep();
   return saved;
 }
@@ -343,6 +392,7 @@ std::future<void> MapKeeper::saveTo(const std::string& path) {
 void MapKeeper::reset(const DriveRecord& drive) {
   State& s = *state_;
   s.reset_call = s.store->clear();
+  s.journal_size.settings = s.journal_size.cleared = 0;
   s.here.clear();
   s.stored.clear();
   s.damaged.clear();
@@ -388,6 +438,7 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
 std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
   State& s = *state_;
   s.takeArrivals(true);
+  if (s.journalled) s.store->noteCleared(box);
   std::vector<GridIndex> changed = s.mapper.clearBox(box);
   for (const GridIndex& block : changed) s.noteChange(SemanticMap::regionOf({block}));
   std::vector<GridIndex> in_box;

@@ -18,8 +18,8 @@ std::shared_ptr<SemanticMap> shared(SemanticMap map) {
 
 }  // namespace
 
-TileStore::TileStore(MapFile file, std::chrono::milliseconds retry)
-    : file_(std::move(file)), retry_(retry), thread_([this] { run(); }) {}
+TileStore::TileStore(MapFile file, bool journalled, std::chrono::milliseconds retry)
+    : file_(std::move(file)), journalled_(journalled), retry_(retry), thread_([this] { run(); }) {}
 
 TileStore::~TileStore() {
   close();
@@ -66,16 +66,20 @@ void TileStore::add(const GridIndex& tile, SemanticMap map) {
 }
 
 std::future<void> TileStore::save(SemanticMap snapshot, std::vector<GridIndex> tiles,
-                                  const DriveRecord& drive) {
-  const auto work = [map = shared(std::move(snapshot)), tiles = std::move(tiles), drive](
-                        MapFile&, MapFile::Change& change, Call) {
+                                  const DriveRecord& drive, JournalChange journal) {
+  const auto work = [map = shared(std::move(snapshot)), tiles = std::move(tiles), drive,
+                     journal = std::move(journal)](MapFile&, MapFile::Change& change, Call) {
     for (const GridIndex& tile : tiles) change.writeTile(*map, {tile});
     if (drive.scans > 0) change.putDrive(drive);
+    for (const std::string& settings : journal.settings) change.addSettings(settings);
+    for (const auto& [scan, content] : journal.added) change.addScan(scan, content());
+    for (const ScanRecord& scan : journal.moved) change.moveScan(scan);
     return true;
   };
   std::promise<void> durable;
   std::future<void> future = durable.get_future();
-  enqueue({work, 0, std::move(durable)});  // the memory of a snapshot is mostly that of the map
+  // The memory of a snapshot is mostly that of the map.
+  enqueue({work, 0, std::move(durable), false, false, true});
   return future;
 }
 
@@ -88,7 +92,7 @@ TileStore::Call TileStore::clear() {
     change.eraseJournal();
     return true;
   };
-  return enqueue({work, 0, std::nullopt, true});
+  return enqueue({work, 0, std::nullopt, true, false, true});
 }
 
 void TileStore::changeTiles(std::vector<GridIndex> tiles, std::function<void(SemanticMap&)> change_tile) {
@@ -118,6 +122,39 @@ void TileStore::putDrive(const DriveRecord& drive) {
   enqueue({work});
 }
 
+void TileStore::noteCleared(const Eigen::AlignedBox3d& box) {
+  const auto work = [box](MapFile&, MapFile::Change& change, Call) {
+    change.addClearedBox(box);
+    return true;
+  };
+  enqueue({work});
+}
+
+std::string TileStore::scanContent(std::uint64_t number) {
+  auto content = std::make_shared<std::promise<std::string>>();
+  std::future<std::string> future = content->get_future();
+  const auto work = [number, content = std::move(content)](MapFile& file, MapFile::Change&, Call) {
+    try {
+      content->set_value(file.scanContent(number));
+    } catch (...) {
+      content->set_exception(std::current_exception());
+    }
+    return false;
+  };
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_) throw MapFileError("the map file is closed");
+    jobs_.push_back({work});
+    ++called_;
+  }
+  wake_.notify_all();
+  try {
+    return future.get();
+  } catch (const std::future_error&) {
+    throw MapFileError("the map file was closed");
+  }
+}
+
 std::future<void> TileStore::copyTo(const std::string& path) {
   auto done = std::make_shared<std::promise<void>>();
   const auto work = [path, done](MapFile& file, MapFile::Change&, Call) {
@@ -142,7 +179,7 @@ void TileStore::waitForTrial() {
   std::unique_lock<std::mutex> lock(mutex_);
   const Call called = called_;
   const std::size_t failures = failures_;
-  tried_.wait(lock, [&] { return ended_ >= called || failures_ > failures || closing_; });
+  tried_.wait(lock, [&] { return ended_ + executed_ >= called || failures_ > failures || closing_; });
 }
 
 std::string TileStore::fault() const {
@@ -163,7 +200,13 @@ std::string TileStore::close() {
   wake_.notify_all();
   if (thread_.joinable()) thread_.join();
   file_.reset();
-  if (jobs_.empty()) return "";
+  std::deque<Job> lost;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+    lost.swap(jobs_);  // whoever waits for one of them is told
+  }
+  if (lost.empty()) return "";
   return fault_ + "; evidence that was not yet in the map file is lost";
 }
 
@@ -183,13 +226,14 @@ void TileStore::arrive(Arrival arrival) {
 void TileStore::run() {
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [this] { return closing_ || !jobs_.empty(); });
-    if (jobs_.empty()) return;
+    wake_.wait(lock, [this] { return closing_ || jobs_.size() > executed_; });
+    if (jobs_.size() == executed_) break;
     const bool last_trial = closing_;
     if (tryJobs(lock)) continue;
     if (last_trial) break;
     wake_.wait_for(lock, retry_, [this] { return closing_; });
   }
+  change_.reset();
   for (Job& job : jobs_) {
     if (job.durable) job.durable->set_exception(std::make_exception_ptr(MapFileError(fault_)));
   }
@@ -199,54 +243,71 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
   // References to elements of a deque stay valid when others are appended.
   std::vector<Job*> jobs;
   std::size_t bytes = 0;
-  Call call = ended_;
-  for (Job& job : jobs_) {
-    if (!jobs.empty() && (job.first || bytes + job.bytes > kChangeBytes)) break;
-    jobs.push_back(&job);
-    bytes += job.bytes;
+  bool ends = !journalled_;
+  for (auto job = jobs_.begin() + static_cast<std::ptrdiff_t>(executed_); job != jobs_.end(); ++job) {
+    if (!jobs.empty() && (job->first || bytes + job->bytes > kChangeBytes)) break;
+    jobs.push_back(&*job);
+    bytes += job->bytes;
+    if (journalled_ && (ends = job->whole)) break;
   }
+  const Call call = ended_ + executed_;
   lock.unlock();
+  bool late = false;
+  const std::string fault = perform(jobs, call, ends, late);
+  lock.lock();
+  fault_ = fault;
+  if (!fault.empty()) {
+    last_trial_ = executed_ + jobs.size();
+    executed_ = 0;
+    ++failures_;
+  } else if (late) {
+    end(last_trial_, lock);
+  } else {
+    executed_ += jobs.size();
+    if (!change_) end(executed_, lock);
+  }
+  tried_.notify_all();
+  return fault.empty();
+}
+
+std::string TileStore::perform(const std::vector<Job*>& jobs, Call call, bool ends, bool& late) {
   std::string fault;
   try {
-    MapFile::Change change = file_->change();
-    bool any = false;
+    if (!change_) change_.emplace(file_->change());
     for (Job* job : jobs) {
       ++call;
       if (job->done) continue;
-      job->done = !job->work(*file_, change, call);
-      any |= !job->done;
+      job->done = !job->work(*file_, *change_, call);
+      writes_ |= !job->done;
     }
-    if (any) change.commit();
+    if (writes_ && !ends) return "";
+    if (writes_) change_->commit();
   } catch (const MapFileLateCommit&) {  // the previous trial succeeded after all
-    jobs.resize(last_trial_);
-    bytes = 0;
-    for (const Job* job : jobs) bytes += job->bytes;
+    late = true;
   } catch (const std::bad_alloc&) {
     fault = "there is not enough memory to write to " + file_->path();
   } catch (const std::exception& error) {
     fault = error.what();
   }
-  for (Job* job : jobs) {
-    if (fault.empty() && job->durable) job->durable->set_value();
-  }
-  lock.lock();
-  fault_ = fault;
+  change_.reset();
+  writes_ = false;
+  return fault;
+}
+
+void TileStore::end(std::size_t jobs, std::unique_lock<std::mutex>& lock) {
   std::vector<Job> ended;
-  if (fault.empty()) {
-    const auto end = jobs_.begin() + static_cast<std::ptrdiff_t>(jobs.size());
-    ended.assign(std::make_move_iterator(jobs_.begin()), std::make_move_iterator(end));
-    jobs_.erase(jobs_.begin(), end);
-    waiting_bytes_ -= bytes;
-    ended_ += jobs.size();
-  } else {
-    last_trial_ = jobs.size();
-    ++failures_;
-  }
-  tried_.notify_all();
+  const auto end = jobs_.begin() + static_cast<std::ptrdiff_t>(jobs);
+  ended.assign(std::make_move_iterator(jobs_.begin()), std::make_move_iterator(end));
+  jobs_.erase(jobs_.begin(), end);
+  for (const Job& job : ended) waiting_bytes_ -= job.bytes;
+  ended_ += jobs;
+  executed_ = 0;
   lock.unlock();
+  for (Job& job : ended) {
+    if (job.durable) job.durable->set_value();
+  }
   ended.clear();  // frees the maps while the lock is released
   lock.lock();
-  return fault.empty();
 }
 
 }  // namespace bki_mapping

@@ -143,6 +143,7 @@ class MapFile {
   // The journal: the scans in the map that can be moved to other poses. Not every scan has to be in it.
   /// Whether the file's version has a journal.
   bool hasJournal() const;
+  JournalSize journalSize();
   /// Sorted by number.
   std::vector<ScanRecord> scans();
   /// The points of a scan of the journal, packed as docs/map_file.md says.

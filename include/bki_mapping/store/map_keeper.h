@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <limits>
 #include <memory>
@@ -35,10 +36,12 @@ class MapKeeper {
   /// Opens a map file, or creates it. @param mapper with an empty map; must outlive this object. While this
   /// object exists, only SemanticMapper::integrate and the functions below may change the map.
   /// @param info describes the mapper's map. @param drive the drive that begins.
-  /// @throws MapFileError if the file cannot be opened or its map has another grid or frame (checkFits);
-  /// std::invalid_argument if it already holds a drive with this id; std::logic_error if the map is not
-  /// empty.
-  MapKeeper(SemanticMapper& mapper, const std::string& path, const MapInfo& info, const DriveRecord& drive);
+  /// @param journal whether scans are kept in the file's journal (keepJournal).
+  /// @throws MapFileError if the file cannot be opened, its map has another grid or frame (checkFits), or it
+  /// is of a version without a journal; std::invalid_argument if it already holds a drive with this id;
+  /// std::logic_error if the map is not empty.
+  MapKeeper(SemanticMapper& mapper, const std::string& path, const MapInfo& info, const DriveRecord& drive,
+            bool journal = false);
   /// Does what close() does.
   ~MapKeeper();
 
@@ -56,6 +59,17 @@ class MapKeeper {
   /// @return the blocks that were added.
   std::vector<GridIndex> waitForTiles();
 
+  /// Sets what tells how the journal has changed since the last call; it is asked for whenever the map is
+  /// saved. The file then holds each scan of the journal exactly once, at its pose in the journal, also if
+  /// the process is killed: evidence becomes durable only with a save.
+  void keepJournal(std::function<JournalChange()> take);
+  /// The journal of the file when it was opened, or after a reset().
+  const JournalSize& journalSize() const;
+  /// Reads the packed points of a scan of the journal, and returns when that is done. May be called in any
+  /// thread while this object exists. @throws MapFileError.
+  std::string scanContent(std::uint64_t number);
+  /// With a journal, whether so much waits for a save that one should come soon.
+  bool wantsSave() const;
   /// Writes the drive and all changes of the map. @return becomes ready when the whole map is durable in the
   /// file; it does not while the file cannot be written (fault()).
   std::future<void> save();

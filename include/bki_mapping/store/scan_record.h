@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,23 @@ struct ScanRecord {
   /// Where it was recorded, in a frame that does not jump.
   Eigen::Isometry3d T_odometry_sensor = Eigen::Isometry3d::Identity();
   std::vector<GridIndex> tiles;  ///< that it touches at T_map_sensor, sorted, each once
+};
+
+/// What a file's journal holds.
+struct JournalSize {
+  std::uint64_t next_number = 0;  ///< above the numbers of all scans
+  int settings = 0, cleared = 0;  ///< numbers of settings, and of cleared boxes
+};
+
+/// What changes in a journal, together with the map.
+struct JournalChange {
+  struct Added {
+    ScanRecord scan;
+    std::function<std::string()> content;  ///< packs its points; called in another thread
+  };
+  std::vector<std::string> settings;  ///< to be added, as YAML
+  std::vector<Added> added;
+  std::vector<ScanRecord> moved;  ///< scans that are in the journal or in `added`
 };
 
 }  // namespace bki_mapping

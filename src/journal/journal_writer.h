@@ -1,0 +1,46 @@
+/// @file Tells a map file what changes in the journal of its map.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bki_mapping/store/scan_record.h"
+#include "journal/map_corrector.h"
+
+namespace bki_mapping {
+
+/// Numbers the scans and settings of a drive as rows of a map file. Not thread-safe.
+class JournalWriter {
+ public:
+  /// @param size of the journal in the file, before the drive. @param drive DriveRecord::id.
+  JournalWriter(const JournalSize& size, std::string drive);
+
+  /// The file was emptied; a drive begins.
+  void reset(std::string drive);
+  /// What has changed since the last call. Scans that could not be packed, or have been forgotten, are left
+  /// out. @param sensors names of the sensors, by their numbers.
+  JournalChange take(MapCorrector& corrector, const std::vector<std::string>& sensors);
+  /// The number in the file of a scan of the corrector. May be called in any thread.
+  std::uint64_t fileNumber(ScanJournal::Number number) const { return first_number_ + number; }
+
+ private:
+  /// The number of settings in the file; adds them to the change if it does not have them.
+  int numberOf(const std::shared_ptr<const MapperConfig>& settings, JournalChange& change);
+  /// Whether the recorded poses jump before a scan with this stamp.
+  bool jumpsBefore(const ScanJournal& journal, std::uint64_t stamp);
+
+  const std::uint64_t first_number_;
+  int first_cleared_, next_settings_;
+  std::string drive_;
+  std::vector<std::pair<std::shared_ptr<const MapperConfig>, int>> settings_;
+  std::optional<std::uint64_t> last_stamp_;  ///< of a scan [ns]
+  std::set<ScanJournal::Number> written_;    ///< scans that the file has
+  std::set<ScanJournal::Number> jumps_;      ///< those before which the recorded poses jump
+};
+
+}  // namespace bki_mapping
