@@ -37,6 +37,8 @@ class CorrectedPoses {
   void add(SensorScan scan, const Eigen::Isometry3d& T_map_sensor, const std::string& sensor_frame,
            const std::vector<GridIndex>& touched);
 
+  /// The frames of the sensors, by their numbers in the corrector.
+  const std::vector<std::string>& sensorFrames() const { return sensor_frames_; }
   /// Notes that tf has jumped between the map and a sensor. @param stamp of the first transform after it.
   void noteJump(const ros::Time& stamp);
   /// Uses the last message, if it is time. @return whether there is news for the status: the last scan has

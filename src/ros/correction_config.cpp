@@ -9,15 +9,18 @@ std::vector<NamedParameter<CorrectionConfig>> correctionParameters() {
   return {
       truthParameter("journal", &C::journal, Changes::kAtStart,
                      "Keep all scans, so that the map follows corrected_path. Set true where a SLAM system "
-                     "corrects the poses of the past. With window it needs map_file."),
+                     "corrects the poses of the past. With window it needs map_file, whose journal then "
+                     "keeps them."),
       realParameter(
           "journal_quantum", &C::journal_quantum, NumberRange::atLeast(0.0001).upTo(1.0), "m",
           Changes::kAtStart,
           "Points of kept scans are rounded to multiples of this in the sensor's frame, before they "
           "are mapped. Raise it to save memory, up to a tenth of resolution."),
-      realParameter("journal_limit", &C::journal_limit, NumberRange::atLeast(0.0), "MB", Changes::kAtStart,
-                    "Largest memory of kept scans. Beyond it the oldest ones are forgotten, and stay in the "
-                    "map where they are. 0 sets no limit."),
+      realParameter(
+          "journal_limit", &C::journal_limit, NumberRange::atLeast(0.0), "MB", Changes::kAtStart,
+          "Largest memory of kept scans. Beyond it the oldest ones are read from map_file when they "
+          "move; without map_file they are forgotten, and stay in the map where they are. 0 sets no "
+          "limit."),
       realParameter("correction/tolerance", &C::tolerance, NumberRange::atLeast(0.0).orElse(-1.0), "m",
                     Changes::kAtStart,
                     "Scans stay where they are while no point is farther than this from where corrected_path "

@@ -19,6 +19,9 @@ namespace {
 /// Fraction of memory_limit up to which tiles of a city are loaded; the rest is for scans.
 constexpr double kMostOfMemory = 0.8;
 
+/// Scans that may wait for being written to the journal of the file, before a save is due.
+constexpr std::size_t kMostUnsavedScans = 200;
+
 /// While more than this waits to be written to the file [bytes], no scans move.
 constexpr std::size_t kMostWaiting = 128 << 20;
 
@@ -49,10 +52,12 @@ KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::
             " exists already, and may hold tiles of the city, which would count "
             "twice; continue it as map_file, without the city, or name a new file as own_map_file");
       }
-      keeper_ = std::make_unique<MapKeeper>(mapper_, config.own_map_file, info(), drive_);
+      keeper_ = std::make_unique<MapKeeper>(mapper_, config.own_map_file, info(), drive_,
+                                            config.correction.journal);
     }
   } else if (!config.map_file.empty()) {
-    keeper_ = std::make_unique<MapKeeper>(mapper_, config.map_file, info(), drive_);
+    keeper_ =
+        std::make_unique<MapKeeper>(mapper_, config.map_file, info(), drive_, config.correction.journal);
     if (config.window <= 0.0) {
       keeper_->moveTo(window_);
       keeper_->waitForTiles();
@@ -87,9 +92,15 @@ void KeptMap::beginJournal(const ServerConfig& config) {
     return keeper_ ? keeper_->replaceLooks(region, looks) : mapper_.replaceLooks(region, looks);
   };
   const auto ready = [this] { return !keeper_ || keeper_->waitingBytes() < kMostWaiting; };
+  const auto fetch = [this](std::uint64_t number) {
+    return keeper_->scanContent(writer_->fileNumber(number));
+  };
   corrector_ = std::make_unique<MapCorrector>(mapper_.config(), mapper_.sharedClasses(), settings,
-                                              CorrectedMap{add, replaceLooks, ready});
-  corrector_->noteForeign(keeper_ ? keeper_->storedTiles() : std::vector<GridIndex>());
+                                              CorrectedMap{add, replaceLooks, ready, fetch});
+  if (!keeper_) return;
+  corrector_->noteForeign(keeper_->storedTiles());
+  writer_ = std::make_unique<JournalWriter>(keeper_->journalSize(), drive_.id);
+  keeper_->keepJournal([this] { return writer_->take(*corrector_, sensor_frames_); });
 }
 
 MapInfo KeptMap::info() const {
@@ -147,9 +158,16 @@ std::vector<GridIndex> KeptMap::update(const ServerConfig& config, PeriodicSave:
   };
   if (corrector_) add(corrector_->update(window_.centre));
   if (!keeper_) return changed;
-  save_.update(*keeper_, config.save_period, now);
+  const bool due = keeper_->wantsSave() || (writer_ && corrector_->unsavedScans() > kMostUnsavedScans);
+  save_.update(*keeper_, config.save_period, now, due);
   add(keeper_->moveTo(window_));
   return changed;
+}
+
+bool KeptMap::makeRoom() {
+  if (!keeper_ || !keeper_->makeRoom()) return false;
+  if (writer_) save_.saveNow(*keeper_, PeriodicSave::Clock::now());  // until then, it takes memory
+  return true;
 }
 
 void KeptMap::requireWritable() const {
@@ -168,6 +186,7 @@ void KeptMap::reset() {
     mapper_.reset();
   }
   if (corrector_) corrector_->reset();
+  if (writer_) writer_->reset(drive_.id);
 }
 
 void KeptMap::addMap(StoredMap map, bool replace, bool allow_overlap) {

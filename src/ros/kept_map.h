@@ -5,9 +5,11 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/store/map_keeper.h"
+#include "journal/journal_writer.h"
 #include "journal/map_corrector.h"
 #include "ros/city_tiles.h"
 #include "ros/periodic_save.h"
@@ -26,6 +28,7 @@ class KeptMap {
   /// @param name of the drive that begins, for people.
   /// @throws MapFileError; std::invalid_argument as checkMapFileSettings().
   KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name);
+  ~KeptMap() { close(); }
 
   // These return the blocks that changed, for the publishers.
   /// Notes what a scan changed, and moves the window. @param stamp of the scan [ns].
@@ -37,10 +40,12 @@ class KeptMap {
 
   /// Keeps the scans and moves them to corrected poses; nullptr without the parameter journal.
   MapCorrector* corrector() { return corrector_.get(); }
+  /// Sets the frames of the sensors, by their numbers in the corrector, for the journal in the map file.
+  void nameSensors(std::vector<std::string> frames) { sensor_frames_ = std::move(frames); }
   const MapCorrector* corrector() const { return corrector_.get(); }
 
   /// Makes room for a scan that was refused for lack of memory. @return whether memory was gained.
-  bool makeRoom() { return keeper_ && keeper_->makeRoom(); }
+  bool makeRoom();
   /// Clears the map, also in the file, and begins a drive. @throws std::invalid_argument if it is read only.
   void reset();
   /// Adds a map. @param replace what was there before. @param allow_overlap as MapKeeper::addMap. @throws as
@@ -97,6 +102,8 @@ class KeptMap {
   std::unique_ptr<MapKeeper> keeper_;  ///< nullptr: the map is in memory only
   PeriodicSave save_;
   CityTiles city_;
+  std::unique_ptr<JournalWriter> writer_;  ///< of a journal in a file
+  std::vector<std::string> sensor_frames_;
   std::unique_ptr<MapCorrector> corrector_;  ///< last, because it changes what is above
 };
 

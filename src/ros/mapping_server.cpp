@@ -245,6 +245,7 @@ ScanStats MappingServer::addToMap(const WaitingCloud& waiting, const PlacedScan&
   stats.counts += rounded.left_out;
   corrected_->add(std::move(rounded.scan), rounded.T_map_sensor,
                   readers_[waiting.input].sensorFrame(*waiting.cloud), mapper_->touchedBlocks());
+  kept_->nameSensors(corrected_->sensorFrames());
   return stats;
 }
 

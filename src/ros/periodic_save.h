@@ -17,8 +17,10 @@ class PeriodicSave {
 
   /// Notes that the map has evidence that is not saved.
   void noteChange() { unsaved_ = true; }
-  /// @param period [s]; 0: never.
-  void update(MapKeeper& keeper, double period, Clock::time_point now);
+  /// @param period [s]; 0: never. @param due whether to save before it has passed.
+  void update(MapKeeper& keeper, double period, Clock::time_point now, bool due = false);
+  /// Begins a save, unless one is under way.
+  void saveNow(MapKeeper& keeper, Clock::time_point now);
   /// Wall time up to which everything is saved; 0: nothing was saved yet.
   ros::WallTime saved() const { return saved_; }
 
@@ -26,7 +28,7 @@ class PeriodicSave {
   bool unsaved_ = false;
   std::future<void> saving_;
   ros::WallTime saving_since_, saved_;
-  Clock::time_point next_{};
+  Clock::time_point begun_{};
 };
 
 }  // namespace bki_mapping::ros_interface
