@@ -1,8 +1,4 @@
 # The lab: what measures the mapper, with the simulation. No robot needs it.
-if(NOT BKI_MAPPING_LAB)
-  return()
-endif()
-
 find_package(PCL QUIET REQUIRED COMPONENTS common filters io kdtree)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp label_noise.cpp occupancy_evaluation.cpp

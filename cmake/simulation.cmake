@@ -1,7 +1,4 @@
 # The simulation of drives, for the demo and the lab. No robot needs it.
-if(NOT BKI_MAPPING_LAB AND NOT BKI_MAPPING_DEMO)
-  return()
-endif()
 bki_mapping_room(simulation FOLDER lab/simulation SOURCES
     city.cpp drive_file.cpp furniture.cpp lidar.cpp oncoming.cpp plots.cpp relief.cpp rooms.cpp scene.cpp
     shape_index.cpp street.cpp street_along.cpp street_parts.cpp truth_cloud.cpp voxel_truth.cpp way.cpp weather.cpp
