@@ -1,8 +1,12 @@
 #!/usr/bin/env python3
 """Corrected poses: the node's map is, to the bit, that of a node whose poses were right from the start."""
+import contextlib
 import os
 import random
 import shutil
+import signal
+import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
@@ -49,6 +53,13 @@ def scan_at(n):
 def content(path):
     """The evidence in a map file, plane by plane."""
     return {(block, label): plane.tobytes() for block, label, plane in read_planes(path)}
+
+
+def places_of_scans(path):
+    """Where the scans in the journal of a map file are, and the names of their sensors."""
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        rows = database.execute('SELECT pose, sensor FROM scan ORDER BY number').fetchall()
+    return [struct.unpack('<12d', pose)[3::4] for pose, _ in rows], {sensor for _, sensor in rows}
 
 
 class Mapper:
@@ -153,7 +164,33 @@ class Corrections(unittest.TestCase):
         wrong.map(range(SCANS), drifted_place)
         wrong.correct(range(SCANS), true_place)
         wrong.wait_for(lambda m: m.corrections == 1 and m.correction_done, 'the correction')
-        self.assertEqual(wrong.content(), right.content())
+        wanted = right.content()
+        self.assertEqual(wrong.content(), wanted)
+        # The file holds the scans at the poses of the path, and so does the copy.
+        wrong.node.send_signal(signal.SIGINT)
+        self.assertEqual(wrong.node.wait(TIMEOUT), 0)
+        for path in (os.path.join(folder, 'kept.bkm'), os.path.join(wrong.folder, 'map.bkm')):
+            self.assertEqual(content(path), wanted)
+            places, sensors = places_of_scans(path)
+            self.assertEqual(places, [true_place(n) for n in range(SCANS)])
+            self.assertEqual(sensors, {'wrong_kept_sensor'})
+
+    def test_a_file_whose_node_is_killed_holds_whole_scans(self):
+        """Killed while scans move, after a save: each scan is at the pose of its row."""
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'killed.bkm')
+        killed = Mapper(self, 'killed_kept', window=25.0, map_file=path, save_period=0.05)
+        killed.map(range(SCANS), drifted_place)
+        killed.correct(range(SCANS), true_place)
+        killed.wait_for(lambda m: m.corrections == 1, 'using the path')
+        killed.node.kill()
+        killed.node.wait(TIMEOUT)
+        places, _ = places_of_scans(path)
+        again = Mapper(self, 'again')
+        for n, place in enumerate(places):
+            again.map([n], lambda _, place=place: place)
+        self.assertEqual(content(path), again.content())
 
     def test_paths_of_no_use_change_nothing_and_are_said(self):
         mapper = Mapper(self, 'refusing')
