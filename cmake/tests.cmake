@@ -403,7 +403,7 @@ if(CATKIN_ENABLE_TESTING)
   add_dependencies(soak_test bki_mapping_nodelets)
   add_rostest(test/ros/soak.test)
   # Likewise: a hostile publisher.
-  add_executable(hostile_test test/ros/hostile_test.cpp test/ros/hostile/calls.cpp test/ros/hostile/clouds.cpp
+  add_executable(hostile_test test/ros/hostile_test.cpp test/ros/hostile/calls.cpp test/ros/hostile/clouds.cpp test/ros/hostile/corrections.cpp
     test/ros/hostile/queries.cpp test/ros/hostile/transforms.cpp)
   target_include_directories(hostile_test PRIVATE test)
   target_link_libraries(hostile_test PRIVATE bki_mapping_ros GTest::gtest ${catkin_LIBRARIES})

@@ -93,6 +93,7 @@ class Attack {
     for (const char* topic : {"/hostile_cloud", "/hostile_cloud_2"}) {
       clouds_.push_back(node.advertise<PointCloud2>(topic, 1000));
     }
+    paths_ = node.advertise<nav_msgs::Path>("/corrected_path", 10);
     transforms_ = node.advertise<tf2_msgs::TFMessage>("/tf", 1000);
     static_transforms_ = node.advertise<tf2_msgs::TFMessage>("/tf_static", 1000);
     for (const char letter : settings.name)
@@ -169,7 +170,7 @@ class Attack {
       for (std::size_t i = 0; i < inputs_; ++i) {
         if (clouds_[i].getNumSubscribers() == 0) return false;
       }
-      return transforms_.getNumSubscribers() > 0;
+      return transforms_.getNumSubscribers() > 0 && (!isCorrected() || paths_.getNumSubscribers() > 0);
     };
     const auto end = Clock::now() + std::chrono::duration<double>(kLongestAnswer);
     while (!connected() && Clock::now() < end) ros::WallDuration(0.005).sleep();
@@ -315,6 +316,26 @@ class Attack {
     EXPECT_LE(answer.message.size(), kLongestText) << where();
   }
 
+  bool isCorrected() const { return settings_.values.count("journal") > 0; }
+  void send(const CorrectionKind& kind) {
+    begin(kind.name);
+    for (int n = 0; n < 3; ++n) {  // among which the poses are
+      publish(changedCloud(cloudKinds().front()));
+      expectAnswer({"mapped"});
+    }
+    const std::uint64_t before = before_.corrections + before_.corrections_refused;
+    const std::uint64_t refused = before_.corrections_refused;
+    const ros::Time stamp = ros::Time(1000.0) + ros::Duration(0.1 * static_cast<double>(turn_));
+    paths_.publish(boost::shared_ptr<nav_msgs::Path>(new nav_msgs::Path(kind.make(stamp, dice_))));
+    ASSERT_TRUE(mapper_.settlePaths(before + 1, before_)) << where() << "\n" << before_;
+    const bool used = before_.corrections_refused == refused;
+    ++results_.answers[kind.name][used ? "used" : "refused"];
+    EXPECT_EQ(used, kind.used) << where() << ": " << before_.last_correction_refusal;
+    if (used) return;
+    EXPECT_GE(before_.last_correction_refusal.size(), kShortestText) << where();
+    EXPECT_LE(before_.last_correction_refusal.size(), kLongestText) << where();
+  }
+
   void send(const DeedKind& kind) {
     begin(kind.name);
     if (kind.name == "deed/two_wrongs") return twoWrongs();
@@ -419,6 +440,7 @@ class Attack {
     append(settingsKinds());
     append(queryKinds());
     append(deedKinds());
+    if (isCorrected()) append(correctionKinds());
     for (std::size_t n = all.size(); n > 1; --n) std::swap(all[n - 1], all[dice_.below(n)]);
     return all;
   }
@@ -500,7 +522,7 @@ class Attack {
   std::size_t inputs_ = 1;
   bool points_have_times_ = false;
   std::vector<ros::Publisher> clouds_;
-  ros::Publisher transforms_, static_transforms_;
+  ros::Publisher transforms_, static_transforms_, paths_;
   std::string kind_ = "load";
   Clock::time_point begun_ = Clock::now();
   std::size_t number_ = 0, turn_ = 0, refusals_before_ = 0;
@@ -527,6 +549,8 @@ std::vector<std::pair<std::string, std::string>> allRows() {
     add(kind.name, kind.sent, kind.refused ? "refused as a whole" : "applied or refused as a whole");
   for (const QueryKind& kind : queryKinds())
     add(kind.name, kind.sent, kind.answered ? "answered" : "refused");
+  for (const CorrectionKind& kind : correctionKinds())
+    add(kind.name, kind.sent, kind.used ? "used" : "refused");
   for (const DeedKind& kind : deedKinds()) add(kind.name, kind.sent, "as each cloud by itself");
   return rows;
 }

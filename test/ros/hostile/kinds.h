@@ -4,6 +4,7 @@
 
 #include <dynamic_reconfigure/Config.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/Path.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include <cstdint>
@@ -108,6 +109,16 @@ void swapBytes(sensor_msgs::PointCloud2& cloud);
 
 /// Adds alpha to packed colours.
 void setAlpha(sensor_msgs::PointCloud2& cloud, Dice& dice);
+
+/// A message of corrected_path, to a mapper with a journal.
+struct CorrectionKind {
+  std::string name;
+  std::string sent;  ///< description
+  bool used;         ///< whether it is used, not refused
+  /// @param stamp of the last cloud; some before it are 0.1 s apart.
+  std::function<nav_msgs::Path(const ros::Time& stamp, Dice&)> make;
+};
+const std::vector<CorrectionKind>& correctionKinds();
 
 /// Any other attack, implemented by hostile_test.
 struct DeedKind {

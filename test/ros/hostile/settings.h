@@ -16,6 +16,13 @@ struct Settings {
 inline const std::vector<Settings>& allSettings() {
   static const std::vector<Settings> all = {
       {"robot", {{"rules/enabled", "true"}, {"sensor_model/max_range", "60"}}},
+      {"corrected",
+       {{"rules/enabled", "true"},
+        {"sensor_model/max_range", "60"},
+        {"window", "0"},
+        {"journal", "true"},
+        {"journal_limit", "1"},
+        {"correction/tolerance", "0"}}},
       {"window_below_a_block", {{"window", "0.5"}, {"sensor_model/max_range", "20"}}},
       {"defaults", {{"window", "0"}}},
       {"coarse",

@@ -159,6 +159,14 @@ class Mapper {
     return came;
   }
 
+  /// Waits for a status with this number of messages of corrected_path. @return whether it arrived in time.
+  bool settlePaths(std::uint64_t paths, MappingStatus& status) {
+    const bool came = waitFor([&] { return last_.corrections + last_.corrections_refused == paths; });
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status = last_;
+    return came;
+  }
+
   std::size_t faults() const { return faults_; }
   std::size_t statuses() const { return statuses_; }
   /// The reasons for which this mapper has dropped clouds.
