@@ -165,7 +165,7 @@ target_include_directories(write_example_map PRIVATE test)
 target_link_libraries(write_example_map PRIVATE bki_mapping_store)
 bki_mapping_test_options(write_example_map)
 # Their own open, write and so on stand before those of the C library, for all libraries.
-foreach(name faulty_disk killed power_cut slow_disk)
+foreach(name faulty_disk killed power_cut slow_disk tile_store)
   bki_mapping_unit_tests(store ${name})
   bki_mapping_long_tests(${name}_test)
   bki_mapping_long_programs(${name}_test)

@@ -1,6 +1,6 @@
 #include "journal/journal_writer.h"
 
-#include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "bki_mapping/settings/yaml.h"
@@ -9,6 +9,9 @@
 
 namespace bki_mapping {
 namespace {
+
+/// Scans before a jump, by their stamps, that may come after scans behind it.
+constexpr int kMostLate = 100;
 
 /// Packs a scan when it is written, unless that has been done. One with too many points stays without
 /// content, and cannot be moved.
@@ -35,9 +38,9 @@ void JournalWriter::reset(std::string drive) {
   drive_ = std::move(drive);
   first_cleared_ = next_settings_ = 0;
   settings_.clear();
-  last_stamp_.reset();
   written_.clear();
   jumps_.clear();
+  after_jumps_.clear();
 }
 
 int JournalWriter::numberOf(const std::shared_ptr<const MapperConfig>& settings, JournalChange& change) {
@@ -49,21 +52,36 @@ int JournalWriter::numberOf(const std::shared_ptr<const MapperConfig>& settings,
   return next_settings_++;
 }
 
-bool JournalWriter::jumpsBefore(const ScanJournal& journal, std::uint64_t stamp) {
-  bool jump = false;
-  if (last_stamp_) {
-    const auto next = journal.jumps().upper_bound(*last_stamp_);
-    jump = next != journal.jumps().end() && *next <= stamp;
+void JournalWriter::findJumps(const ScanJournal& journal, std::set<ScanJournal::Number>& changed) {
+  for (const std::uint64_t jump : journal.jumps()) {
+    if (jumps_.count(jump) > 0) continue;
+    std::optional<ScanJournal::Number> first;  // after the jump, by its stamp
+    int before = 0;
+    for (auto number = written_.rbegin(); number != written_.rend() && before < kMostLate; ++number) {
+      if (!journal.has(*number)) break;
+      const std::uint64_t stamp = journal.at(*number).stamp;
+      before += stamp < jump;
+      if (stamp >= jump && (!first || stamp < journal.at(*first).stamp)) first = *number;
+    }
+    if (!first) continue;  // it is still to come
+    jumps_.insert(jump);
+    if (before > 0) after_jumps_.insert(*first);
+    changed.insert(*first);
   }
-  last_stamp_ = std::max(stamp, last_stamp_.value_or(0));
-  return jump;
 }
 
 JournalChange JournalWriter::take(MapCorrector& corrector, const std::vector<std::string>& sensors) {
-  const MapCorrector::Changes changes = corrector.takeChanges();
+  MapCorrector::Changes changes = corrector.takeChanges();
   const ScanJournal& journal = corrector.journal();
   JournalChange change;
-  const auto record = [&](ScanJournal::Number number, bool jump) {
+  std::vector<ScanJournal::Number> added;
+  for (const ScanJournal::Number number : changes.added) {
+    if (!journal.has(number) || !journal.at(number).isKept()) continue;
+    added.push_back(number);
+    written_.insert(written_.end(), number);
+  }
+  findJumps(journal, changes.moved);
+  const auto record = [&](ScanJournal::Number number) {
     const JournalScan& scan = journal.at(number);
     StoredAs stored;
     stored.number = fileNumber(number);
@@ -71,21 +89,17 @@ JournalChange JournalWriter::take(MapCorrector& corrector, const std::vector<std
     if (scan.sensor < sensors.size()) stored.sensor = sensors[scan.sensor];
     stored.settings = numberOf(scan.settings, change);
     stored.first_cleared = first_cleared_;
-    stored.jump = jump;
+    stored.jump = after_jumps_.count(number) > 0;
     return recordOf(scan, stored);
   };
-  for (const ScanJournal::Number number : changes.added) {
-    if (!journal.has(number) || !journal.at(number).isKept()) continue;
-    const bool jump = jumpsBefore(journal, journal.at(number).stamp);
-    change.added.push_back({record(number, jump), contentOf(journal.at(number))});
-    written_.insert(written_.end(), number);
-    corrector.noteStored(number);
-    if (jump) jumps_.insert(number);
+  for (const ScanJournal::Number number : added) {
+    change.added.push_back({record(number), contentOf(journal.at(number))});
+    changes.moved.erase(number);
   }
   for (const ScanJournal::Number number : changes.moved) {
-    if (!journal.has(number) || written_.count(number) == 0) continue;
-    change.moved.push_back(record(number, jumps_.count(number) > 0));
+    if (journal.has(number) && written_.count(number) > 0) change.moved.push_back(record(number));
   }
+  for (const ScanJournal::Number number : added) corrector.noteStored(number);
   return change;
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -31,16 +30,16 @@ class JournalWriter {
  private:
   /// The number of settings in the file; adds them to the change if it does not have them.
   int numberOf(const std::shared_ptr<const MapperConfig>& settings, JournalChange& change);
-  /// Whether the recorded poses jump before a scan with this stamp.
-  bool jumpsBefore(const ScanJournal& journal, std::uint64_t stamp);
+  /// Finds the scans after jumps that were noted since the last call, and adds them to those that changed.
+  void findJumps(const ScanJournal& journal, std::set<ScanJournal::Number>& changed);
 
   const std::uint64_t first_number_;
   int first_cleared_, next_settings_;
   std::string drive_;
   std::vector<std::pair<std::shared_ptr<const MapperConfig>, int>> settings_;
-  std::optional<std::uint64_t> last_stamp_;  ///< of a scan [ns]
-  std::set<ScanJournal::Number> written_;    ///< scans that the file has
-  std::set<ScanJournal::Number> jumps_;      ///< those before which the recorded poses jump
+  std::set<ScanJournal::Number> written_;      ///< scans that the file has
+  std::set<std::uint64_t> jumps_;              ///< stamps of jumps that scans tell of [ns]
+  std::set<ScanJournal::Number> after_jumps_;  ///< those scans
 };
 
 }  // namespace bki_mapping

@@ -48,7 +48,7 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
     : settings_(settings),
       map_(std::move(map)),
       config_(std::make_shared<const MapperConfig>(config)),
-      journal_(settings.memory),
+      journal_(settings.memory, map_.fetch != nullptr),
       mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
   checkCorrectable(config);
@@ -283,7 +283,9 @@ bool MapCorrector::startLooking(const Eigen::Vector3d& robot) {
     return false;
   }
   if (!looks_) beginLooks(robot);
-  if (to_look_.size() <= kScansAtOnce && ++rounds_ > kPatience) {
+  const bool in_memory =
+      !to_look_.empty() && journal_.has(to_look_.front()) && journal_.at(to_look_.front()).packed;
+  if (in_memory && to_look_.size() <= kScansAtOnce && ++rounds_ > kPatience) {
     lookAtNext();
     return false;
   }
@@ -332,6 +334,23 @@ void MapCorrector::giveUpLooks(const std::string& fault) {
   to_look_.clear();
 }
 
+void MapCorrector::takeLooks(const Job& job, const Looking& looking) {
+  if (job.fault.empty() || job.generation != generation_) return;
+  if (job.unreadable) leaveWhereItIs(looking.scans[looking.done].number, job.fault);
+  if (job.unreadable) return dropLooks();
+  giveUpLooks(job.fault);
+}
+
+void MapCorrector::leaveWhereItIs(Number number, const std::string& fault) {
+  progress_.fault = fault;
+  if (!journal_.has(number)) return;
+  JournalScan& scan = journal_.at(number);
+  journal_.noteForeign(scan.regions);
+  scan.scan = nullptr;
+  scan.packed = nullptr;
+  scan.stored = scan.off = false;
+}
+
 std::vector<GridIndex> MapCorrector::replaceLooks() {
   std::vector<GridIndex> changed;
   Stopwatch watch;
@@ -350,7 +369,7 @@ std::vector<GridIndex> MapCorrector::replaceLooks() {
 std::vector<GridIndex> MapCorrector::take(Job& job) {
   if (const auto* const packing = std::get_if<Packing>(&job.work)) takePacked(job, *packing);
   if (auto* const moving = std::get_if<Moving>(&job.work)) return takeMoved(job, *moving);
-  if (std::holds_alternative<Looking>(job.work) && !job.fault.empty()) giveUpLooks(job.fault);
+  if (const auto* const looking = std::get_if<Looking>(&job.work)) takeLooks(job, *looking);
   return {};
 }
 
@@ -359,12 +378,8 @@ void MapCorrector::takePacked(const Job& job, const Packing& packing) {
     const Number number = packing.scans[n].first;
     if (n < packing.packed.size()) {
       journal_.setPacked(number, packing.packed[n]);
-    } else if (journal_.has(number)) {  // it stays where it is
-      progress_.fault = job.fault;
-      JournalScan& scan = journal_.at(number);
-      journal_.noteForeign(scan.regions);
-      scan.scan = nullptr;
-      scan.off = false;
+    } else if (journal_.has(number)) {
+      leaveWhereItIs(number, job.fault);
     }
   }
 }
@@ -458,10 +473,13 @@ void MapCorrector::perform(Job& job) {
       moving->moved = mover_->move(moving->moves);
       moving->ms = watch.lap();
     } else if (auto* const looking = std::get_if<Looking>(&job.work)) {
-      for (const PlacedJournalScan& scan : looking->scans) {
-        mover_->addLooks(scan, *looking->to);
+      for (; looking->done < looking->scans.size(); ++looking->done) {
+        mover_->addLooks(looking->scans[looking->done], *looking->to);
       }
     }
+  } catch (const std::runtime_error& error) {
+    job.fault = error.what();
+    job.unreadable = true;
   } catch (const std::exception& error) {
     job.fault = error.what();
   }

@@ -133,11 +133,13 @@ class MapCorrector {
   struct Looking {
     std::vector<PlacedJournalScan> scans;
     std::shared_ptr<LooksByRegion> to;
+    std::size_t done = 0;  ///< scans
   };
   struct Job {
     std::variant<Packing, Moving, Looking> work;
     std::uint64_t generation = 0;
-    std::string fault;  ///< why it has failed; "" if it has not
+    std::string fault;        ///< why it has failed; "" if it has not
+    bool unreadable = false;  ///< the fault is of a scan, not of the moment
   };
 
   void work();
@@ -151,6 +153,9 @@ class MapCorrector {
 
   std::vector<GridIndex> take(Job& job);
   void takePacked(const Job& job, const Packing& packing);
+  void takeLooks(const Job& job, const Looking& looking);
+  /// A scan cannot be placed anywhere else.
+  void leaveWhereItIs(Number number, const std::string& fault);
   /// Packs a scan in this thread, where too many wait for the other one.
   void packNext();
   std::vector<GridIndex> takeMoved(Job& job, Moving& moving);

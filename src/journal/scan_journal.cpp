@@ -11,6 +11,7 @@ ScanJournal::Number ScanJournal::add(JournalScan scan) {
   scan.cleared_before = cleared_.size();
   scan.wanted = scan.T_map_sensor;
   if (scan.packed) bytes_ += scan.packed->size();
+  if (scan.packed && !scan.stored) bytes_not_stored_ += scan.packed->size();
   scans_.push_back(std::move(scan));
   keepWithinMemory();
   return end() - 1;
@@ -22,29 +23,50 @@ void ScanJournal::setPacked(Number number, std::shared_ptr<const std::string> pa
   scan.scan = nullptr;
   if (number < resident_) return;
   bytes_ += packed->size();
+  if (!scan.stored) bytes_not_stored_ += packed->size();
   scan.packed = std::move(packed);
   keepWithinMemory();
 }
 
 void ScanJournal::setStored(Number number) {
   if (!has(number)) return;
-  at(number).stored = true;
+  JournalScan& scan = at(number);
+  if (!scan.stored && scan.packed) bytes_not_stored_ -= scan.packed->size();
+  scan.stored = true;
   keepWithinMemory();
 }
 
+void ScanJournal::release(JournalScan& scan) {
+  if (!scan.packed) return;
+  bytes_ -= scan.packed->size();
+  if (!scan.stored) bytes_not_stored_ -= scan.packed->size();
+  scan.packed = nullptr;
+}
+
+void ScanJournal::forget(JournalScan& scan) {
+  noteForeign(scan.regions);
+  release(scan);
+  scan.off = false;
+  ++forgotten_;
+}
+
 void ScanJournal::keepWithinMemory() {
-  while (memory_ > 0 && bytes_ > memory_ && resident_ + 1 < end()) {
+  if (memory_ == 0) return;
+  for (; bytes_ > memory_ && resident_ + 1 < end(); ++resident_) {
     JournalScan& oldest = at(resident_);
-    const bool is_first = resident_ == first_;
-    if (!oldest.stored && !(is_first && oldest.packed)) return;
-    if (oldest.packed) bytes_ -= oldest.packed->size();
-    oldest.packed = nullptr;
-    ++resident_;
-    if (oldest.stored) continue;
-    noteForeign(oldest.regions);
-    scans_.pop_front();
-    ++first_;
-    ++forgotten_;
+    if (oldest.stored) {
+      release(oldest);
+    } else if (!oldest.isKept()) {
+      continue;  // it has no points
+    } else if (!oldest.packed || (in_file_ && bytes_ <= 2 * memory_)) {
+      return;
+    } else {
+      forget(oldest);
+    }
+    while (!scans_.front().isKept() && first_ <= resident_) {
+      scans_.pop_front();
+      ++first_;
+    }
   }
 }
 
@@ -54,7 +76,7 @@ void ScanJournal::clear() {
   cleared_.clear();
   foreign_.clear();
   jumps_.clear();
-  bytes_ = 0;
+  bytes_ = bytes_not_stored_ = 0;
 }
 
 bool ScanJournal::setPath(const std::vector<StampedMotion>& keyframes,

@@ -46,7 +46,9 @@ class ScanJournal {
  public:
   /// @param memory limit for the packed scans [bytes]; when they take more, the oldest are only in the map
   /// file, or, without one, forgotten: they then stay where they are in the map. 0: no limit.
-  explicit ScanJournal(std::size_t memory = 0) : memory_(memory) {}
+  /// @param in_file whether a map file takes the scans; those that it has not taken, because it cannot be
+  /// written, are forgotten at twice the limit.
+  explicit ScanJournal(std::size_t memory = 0, bool in_file = false) : memory_(memory), in_file_(in_file) {}
 
   using Number = std::uint64_t;
   /// Adds a scan. @return its number.
@@ -79,8 +81,9 @@ class ScanJournal {
   JournalScan& at(Number number) { return scans_[number - first_]; }
   bool has(Number number) const { return number >= begin() && number < end(); }
   std::size_t size() const { return scans_.size(); }
-  std::size_t bytes() const { return bytes_; }            ///< of the packed scans in memory
-  std::uint64_t forgotten() const { return forgotten_; }  ///< scans, because of the limit
+  std::size_t bytes() const { return bytes_; }                      ///< of the packed scans in memory
+  std::size_t bytesNotStored() const { return bytes_not_stored_; }  ///< of those that no file has
+  std::uint64_t forgotten() const { return forgotten_; }            ///< scans, because of the limit
   /// The stamps of the first poses after jumps [ns].
   const std::set<std::uint64_t>& jumps() const { return jumps_; }
   /// The regions where the map has evidence that is not of scans of this journal.
@@ -90,12 +93,16 @@ class ScanJournal {
 
  private:
   void keepWithinMemory();
+  /// Frees the memory of the packed points of a scan.
+  void release(JournalScan& scan);
+  void forget(JournalScan& scan);
 
   std::size_t memory_;
+  bool in_file_;
   std::deque<JournalScan> scans_;
   Number first_ = 0;
-  Number resident_ = 0;  ///< those before it are in a map file only
-  std::size_t bytes_ = 0;
+  Number resident_ = 0;  ///< those before it are not in memory
+  std::size_t bytes_ = 0, bytes_not_stored_ = 0;
   std::uint64_t forgotten_ = 0;
   std::vector<Eigen::AlignedBox3d> cleared_;
   std::set<GridIndex> foreign_;

@@ -158,10 +158,16 @@ std::vector<GridIndex> KeptMap::update(const ServerConfig& config, PeriodicSave:
   };
   if (corrector_) add(corrector_->update(window_.centre));
   if (!keeper_) return changed;
-  const bool due = keeper_->wantsSave() || (writer_ && corrector_->unsavedScans() > kMostUnsavedScans);
+  const bool due = keeper_->wantsSave() || (writer_ && journalIsDue(config.correction));
   save_.update(*keeper_, config.save_period, now, due);
   add(keeper_->moveTo(window_));
   return changed;
+}
+
+bool KeptMap::journalIsDue(const CorrectionConfig& config) const {
+  const auto waiting = static_cast<double>(corrector_->journal().bytesNotStored());
+  const bool fills_memory = config.journal_limit > 0.0 && waiting > 0.5e6 * config.journal_limit;
+  return fills_memory || corrector_->unsavedScans() > kMostUnsavedScans;
 }
 
 bool KeptMap::makeRoom() {
@@ -200,6 +206,7 @@ void KeptMap::addMap(StoredMap map, bool replace, bool allow_overlap) {
   const std::vector<GridIndex> regions = map.map.regions();
   if (keeper_) {
     keeper_->addMap(std::move(map.map), map.drives, allow_overlap);
+    if (writer_) save_.saveNow(*keeper_, PeriodicSave::Clock::now());
   } else {
     checkNotAdded("the map", drives_, map.drives, allow_overlap);
     mapper_.addMap(std::move(map.map));

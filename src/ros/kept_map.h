@@ -88,6 +88,8 @@ class KeptMap {
   void requireWritable() const;
   /// Begins the journal. @throws std::logic_error if the settings do not allow one.
   void beginJournal(const ServerConfig& config);
+  /// Whether scans that wait for being written should be saved soon.
+  bool journalIsDue(const CorrectionConfig& config) const;
   /// Adds the tiles that have been read from the city. @return the blocks that changed; none with a keeper,
   /// which reports them itself.
   std::vector<GridIndex> addFromCity(const ServerConfig& config);

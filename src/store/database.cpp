@@ -215,8 +215,12 @@ void Database::run(const char* sql) {
   if (code != SQLITE_OK) fail(name_, database_.get(), code);
 }
 
+bool Database::inTransaction() const {
+  return sqlite3_get_autocommit(database_.get()) == 0;
+}
+
 void Database::rollBack() noexcept {
-  if (!sqlite3_get_autocommit(database_.get())) {
+  if (inTransaction()) {
     sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
   }
 }

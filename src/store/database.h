@@ -85,6 +85,8 @@ class Database {
   /// Runs a statement and ignores its rows.
   void run(const char* sql);
   Statement prepare(const char* sql) const;
+  /// Whether a transaction is open. After some errors, also of reading, SQLite has rolled it back.
+  bool inTransaction() const;
   /// Rolls an open transaction back, if there is one.
   void rollBack() noexcept;
   /// Copies all pages to an empty database. @throws MapFileError.

@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -14,7 +15,9 @@
 namespace bki_mapping {
 namespace {
 
-constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+constexpr std::uint64_t kMostStamp = std::numeric_limits<std::int64_t>::max();
+/// So that there are numbers above it.
+constexpr std::uint64_t kMostNumber = std::uint64_t{1} << 62;
 
 /// Coordinates of poses and ranges beyond this are no places [m].
 constexpr double kFarthest = 1e12;
@@ -85,13 +88,14 @@ std::vector<GridIndex> tilesFrom(const std::string& bytes, const std::string& na
       if (byte < 0x80) break;
     }
     const std::int64_t to = from + static_cast<std::int64_t>(rest >> 1 ^ (0 - (rest & 1)));
-    if (std::abs(to) > kMostTileIndex) throw damaged(name, "a tile of a scan is out of range");
+    if (std::abs(to) > std::numeric_limits<std::int32_t>::max()) {
+      throw damaged(name, "a tile of a scan is out of range");
+    }
     return static_cast<std::int32_t>(to);
   };
   std::vector<GridIndex> tiles;
   for (GridIndex last{}; next < bytes.size(); tiles.push_back(last)) {
     last = {take(last.x), take(last.y), take(last.z)};
-    if (!tiles.empty() && !(tiles.back() < last)) throw damaged(name, "the tiles of a scan are not sorted");
   }
   return tiles;
 }
@@ -239,7 +243,10 @@ void readJournal(Database& database, const Totals& expected, Totals& found) {
     ScanRow row;
     const ScanRecord scan = readRow(reader, database.name(), row, found.checksums);
     const auto number = static_cast<std::int64_t>(scan.number);
-    text_left -= reader.textSize();
+    if (row.bytes > static_cast<std::uint64_t>(database.mostContent())) {
+      throw damaged(database.name(), "a scan of its journal is larger than the file");
+    }
+    text_left -= reader.textSize() + static_cast<std::int64_t>(row.bytes);
     if (number <= last) throw damaged(database.name(), "its list of scans is out of order");
     if (text_left < 0) throw damaged(database.name(), "scans of its journal share their texts");
     if (scan.settings >= expected.settings || scan.cleared > expected.cleared) {
@@ -270,7 +277,8 @@ std::uint64_t readNextNumber(Database& database) {
 }
 
 std::string readScanContent(Database& database, std::uint64_t number) {
-  Statement select = database.prepare("SELECT bytes, content_checksum, content FROM scan WHERE number = ?");
+  Statement select = database.prepare(
+      "SELECT bytes, content_checksum, content FROM scan JOIN scan_content USING (number) WHERE number = ?");
   select.bind(0, static_cast<std::int64_t>(number));
   if (!select.step()) throw damaged(database.name(), "scan " + std::to_string(number) + " is missing");
   const Statement::Bytes bytes = select.bytes(2);
@@ -284,14 +292,17 @@ std::string readScanContent(Database& database, std::uint64_t number) {
 
 void insertScan(Database& database, const ScanRecord& scan, const std::string& content, Totals& totals) {
   checkScan(scan);
-  Statement insert = database.prepare("INSERT INTO scan VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+  Statement insert = database.prepare("INSERT INTO scan VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   RowWriter writer(insert);
   ScanRow row;
   row.bytes = content.size();
   row.checksum = checksumOf(content);
   const std::uint32_t checksum = bindScan(writer, scan, row);
-  insert.bindBytes(14, content);
   insert.step();
+  Statement insert_content = database.prepare("INSERT INTO scan_content VALUES (?,?)");
+  insert_content.bind(0, static_cast<std::int64_t>(scan.number));
+  insert_content.bindBytes(1, content);
+  insert_content.step();
   totals.checksums += checksum;
   ++totals.scans;
 }
@@ -350,7 +361,7 @@ void insertCleared(Database& database, const Eigen::AlignedBox3d& box, Totals& t
 void eraseJournal(Database& database, Totals& totals) {
   Totals found;
   readJournal(database, totals, found);
-  for (const char* table : {"scan", "settings", "cleared"}) {
+  for (const char* table : {"scan", "scan_content", "settings", "cleared"}) {
     database.run((std::string("DELETE FROM ") + table).c_str());
   }
   totals.checksums -= found.checksums;
@@ -360,8 +371,17 @@ void eraseJournal(Database& database, Totals& totals) {
 void checkScan(const ScanRecord& scan) {
   checkText("the drive of a scan", scan.drive);
   checkText("the sensor of a scan", scan.sensor);
-  if (scan.number > kMost || scan.stamp > kMost) {
-    throw std::invalid_argument("the number or stamp of a scan is 2^63 or more");
+  if (scan.number > kMostNumber || scan.stamp > kMostStamp) {
+    throw std::invalid_argument("the number of a scan is above 2^62, or its stamp 2^63 or more");
+  }
+  for (std::size_t n = 0; n < scan.tiles.size(); ++n) {
+    const GridIndex& tile = scan.tiles[n];
+    const std::int64_t farthest = std::max(
+        {std::abs(std::int64_t{tile.x}), std::abs(std::int64_t{tile.y}), std::abs(std::int64_t{tile.z})});
+    if (farthest > kMostTileIndex || (n > 0 && !(scan.tiles[n - 1] < tile))) {
+      throw std::invalid_argument("the tiles of scan " + std::to_string(scan.number) +
+                                  " are not sorted, or out of range");
+    }
   }
   if (scan.settings < 0 || scan.cleared < 0 || !(scan.reach >= 0.0) || !(scan.reach < kFarthest)) {
     throw std::invalid_argument("a number of scan " + std::to_string(scan.number) + " is out of range");

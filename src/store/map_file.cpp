@@ -105,6 +105,12 @@ bool MapFile::addTileTo(SemanticMap& map, const TileKey& key) {
   return true;
 }
 
+MapFileError withoutJournal(const std::string& path) {
+  return MapFileError(path +
+                      " is of a version of the format that has no journal of scans; convert it with "
+                      "migrate_map, or do without the journal");
+}
+
 bool MapFile::hasJournal() const {
   return state_->version >= kFirstVersionWithJournal;
 }
@@ -195,9 +201,7 @@ void MapFile::Change::putDrive(const DriveRecord& drive) {
 
 void MapFile::Change::requireJournal() const {
   if (state_->file.version >= kFirstVersionWithJournal) return;
-  throw MapFileError(state_->file.database.name() + " has version " + std::to_string(state_->file.version) +
-                     " of the format, which has no journal of scans; convert it with migrate_map, or do "
-                     "without the journal");
+  throw withoutJournal(state_->file.database.name());
 }
 
 void MapFile::Change::addScan(const ScanRecord& scan, const std::string& content) {
@@ -234,8 +238,16 @@ void MapFile::Change::eraseJournal() {
   bki_mapping::eraseJournal(state_->file.database, state_->totals);
 }
 
+bool MapFile::Change::isOpen() const {
+  return state_->file.database.inTransaction();
+}
+
 void MapFile::Change::commit() {
   MapFile::State& file = state_->file;
+  if (!isOpen()) {
+    throw MapFileError("a change of " + file.database.name() +
+                       " was undone by an error of the disk; check the disk, and repeat the change");
+  }
   writeTotals(file.database, file.version, state_->totals);
   state_->done = true;
   file.commit(state_->totals);

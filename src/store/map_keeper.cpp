@@ -65,11 +65,7 @@ struct MapKeeper::State {
       throw std::invalid_argument("the map in " + path + " already holds drive '" + drive.id +
                                   "'; give the new drive another id");
     }
-    if (journal && !file.hasJournal()) {
-      throw MapFileError(path +
-                         " is of a version of the format that has no journal; convert it with "
-                         "migrate_map, or set journal to false");
-    }
+    if (journal && !file.hasJournal()) throw withoutJournal(path);
     for (const TileEntry& tile : file.tiles()) stored.insert(tile.index);
     journal_size = file.journalSize();
     journalled = journal || journal_size.next_number > 0;
@@ -438,7 +434,10 @@ void MapKeeper::addMap(SemanticMap other, const std::vector<DriveRecord>& drives
 std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
   State& s = *state_;
   s.takeArrivals(true);
-  if (s.journalled) s.store->noteCleared(box);
+  if (s.journalled) {
+    s.addAllDifferences();
+    s.store->noteCleared(box);
+  }
   std::vector<GridIndex> changed = s.mapper.clearBox(box);
   for (const GridIndex& block : changed) s.noteChange(SemanticMap::regionOf({block}));
   std::vector<GridIndex> in_box;
@@ -453,6 +452,7 @@ std::vector<GridIndex> MapKeeper::clearBox(const Eigen::AlignedBox3d& box) {
 std::vector<GridIndex> MapKeeper::replaceLooks(const GridIndex& tile, const LooksByBlock& looks) {
   State& s = *state_;
   s.takeArrivals(true);
+  if (s.journalled) s.addAllDifferences();
   std::vector<GridIndex> changed = s.mapper.replaceLooks(tile, looks);
   if (!changed.empty()) s.noteChange(tile);
   s.changeStored(std::vector<GridIndex>{tile},

@@ -49,6 +49,7 @@ void checkAll(const std::string& path) {
       file.addTileTo(map, {tile.index, part});
     }
   }
+  for (const ScanRecord& scan : file.scans()) file.scanContent(scan.number);
 }
 
 }  // namespace

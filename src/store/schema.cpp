@@ -38,7 +38,10 @@ constexpr SchemaEntry kSchema[] = {
     {"table", "scan",
      "CREATE TABLE scan (number INTEGER PRIMARY KEY, drive TEXT, stamp INTEGER, sensor TEXT, settings "
      "INTEGER, cleared INTEGER, jump INTEGER, reach REAL, pose BLOB, odometry BLOB, tiles BLOB, bytes "
-     "INTEGER, content_checksum INTEGER, checksum INTEGER, content BLOB)",
+     "INTEGER, content_checksum INTEGER, checksum INTEGER)",
+     kFirstVersionWithJournal},
+    // Apart from the rest of a scan, so that this can change without being written again.
+    {"table", "scan_content", "CREATE TABLE scan_content (number INTEGER PRIMARY KEY, content BLOB)",
      kFirstVersionWithJournal},
     {"table", "settings",
      "CREATE TABLE settings (number INTEGER PRIMARY KEY, parameters TEXT, checksum INTEGER)",

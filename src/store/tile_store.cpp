@@ -1,8 +1,10 @@
 #include "store/tile_store.h"
 
+#include <algorithm>
 #include <iterator>
 #include <memory>
 #include <new>
+#include <stdexcept>
 #include <utility>
 
 namespace bki_mapping {
@@ -72,8 +74,18 @@ std::future<void> TileStore::save(SemanticMap snapshot, std::vector<GridIndex> t
     for (const GridIndex& tile : tiles) change.writeTile(*map, {tile});
     if (drive.scans > 0) change.putDrive(drive);
     for (const std::string& settings : journal.settings) change.addSettings(settings);
-    for (const auto& [scan, content] : journal.added) change.addScan(scan, content());
-    for (const ScanRecord& scan : journal.moved) change.moveScan(scan);
+    const auto unlessInvalid = [](const auto& put) {
+      try {
+        put();
+      } catch (const std::invalid_argument&) {  // the map has such a scan all the same; its journal lacks it
+      }
+    };
+    for (const JournalChange::Added& each : journal.added) {
+      unlessInvalid([&] { change.addScan(each.scan, each.content()); });
+    }
+    for (const ScanRecord& scan : journal.moved) {
+      unlessInvalid([&] { change.moveScan(scan); });
+    }
     return true;
   };
   std::promise<void> durable;
@@ -133,7 +145,7 @@ void TileStore::noteCleared(const Eigen::AlignedBox3d& box) {
 std::string TileStore::scanContent(std::uint64_t number) {
   auto content = std::make_shared<std::promise<std::string>>();
   std::future<std::string> future = content->get_future();
-  const auto work = [number, content = std::move(content)](MapFile& file, MapFile::Change&, Call) {
+  Work work = [number, content = std::move(content)](MapFile& file, MapFile::Change&, Call) {
     try {
       content->set_value(file.scanContent(number));
     } catch (...) {
@@ -144,7 +156,9 @@ std::string TileStore::scanContent(std::uint64_t number) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (closed_) throw MapFileError("the map file is closed");
-    jobs_.push_back({work});
+    Job job{std::move(work)};  // whose end is the end of the promise
+    job.reads = true;
+    jobs_.push_back(std::move(job));
     ++called_;
   }
   wake_.notify_all();
@@ -200,13 +214,9 @@ std::string TileStore::close() {
   wake_.notify_all();
   if (thread_.joinable()) thread_.join();
   file_.reset();
-  std::deque<Job> lost;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    closed_ = true;
-    lost.swap(jobs_);  // whoever waits for one of them is told
-  }
-  if (lost.empty()) return "";
+  std::deque<Job> left;
+  left.swap(jobs_);  // nobody adds any after closed_; whoever waits for one of them is told
+  if (std::all_of(left.begin(), left.end(), [](const Job& job) { return job.reads || job.done; })) return "";
   return fault_ + "; evidence that was not yet in the map file is lost";
 }
 
@@ -234,6 +244,7 @@ void TileStore::run() {
     wake_.wait_for(lock, retry_, [this] { return closing_; });
   }
   change_.reset();
+  closed_ = true;
   for (Job& job : jobs_) {
     if (job.durable) job.durable->set_exception(std::make_exception_ptr(MapFileError(fault_)));
   }
@@ -252,12 +263,12 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
   }
   const Call call = ended_ + executed_;
   lock.unlock();
-  bool late = false;
-  const std::string fault = perform(jobs, call, ends, late);
+  bool late = false, committed = false;
+  const std::string fault = perform(jobs, call, ends, late, committed);
   lock.lock();
   fault_ = fault;
   if (!fault.empty()) {
-    last_trial_ = executed_ + jobs.size();
+    if (committed) last_trial_ = executed_ + jobs.size();
     executed_ = 0;
     ++failures_;
   } else if (late) {
@@ -270,7 +281,8 @@ bool TileStore::tryJobs(std::unique_lock<std::mutex>& lock) {
   return fault.empty();
 }
 
-std::string TileStore::perform(const std::vector<Job*>& jobs, Call call, bool ends, bool& late) {
+std::string TileStore::perform(const std::vector<Job*>& jobs, Call call, bool ends, bool& late,
+                               bool& committed) {
   std::string fault;
   try {
     if (!change_) change_.emplace(file_->change());
@@ -279,9 +291,15 @@ std::string TileStore::perform(const std::vector<Job*>& jobs, Call call, bool en
       if (job->done) continue;
       job->done = !job->work(*file_, *change_, call);
       writes_ |= !job->done;
+      if (!change_->isOpen()) {
+        throw MapFileError(file_->path() + " could not be read; what was not saved yet is written again");
+      }
     }
     if (writes_ && !ends) return "";
-    if (writes_) change_->commit();
+    if (writes_) {
+      committed = true;
+      change_->commit();
+    }
   } catch (const MapFileLateCommit&) {  // the previous trial succeeded after all
     late = true;
   } catch (const std::bad_alloc&) {

@@ -93,17 +93,21 @@ class TileStore {
     Work work;
     std::size_t bytes = 0;
     std::optional<std::promise<void>> durable = std::nullopt;
-    bool first = false;  ///< all earlier jobs must be durable before this one, which reads the list of drives
+    /// All earlier jobs come in other calls of tryJobs() than this one, which reads the list of drives.
+    bool first = false;
     bool done = false;
     bool whole = false;  ///< with it and all earlier jobs, the file holds each scan exactly once
+    bool reads = false;  ///< nothing is lost without it
   };
 
   Call enqueue(Job job);
   void run();
   /// Tries the next jobs, as one change or as a part of one. @return whether that succeeded.
   bool tryJobs(std::unique_lock<std::mutex>& lock);
-  /// Runs jobs in the open change, and commits it if it ends with them. @return why that failed; "" if not.
-  std::string perform(const std::vector<Job*>& jobs, Call call, bool ends, bool& late);
+  /// Runs jobs in the open change, and commits it if it ends with them.
+  /// @param[out] late whether the commit before was made, although it had reported a failure.
+  /// @param[out] committed whether a commit was tried. @return why that failed; "" if it has not.
+  std::string perform(const std::vector<Job*>& jobs, Call call, bool ends, bool& late, bool& committed);
   /// The first jobs are durable.
   void end(std::size_t jobs, std::unique_lock<std::mutex>& lock);
   void arrive(Arrival arrival);
@@ -122,7 +126,7 @@ class TileStore {
   std::size_t waiting_bytes_ = 0;
   Call called_ = 0, ended_ = 0;
   std::size_t executed_ = 0;    ///< the first of the jobs, which are not durable yet
-  std::size_t last_trial_ = 0;  ///< number of jobs in the last trial that failed
+  std::size_t last_trial_ = 0;  ///< number of jobs in the last commit that failed
   std::size_t failures_ = 0;    ///< number of trials that failed
   bool closing_ = false, closed_ = false;
   std::thread thread_;  ///< last, so that it starts after all other members

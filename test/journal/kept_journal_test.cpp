@@ -228,6 +228,40 @@ TEST(KeptJournal, HoldsEachScanOnceWhenItIsKilled) {
   EXPECT_GT(cut_short, 10u) << "the kills come in the middle of changes";
 }
 
+/// The numbers of the scans in a change that say that the poses jump before them.
+std::vector<std::uint64_t> jumpsIn(const JournalChange& change) {
+  std::vector<std::uint64_t> numbers;
+  for (const JournalChange::Added& each : change.added) {
+    if (each.scan.jump) numbers.push_back(each.scan.number);
+  }
+  for (const ScanRecord& scan : change.moved) {
+    if (scan.jump) numbers.push_back(scan.number);
+  }
+  return numbers;
+}
+
+TEST(JournalWriter, TellsOfJumpsThatAreNoticedLate) {
+  MapCorrector corrector(config(), reference::smallTable(), {},
+                         {[](SemanticMap) { return std::vector<GridIndex>(); },
+                          [](const GridIndex&, const LooksByBlock&) { return std::vector<GridIndex>(); }});
+  JournalWriter writer({10, 0, 0}, "drive");
+  const auto add = [&](std::uint64_t stamp) {
+    Scan scan = scanAt(0.0, 0.0, stamp);
+    scan.origin.setZero();
+    const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    corrector.addScan(corrector.round(scan, pose).scan, 0, pose, pose, {});
+  };
+  for (const std::uint64_t stamp : {100u, 200u, 300u, 400u}) add(stamp);
+  EXPECT_EQ(writer.take(corrector, {}).added.size(), 4u);
+  corrector.noteJump(250);
+  corrector.noteJump(500);
+  EXPECT_EQ(jumpsIn(writer.take(corrector, {})), std::vector<std::uint64_t>{12}) << "the scan of time 300";
+  add(600);
+  add(510);
+  EXPECT_EQ(jumpsIn(writer.take(corrector, {})), std::vector<std::uint64_t>{15}) << "the scan of time 510";
+  EXPECT_TRUE(jumpsIn(writer.take(corrector, {})).empty());
+}
+
 TEST(KeptJournal, IsRefusedByFilesOfOlderVersions) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
@@ -238,10 +272,11 @@ TEST(KeptJournal, IsRefusedByFilesOfOlderVersions) {
   config.resolution = info.resolution;
   config.prior = info.prior;
   SemanticMapper mapper(config, info.classes);
-  EXPECT_EQ(sentenceOf([&] { MapKeeper(mapper, path, info, newDrive("a"), true); }),
-            path +
-                " is of a version of the format that has no journal; convert it with migrate_map, or set "
-                "journal to false");
+  EXPECT_EQ(
+      sentenceOf([&] { MapKeeper(mapper, path, info, newDrive("a"), true); }),
+      path +
+          " is of a version of the format that has no journal of scans; convert it with migrate_map, or do "
+          "without the journal");
 }
 
 }  // namespace

@@ -52,8 +52,8 @@ std::string randomValue(Random& random) {
 }
 
 std::string randomChange(Random& random) {
-  static const std::array<std::string, 8> kTables{"map",   "class", "drive",    "tile",
-                                                  "total", "scan",  "settings", "cleared"};
+  static const std::array<std::string, 9> kTables{"map",  "class",    "drive",   "tile",        "total",
+                                                  "scan", "settings", "cleared", "scan_content"};
   static const std::array<std::string, 43> kColumns{
       "resolution",      "unit_exponent", "prior",  "frame",     "class_table", "label_mask", "parameters",
       "program",         "position",      "id",     "name",      "red",         "raw",        "any_raw",

@@ -196,10 +196,11 @@ TEST_P(Version, KeepsAJournalOrSaysThatItHasNone) {
   MapFile file(path, MapFile::Access::kUpdate);
   if (GetParam() < 4) {
     MapFile::Change change = file.change();
-    EXPECT_EQ(sentenceOf([&] { change.addSettings("x: 1\n"); }),
-              path + " has version " + std::to_string(GetParam()) +
-                  " of the format, which has no journal of scans; convert it with migrate_map, or do without "
-                  "the journal");
+    EXPECT_EQ(
+        sentenceOf([&] { change.addSettings("x: 1\n"); }),
+        path +
+            " is of a version of the format that has no journal of scans; convert it with migrate_map, or "
+            "do without the journal");
     EXPECT_NE(sentenceOf([&] { change.addScan(scan, ""); }), "");
     EXPECT_NO_THROW(change.eraseJournal());
     return;

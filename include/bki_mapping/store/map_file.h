@@ -39,6 +39,9 @@ class MapFileInUse : public MapFileError {
   using MapFileError::MapFileError;
 };
 
+/// The error for a file that should have a journal, and is of an older version.
+MapFileError withoutJournal(const std::string& path);
+
 /// A unit of evidence is 2^-kUnitExponent.
 constexpr int kUnitExponent = 16;
 static_assert(kEvidenceUnit * (1 << kUnitExponent) == 1.0f);
@@ -182,6 +185,8 @@ class MapFile {
     int addClearedBox(const Eigen::AlignedBox3d& box);
     /// Forgets all scans, settings and boxes; the map stays as it is. Does nothing if the version has none.
     void eraseJournal();
+    /// Whether the change can still be made: after an error of the disk, also of reading, it may be undone.
+    bool isOpen() const;
     /// Writes the change to the disk, and returns when it is durable. The object must not be used afterwards.
     /// If the function throws, the change is not made; MapFile::change() describes the one exception.
     void commit();
