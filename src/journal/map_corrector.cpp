@@ -97,6 +97,12 @@ void MapCorrector::addScan(SensorScan scan, std::size_t sensor, const Eigen::Iso
   if (seen) to_look_.push_back(number);
 }
 
+void MapCorrector::restore(JournalScan scan) {
+  const std::size_t cleared_before = scan.cleared_before;
+  const Number number = journal_.add(std::move(scan));
+  journal_.at(number).cleared_before = cleared_before;
+}
+
 void MapCorrector::reconfigure(const MapperConfig& config) {
   checkCorrectable(config);
   config_ = std::make_shared<const MapperConfig>(config);
@@ -127,6 +133,22 @@ void MapCorrector::reset() {
 bool MapCorrector::correct(const std::vector<StampedMotion>& keyframes,
                            const std::vector<Eigen::Isometry3d>& T_sensor_keyframe) {
   if (!journal_.setPath(keyframes, T_sensor_keyframe)) return false;
+  markAll();
+  return true;
+}
+
+void MapCorrector::correctTo(const std::vector<Eigen::Isometry3d>& T_map_sensor) {
+  if (T_map_sensor.size() != journal_.size()) {
+    throw std::invalid_argument("there are " + std::to_string(T_map_sensor.size()) + " poses for " +
+                                std::to_string(journal_.size()) + " scans");
+  }
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    journal_.at(n).wanted = roundedPose(T_map_sensor[n - journal_.begin()]);
+  }
+  markAll();
+}
+
+void MapCorrector::markAll() {
   ++progress_.paths;
   progress_.largest_move = 0.0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
@@ -136,7 +158,6 @@ bool MapCorrector::correct(const std::vector<StampedMotion>& keyframes,
   progress_.failed = 0;
   progress_.fault.clear();
   countToGo();
-  return true;
 }
 
 std::vector<StampedMotion> MapCorrector::trajectory() const {

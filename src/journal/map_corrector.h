@@ -60,6 +60,9 @@ class MapCorrector {
   /// @param T_odometry_sensor its recorded pose in a frame that does not jump.
   void addScan(SensorScan scan, std::size_t sensor, const Eigen::Isometry3d& T_map_sensor,
                const Eigen::Isometry3d& T_odometry_sensor, const std::vector<GridIndex>& touched);
+  /// Notes a scan that is in the map from before, as addScan() has made it: packed, with its settings and the
+  /// number of boxes that had been cleared before it.
+  void restore(JournalScan scan);
   /// The settings with which later scans are integrated. @throws as checkCorrectable(); nothing has then
   /// changed.
   void reconfigure(const MapperConfig& config);
@@ -79,6 +82,10 @@ class MapCorrector {
   bool correct(const std::vector<StampedMotion>& keyframes,
                const std::vector<Eigen::Isometry3d>& T_sensor_keyframe);
 
+  /// Sets where each scan of the journal belongs, in order. @throws std::invalid_argument unless there are as
+  /// many poses.
+  void correctTo(const std::vector<Eigen::Isometry3d>& T_map_sensor);
+
   /// Adds to the map what is ready, and has the next scans moved: those near a place first, and of these the
   /// newest. Call it between scans; it takes some milliseconds. @param robot position in the map frame [m].
   /// @return the changed blocks.
@@ -87,6 +94,7 @@ class MapCorrector {
   /// Takes as long as that takes.
   void finish(const Eigen::Vector3d& robot);
 
+  const ScanJournal& journal() const { return journal_; }
   /// The poses where the kept scans belong, by rising stamp.
   std::vector<StampedMotion> trajectory() const;
 
@@ -175,6 +183,8 @@ class MapCorrector {
   void giveUpLooks(const std::string& fault);
   /// Replaces the looks of some regions, which takes a moment.
   std::vector<GridIndex> replaceLooks();
+  /// Marks all scans after new poses were set.
+  void markAll();
   /// Marks a scan as to be moved, or not, by where it is.
   void mark(JournalScan& scan) const;
   void countToGo();
