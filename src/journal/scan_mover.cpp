@@ -1,6 +1,8 @@
 #include "journal/scan_mover.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <utility>
 
 #include "journal/scan_codec.h"
 
@@ -28,32 +30,40 @@ std::vector<GridIndex> regionsOf(const std::vector<GridIndex>& blocks) {
 }
 
 ScanMover::ScanMover(const MapperConfig& config, std::shared_ptr<const ClassTable> classes, Fetch fetch)
-    : mapper_(asideOf(config), std::move(classes)), fetch_(std::move(fetch)) {}
+    : classes_(std::move(classes)),
+      mapper_(std::make_unique<SemanticMapper>(asideOf(config), classes_)),
+      fetch_(std::move(fetch)) {}
 
 SensorScan ScanMover::unpack(const PlacedJournalScan& scan) const {
   return unpackScan(scan.packed ? *scan.packed : fetch_(scan.number));
 }
 
 void ScanMover::use(const PlacedJournalScan& scan) {
-  if (settings_ != scan.settings) mapper_.reconfigure(asideOf(*scan.settings));
+  if (settings_ == scan.settings) return;
+  const MapperConfig aside = asideOf(*scan.settings);
+  try {
+    mapper_->reconfigure(aside);
+  } catch (const std::invalid_argument&) {  // as of scans of a drive that began with other settings
+    mapper_ = std::make_unique<SemanticMapper>(aside, classes_);
+  }
   settings_ = scan.settings;
 }
 
 ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
-  mapper_.takeMap();  // what a failed call has left
+  mapper_->takeMap();  // what a failed call has left
   std::vector<std::vector<GridIndex>> regions;
   std::vector<SensorScan> scans;
   for (const ScanMove& move : moves) {
     use(move.scan);
     scans.push_back(unpack(move.scan));
-    mapper_.withdraw(place(scans.back(), move.scan.T_map_sensor));
+    mapper_->withdraw(place(scans.back(), move.scan.T_map_sensor));
   }
   // After all is withdrawn: a block that is empty for a moment loses its looks.
   for (std::size_t n = 0; n < moves.size(); ++n) {
-    mapper_.integrate(place(scans[n], moves[n].to));
-    regions.push_back(regionsOf(mapper_.touchedBlocks()));
+    mapper_->integrate(place(scans[n], moves[n].to));
+    regions.push_back(regionsOf(mapper_->touchedBlocks()));
   }
-  Moved moved{mapper_.takeMap(), std::move(regions)};
+  Moved moved{mapper_->takeMap(), std::move(regions)};
   if (!moves.empty()) {
     for (const Eigen::AlignedBox3d& box : moves.front().scan.cleared) clearBox(moved.difference, box);
   }
@@ -62,13 +72,13 @@ ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
 
 void ScanMover::addLooks(const PlacedJournalScan& scan, LooksByRegion& looks) {
   use(scan);
-  mapper_.takeMap();  // what a failed call has left
-  mapper_.integrate(place(unpack(scan), scan.T_map_sensor));
-  for (const Eigen::AlignedBox3d& box : scan.cleared) mapper_.clearBox(box);
-  for (const GridIndex& region : mapper_.map().regions()) {
+  mapper_->takeMap();  // what a failed call has left
+  mapper_->integrate(place(unpack(scan), scan.T_map_sensor));
+  for (const Eigen::AlignedBox3d& box : scan.cleared) mapper_->clearBox(box);
+  for (const GridIndex& region : mapper_->map().regions()) {
     const auto to = looks.find(region);
     if (to == looks.end()) continue;
-    const Region& blocks = *mapper_.map().findRegion(region);
+    const Region& blocks = *mapper_->map().findRegion(region);
     blocks.forEachIndex([&](const BlockIndex& index) {
       const Block& block = *blocks.find(Region::numberOf(index));
       if (!block.looks().empty()) to->second[index].add(block.looks());

@@ -62,7 +62,8 @@ class ScanMover {
   void use(const PlacedJournalScan& scan);
   SensorScan unpack(const PlacedJournalScan& scan) const;
 
-  SemanticMapper mapper_;
+  std::shared_ptr<const ClassTable> classes_;
+  std::unique_ptr<SemanticMapper> mapper_;
   Fetch fetch_;
   std::shared_ptr<const MapperConfig> settings_;  ///< that the mapper has now
 };

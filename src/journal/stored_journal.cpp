@@ -1,6 +1,85 @@
 #include "journal/stored_journal.h"
 
+#include <algorithm>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "bki_mapping/settings/yaml.h"
+#include "store/box_tiles.h"
+
 namespace bki_mapping {
+namespace {
+
+std::shared_ptr<const MapperConfig> settingsFrom(const std::string& yaml, const std::string& file) {
+  auto config = std::make_shared<MapperConfig>();
+  try {
+    const std::map<std::string, std::string> values = parseParameters(yaml);
+    std::map<std::string, std::string> known;
+    for (const Parameter& parameter : mapperParameters()) {
+      const auto found = values.find(parameter.name);
+      if (found != values.end()) known.insert(*found);
+    }
+    setParameters(*config, known);
+    checkParameters(*config);
+  } catch (const std::invalid_argument& error) {
+    throw MapFileError("the settings in the journal of " + file + " cannot be used: " + error.what());
+  }
+  return config;
+}
+
+/// The tiles of a file that a box of whole blocks reaches into.
+std::vector<GridIndex> tilesReached(MapFile& file, const Eigen::AlignedBox3d& box) {
+  std::vector<GridIndex> tiles;
+  if (box.isEmpty()) return tiles;
+  const double resolution = file.info().resolution, edge = kTileEdge * resolution;
+  // Boxes that only share a face hold no common block.
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(resolution);
+  const Eigen::AlignedBox3d inside(box.min() + margin, box.max() - margin);
+  const auto [low, high] = tilesAbout(box, resolution);
+  for (const TileEntry& tile : file.tilesIn(low, high)) {
+    const Eigen::Vector3d corner = edge * Eigen::Vector3d(tile.index.x, tile.index.y, tile.index.z);
+    const Eigen::AlignedBox3d space(corner, corner + Eigen::Vector3d::Constant(edge));
+    if (space.intersects(inside)) tiles.push_back(tile.index);
+  }
+  return tiles;
+}
+
+/// Notes where drives have scans that the journal lacks. @param kept number of scans in it, by drive.
+void noteLacking(MapFile& file, const std::map<std::string, std::uint64_t>& kept, MapCorrector& corrector) {
+  for (const DriveRecord& drive : file.drives()) {
+    const auto found = kept.find(drive.id);
+    if (drive.scans != (found == kept.end() ? 0 : found->second)) {
+      corrector.noteForeign(tilesReached(file, drive.bounds));
+    }
+  }
+}
+
+std::size_t numberOf(const std::string& sensor, std::vector<std::string>& sensors) {
+  const auto known = std::find(sensors.begin(), sensors.end(), sensor);
+  const auto number = static_cast<std::size_t>(known - sensors.begin());
+  if (known == sensors.end()) sensors.push_back(sensor);
+  return number;
+}
+
+/// The scan of a row, as it is in the map.
+JournalScan scanOf(const ScanRecord& record, std::string content,
+                   const std::shared_ptr<const MapperConfig>& settings, std::size_t sensor) {
+  JournalScan scan;
+  scan.stamp = record.stamp;
+  scan.packed = std::make_shared<const std::string>(std::move(content));
+  scan.settings = settings;
+  scan.sensor = sensor;
+  scan.T_map_sensor = record.T_map_sensor;
+  scan.T_odometry_sensor = record.T_odometry_sensor;
+  scan.reach = record.reach;
+  scan.regions = record.tiles;
+  scan.cleared_before = static_cast<std::size_t>(record.cleared);
+  return scan;
+}
+
+}  // namespace
 
 ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored) {
   ScanRecord record;
@@ -16,6 +95,47 @@ ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored) {
   record.T_odometry_sensor = scan.T_odometry_sensor;
   record.tiles = scan.regions;
   return record;
+}
+
+std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file) {
+  std::vector<std::shared_ptr<const MapperConfig>> settings;
+  for (const std::string& yaml : file.settings()) settings.push_back(settingsFrom(yaml, file.path()));
+  return settings;
+}
+
+RestoredJournal restoreJournal(MapFile& file, MapCorrector& corrector, const std::string& drive) {
+  RestoredJournal restored;
+  const auto settings = journalSettings(file);
+  for (const Eigen::AlignedBox3d& box : file.clearedBoxes()) corrector.noteCleared(box);
+  std::map<std::string, std::uint64_t> kept;
+  for (const ScanRecord& record : file.scans()) {
+    ++kept[record.drive];
+    if (!drive.empty() && record.drive != drive) {
+      corrector.noteForeign(record.tiles);
+      continue;
+    }
+    if (record.jump) corrector.noteJump(record.stamp);
+    corrector.restore(scanOf(record, file.scanContent(record.number),
+                             settings[static_cast<std::size_t>(record.settings)],
+                             numberOf(record.sensor, restored.sensors)));
+    restored.scans.push_back({record.number, record.drive, record.sensor, record.settings, 0, record.jump});
+  }
+  noteLacking(file, kept, corrector);
+  return restored;
+}
+
+Eigen::AlignedBox3d boundsIn(const SemanticMap& map, const std::vector<GridIndex>& tiles) {
+  Eigen::AlignedBox3d bounds;
+  for (const GridIndex& tile : tiles) {
+    const Region* const region = map.findRegion(tile);
+    if (region == nullptr) continue;
+    region->forEachIndex([&](const BlockIndex& block) {
+      const Eigen::Vector3d low = map.geometry().blockOrigin(block);
+      bounds.extend(low);
+      bounds.extend(low + Eigen::Vector3d::Constant(map.geometry().blockSize()));
+    });
+  }
+  return bounds;
 }
 
 }  // namespace bki_mapping

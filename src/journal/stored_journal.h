@@ -1,10 +1,14 @@
 /// @file The journal of a map file: scans of a MapCorrector as rows, and back.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <vector>
 
-#include "bki_mapping/store/scan_record.h"
+#include "bki_mapping/store/map_file.h"
+#include "journal/map_corrector.h"
 #include "journal/scan_journal.h"
 
 namespace bki_mapping {
@@ -20,5 +24,26 @@ struct StoredAs {
 
 /// The row of a scan where it is in the map now.
 ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored);
+
+/// The settings of a file's journal, by their numbers. Parameters that this version does not know are
+/// ignored. @throws MapFileError if they are not YAML, or not allowed.
+std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file);
+
+/// What a corrector does not know of the scans that restoreJournal() gives it.
+struct RestoredJournal {
+  std::vector<StoredAs> scans;       ///< in the order of the journal in memory
+  std::vector<std::string> sensors;  ///< names, by the numbers that the scans have (JournalScan::sensor)
+};
+
+/// Gives a corrector that has no scans those of a file's journal, with the jumps of their poses and the
+/// boxes that were cleared, and notes as foreign where the map in the file has other evidence: from scans
+/// that the journal lacks, or of other drives.
+/// @param drive whose scans are given; "": the scans of all drives.
+/// @throws MapFileError, also if a scan refers to settings that cannot be used; std::bad_alloc. The corrector
+/// then has some of the scans; reset() it.
+RestoredJournal restoreJournal(MapFile& file, MapCorrector& corrector, const std::string& drive = "");
+
+/// The bounding box of the blocks that a map has in some tiles, map frame [m]; empty if there are none.
+Eigen::AlignedBox3d boundsIn(const SemanticMap& map, const std::vector<GridIndex>& tiles);
 
 }  // namespace bki_mapping

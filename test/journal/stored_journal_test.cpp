@@ -1,0 +1,421 @@
+// A journal that was written to a map file corrects the map as one in memory does: to the bit.
+#include "journal/stored_journal.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "bki_mapping/settings/yaml.h"
+#include "bki_mapping/store/mapper_file.h"
+#include "journal/scan_codec.h"
+#include "reference/content.h"
+#include "reference/scenes.h"
+#include "temporary_folder.h"
+
+namespace bki_mapping {
+namespace {
+
+using Content = std::map<GridIndex, std::string>;
+
+MapperConfig ruled(bool looks) {
+  MapperConfig config;
+  config.free_space.mode = "line";
+  config.rules.enabled = true;
+  config.rules.latest = looks;
+  config.sensor_model.height = 1.5;
+  config.threads = 1;
+  return config;
+}
+
+/// Settings that a drive may begin with after others, and of which the second is a change while mapping.
+std::vector<MapperConfig> manySettings(bool looks) {
+  std::vector<MapperConfig> settings(3, ruled(looks));
+  settings[1].sensor_model.max_range = 3.0;
+  settings[2].downsample_resolution = 0.15;
+  return settings;
+}
+
+Eigen::Isometry3d randomMotion(std::mt19937& random, double metres, double radians) {
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto vector = [&] {
+    const double x = uniform(random), y = uniform(random), z = uniform(random);
+    return Eigen::Vector3d(x, y, z);
+  };
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = Eigen::AngleAxisd(radians * uniform(random), vector().normalized()).toRotationMatrix();
+  motion.translation() = metres * vector();
+  return motion;
+}
+
+/// A map of scans, with all that its file needs; what is in it is made afresh for each use.
+class Drives {
+ public:
+  struct Entry {
+    SensorScan scan;
+    std::string drive, sensor;
+    int settings = 0, cleared = 0;
+    bool jump = false;
+    Eigen::Isometry3d pose, odometry;
+  };
+
+  explicit Drives(std::vector<MapperConfig> settings) : settings_(std::move(settings)) {}
+
+  /// Adds a scan from a random place, some of whose points are near others of earlier scans.
+  Entry& add(const std::string& drive, int settings, std::mt19937& random) {
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    Eigen::Isometry3d pose = randomMotion(random, 1.5, 3.0);
+    pose.translation().z() *= 0.2;
+    std::vector<Eigen::Vector3f> points;
+    std::vector<std::uint32_t> labels;
+    for (int n = 0; n < 60; ++n) {
+      const double x = uniform(random), y = uniform(random), z = uniform(random);
+      Eigen::Vector3d hit(6.0 * x, 4.0 * y, 1.5 * z);
+      if (n % 5) hit[n % 3] = n % 2 ? 2.5 : -2.5;
+      points.push_back((pose.inverse() * hit).cast<float>());
+      labels.push_back(10 * (random() % 4));
+    }
+    stamp_ += 70'000'000 + random() % 300'000'000;
+    const Scan scan = scanFromSensorFrame(pose, points, labels, stamp_);
+    const MapperConfig& config = settings_[static_cast<std::size_t>(settings)];
+    RoundedScan rounded = toSensorScan(scan, pose, 0.01, config.sensor_model);
+    entries_.push_back({std::move(rounded.scan), drive, random() % 2 ? "left" : "right", settings,
+                        static_cast<int>(boxes_.size()), false, rounded.T_map_sensor,
+                        randomMotion(random, 3.0, 1.0)});
+    return entries_.back();
+  }
+  void clear(const Eigen::AlignedBox3d& box) { boxes_.push_back(box); }
+
+  /// The map of the scans, and their rows.
+  SemanticMap map(std::vector<ScanRecord>* rows = nullptr, std::vector<DriveRecord>* drives = nullptr) const {
+    SemanticMap sum = SemanticMapper(settings_[0], reference::tableWithDynamicClass()).takeMap();
+    std::size_t cleared = 0;
+    for (std::size_t n = 0; n < entries_.size(); ++n) {
+      const Entry& entry = entries_[n];
+      for (; cleared < static_cast<std::size_t>(entry.cleared); ++cleared) clearBox(sum, boxes_[cleared]);
+      SemanticMapper mapper(settings_[static_cast<std::size_t>(entry.settings)],
+                            reference::tableWithDynamicClass());
+      mapper.addMap(std::move(sum));
+      mapper.integrate(place(entry.scan, entry.pose));
+      if (rows) rows->push_back(rowOfEntry(n, mapper.touchedBlocks()));
+      if (drives) note(entry, mapper, *drives);
+      sum = mapper.takeMap();
+    }
+    for (; cleared < boxes_.size(); ++cleared) clearBox(sum, boxes_[cleared]);
+    return sum;
+  }
+
+  void save(const std::string& path) const {
+    std::vector<ScanRecord> rows;
+    std::vector<DriveRecord> drives;
+    const SemanticMap sum = map(&rows, &drives);
+    NewMapFile file(path, mapInfoOf(SemanticMapper(settings_[0], reference::tableWithDynamicClass()), "map"));
+    for (const DriveRecord& drive : drives) file.content().putDrive(drive);
+    for (const GridIndex& tile : tilesOf(sum)) file.content().writeTile(sum, {tile});
+    for (const MapperConfig& config : settings_) file.content().addSettings(parameterYaml(config));
+    for (const Eigen::AlignedBox3d& box : boxes_) file.content().addClearedBox(box);
+    for (std::size_t n = 0; n < rows.size(); ++n) {
+      file.content().addScan(rows[n], packScan(entries_[n].scan));
+    }
+    file.commit();
+  }
+
+  std::vector<MapperConfig> settings_;
+  std::vector<Entry> entries_;
+  std::vector<Eigen::AlignedBox3d> boxes_;
+
+ private:
+  ScanRecord rowOfEntry(std::size_t n, const std::vector<GridIndex>& touched) const {
+    const Entry& entry = entries_[n];
+    ScanRecord row;
+    row.number = 3 * n + 2;  // numbers may have gaps
+    row.drive = entry.drive;
+    row.stamp = entry.scan.stamp;
+    row.sensor = entry.sensor;
+    row.settings = entry.settings;
+    row.cleared = entry.cleared;
+    row.jump = entry.jump;
+    row.reach = reachOf(entry.scan, settings_[static_cast<std::size_t>(entry.settings)].sensor_model);
+    row.T_map_sensor = entry.pose;
+    row.T_odometry_sensor = entry.odometry;
+    row.tiles = regionsOf(touched);
+    return row;
+  }
+  static void note(const Entry& entry, const SemanticMapper& mapper, std::vector<DriveRecord>& drives) {
+    auto drive = std::find_if(drives.begin(), drives.end(),
+                              [&](const DriveRecord& each) { return each.id == entry.drive; });
+    if (drive == drives.end()) {
+      drive = drives.emplace(drives.end());
+      drive->id = entry.drive;
+    }
+    drive->addScan(entry.scan.stamp, mapper.map().geometry(), mapper.touchedBlocks());
+  }
+
+  std::uint64_t stamp_ = 1'000'000'000;
+};
+
+/// A map file in memory with its journal.
+class Restored {
+ public:
+  explicit Restored(MapFile& file, const std::string& drive = "")
+      : map_(readMap(file).map),
+        corrector_(*journalSettings(file).front(), file.info().classes, exact(),
+                   {[this](const SemanticMap& difference) {
+                      map_.add(difference);
+                      for (const GridIndex& region : difference.regions()) changed_.insert(region);
+                      return std::vector<GridIndex>();
+                    },
+                    [this](const GridIndex& region, const LooksByBlock& looks) {
+                      changed_.insert(region);
+                      return replaceLooks(map_, region, looks);
+                    }}),
+        rows_(restoreJournal(file, corrector_, drive)) {}
+
+  static MapCorrector::Settings exact() {
+    MapCorrector::Settings settings;
+    settings.tolerance = 0.0;
+    return settings;
+  }
+  void moveTo(const std::vector<Eigen::Isometry3d>& poses) {
+    corrector_.correctTo(poses);
+    corrector_.finish(Eigen::Vector3d::Zero());
+    const MapCorrector::Progress progress = corrector_.progress();
+    EXPECT_EQ(progress.failed, 0u) << progress.fault;
+    EXPECT_EQ(progress.fault, "");
+  }
+  Content content() const { return reference::contentOf(map_); }
+  /// Writes what has changed.
+  void save(MapFile& file) {
+    MapFile::Change change = file.change();
+    for (const GridIndex& tile : changed_) change.writeTile(map_, {tile});
+    for (std::size_t n = 0; n < rows_.scans.size(); ++n) {
+      change.moveScan(recordOf(corrector_.journal().at(n), rows_.scans[n]));
+    }
+    change.commit();
+  }
+
+  SemanticMap map_;
+  std::set<GridIndex> changed_;
+  MapCorrector corrector_;
+  RestoredJournal rows_;
+};
+
+std::vector<Eigen::Isometry3d> posesOf(const Drives& drives) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Drives::Entry& entry : drives.entries_) poses.push_back(entry.pose);
+  return poses;
+}
+
+/// Moves some scans. @param drive whose scans move; "": all.
+std::vector<Eigen::Isometry3d> moveSome(Drives& drives, const std::string& drive, std::mt19937& random) {
+  for (Drives::Entry& entry : drives.entries_) {
+    if (random() % 4 == 0 || (!drive.empty() && entry.drive != drive)) continue;
+    entry.pose = roundedPose(randomMotion(random, 0.6, 0.1) * entry.pose);
+  }
+  return posesOf(drives);
+}
+
+/// Two drives with changing settings.
+Drives twoDrives(bool looks, std::mt19937& random, const std::vector<Eigen::AlignedBox3d>& boxes = {}) {
+  Drives drives(manySettings(looks));
+  for (int n = 0; n < 8; ++n) {
+    if (n == 3) {
+      for (const Eigen::AlignedBox3d& box : boxes) drives.clear(box);
+    }
+    drives.add("first", n < 5 ? 0 : 1, random);
+  }
+  for (int n = 0; n < 8; ++n) {
+    drives.add("second", 2, random);
+    if (n == 4) {
+      for (const Eigen::AlignedBox3d& box : boxes) drives.clear(box);
+    }
+  }
+  return drives;
+}
+
+/// What a map holds but its looks.
+std::map<GridIndex, std::vector<EvidenceUnits>> evidenceOf(const SemanticMap& map) {
+  std::map<GridIndex, std::vector<EvidenceUnits>> planes;
+  for (const auto& [index, block] : map.entries()) {
+    planes[index].assign(block->plane(0), block->plane(0) + block->classes().size() * kBlockVoxels);
+  }
+  return planes;
+}
+
+TEST(StoredJournal, CorrectsAMapAcrossDrivesAndSettings) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  for (const bool looks : {true, false}) {
+    std::mt19937 random(looks ? 31 : 32);
+    Drives drives = twoDrives(looks, random);
+    drives.save(path);
+    const Content before = reference::contentOf(drives.map());
+    for (const std::string moved : {"second", "first", ""}) {
+      MapFile file(path, MapFile::Access::kUpdate);
+      Restored restored(file);
+      ASSERT_TRUE(restored.content() == reference::contentOf(drives.map()));
+      ASSERT_EQ(restored.rows_.scans.size(), drives.entries_.size());
+      EXPECT_TRUE(restored.corrector_.journal().foreign().empty());
+      restored.moveTo(moveSome(drives, moved, random));
+      EXPECT_GT(restored.corrector_.progress().moved, 3u);
+      ASSERT_TRUE(restored.content() == reference::contentOf(drives.map())) << moved;
+      ASSERT_FALSE(restored.content() == before);
+      restored.save(file);
+      EXPECT_TRUE(reference::contentOf(readMap(file).map) == restored.content());
+    }
+  }
+}
+
+TEST(StoredJournal, RemembersTheRows) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(33);
+  Drives drives = twoDrives(true, random);
+  drives.entries_[4].jump = true;
+  drives.save(path);
+  MapFile file(path, MapFile::Access::kUpdate);
+  const std::vector<ScanRecord> rows = file.scans();
+  Restored restored(file);
+  ASSERT_EQ(restored.rows_.sensors.size(), 2u);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const JournalScan& scan = restored.corrector_.journal().at(n);
+    const ScanRecord row = recordOf(scan, restored.rows_.scans[n]);
+    EXPECT_EQ(row.number, rows[n].number);
+    EXPECT_EQ(row.drive, rows[n].drive);
+    EXPECT_EQ(row.stamp, rows[n].stamp);
+    EXPECT_EQ(row.sensor, rows[n].sensor);
+    EXPECT_EQ(restored.rows_.sensors[scan.sensor], rows[n].sensor);
+    EXPECT_EQ(row.settings, rows[n].settings);
+    EXPECT_EQ(row.cleared, rows[n].cleared);
+    EXPECT_EQ(row.jump, rows[n].jump);
+    EXPECT_EQ(row.reach, rows[n].reach);
+    EXPECT_EQ(row.T_map_sensor.matrix(), rows[n].T_map_sensor.matrix());
+    EXPECT_EQ(row.T_odometry_sensor.matrix(), rows[n].T_odometry_sensor.matrix());
+    EXPECT_EQ(row.tiles, rows[n].tiles);
+    EXPECT_TRUE(unpackScan(*scan.packed) == drives.entries_[n].scan);
+  }
+}
+
+/// Without looks, whose intervals may differ from those of a map made afresh where a box was cleared.
+TEST(StoredJournal, WhatWasClearedStaysEmptyOfWhatWasBefore) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(34);
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(-1.0, -3.0, -3.0), Eigen::Vector3d(2.0, 3.0, 3.0));
+  Drives drives = twoDrives(false, random, {box});
+  drives.save(path);
+  MapFile file(path, MapFile::Access::kRead);
+  EXPECT_EQ(file.clearedBoxes().size(), 2u);
+  Restored restored(file);
+  restored.moveTo(moveSome(drives, "", random));
+  EXPECT_TRUE(restored.content() == reference::contentOf(drives.map()));
+}
+
+TEST(StoredJournal, GivesTheScansOfOneDriveAndTheRestIsForeign) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(35);
+  Drives drives = twoDrives(true, random);
+  drives.save(path);
+  MapFile file(path, MapFile::Access::kRead);
+  Restored restored(file, "second");
+  ASSERT_EQ(restored.rows_.scans.size(), 8u);
+  std::set<GridIndex> others;
+  for (const ScanRecord& row : file.scans()) {
+    if (row.drive == "first") others.insert(row.tiles.begin(), row.tiles.end());
+  }
+  EXPECT_EQ(restored.corrector_.journal().foreign(), others);
+  const std::vector<Eigen::Isometry3d> poses = moveSome(drives, "second", random);
+  restored.moveTo({poses.begin() + 8, poses.end()});
+  EXPECT_TRUE(evidenceOf(restored.map_) == evidenceOf(drives.map()));
+}
+
+TEST(StoredJournal, TilesOfScansThatItLacksAreForeign) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(36);
+  Drives drives = twoDrives(true, random);
+  drives.save(path);
+  MapFile file(path, MapFile::Access::kUpdate);
+  const std::vector<TileEntry> tiles = file.tiles();
+  ASSERT_GT(tiles.size(), 4u);
+  const double edge = 64 * file.info().resolution;
+  DriveRecord lacking;
+  lacking.id = "of another map";
+  lacking.scans = 1;
+  const GridIndex& in = tiles.front().index;
+  const Eigen::Vector3d corner = edge * Eigen::Vector3d(in.x, in.y, in.z);
+  lacking.bounds = {corner, corner + Eigen::Vector3d::Constant(edge)};
+  MapFile::Change change = file.change();
+  change.putDrive(lacking);
+  change.commit();
+  EXPECT_EQ(Restored(file).corrector_.journal().foreign(), std::set<GridIndex>{in});
+
+  MapFile::Change emptied = file.change();
+  lacking.scans = 0;
+  emptied.putDrive(lacking);
+  emptied.commit();
+  EXPECT_TRUE(Restored(file).corrector_.journal().foreign().empty());
+}
+
+/// A path that ends before a jump moves nothing after it.
+TEST(StoredJournal, KeepsJumps) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(37);
+  Drives drives(manySettings(true));
+  for (int n = 0; n < 6; ++n) {
+    Drives::Entry& entry = drives.add("only", 0, random);
+    entry.sensor = "";
+    entry.odometry = entry.pose;
+    entry.jump = n == 3;
+  }
+  drives.save(path);
+  MapFile file(path, MapFile::Access::kRead);
+  Restored restored(file);
+  const Eigen::Isometry3d shift = randomMotion(random, 0.5, 0.0);
+  EXPECT_TRUE(restored.corrector_.correct({{drives.entries_[1].scan.stamp, shift * drives.entries_[1].pose}},
+                                          {Eigen::Isometry3d::Identity()}));
+  restored.corrector_.finish(Eigen::Vector3d::Zero());
+  EXPECT_EQ(restored.corrector_.progress().moved, 3u);
+  for (std::size_t n = 0; n < 3; ++n) {
+    drives.entries_[n].pose = roundedPose(shift * drives.entries_[n].pose);
+  }
+  EXPECT_TRUE(restored.content() == reference::contentOf(drives.map()));
+}
+
+TEST(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(38);
+  twoDrives(true, random).save(path);
+  MapFile file(path, MapFile::Access::kUpdate);
+  MapFile::Change change = file.change();
+  change.addSettings("a_setting_of_the_future: 1\nresolution: -1\n");
+  change.commit();
+  try {
+    journalSettings(file);
+    FAIL();
+  } catch (const MapFileError& error) {
+    EXPECT_NE(std::string(error.what()).find("the settings in the journal of " + path), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("resolution"), std::string::npos) << error.what();
+  }
+}
+
+TEST(StoredJournal, BoundsAreThoseOfTheBlocksInTiles) {
+  std::mt19937 random(39);
+  const Drives drives = twoDrives(true, random);
+  const SemanticMap map = drives.map();
+  Eigen::AlignedBox3d all;
+  for (const auto& [index, block] : map.entries()) {
+    const Eigen::Vector3d low = map.geometry().blockOrigin({index});
+    all.extend(low);
+    all.extend(low + Eigen::Vector3d::Constant(map.geometry().blockSize()));
+  }
+  const Eigen::AlignedBox3d bounds = boundsIn(map, tilesOf(map));
+  EXPECT_EQ(bounds.min(), all.min());
+  EXPECT_EQ(bounds.max(), all.max());
+  EXPECT_TRUE(boundsIn(map, {{1000, 0, 0}}).isEmpty());
+}
+
+}  // namespace
+}  // namespace bki_mapping
