@@ -34,7 +34,7 @@ foreach(room sequence city export)
 endforeach()
 
 bki_mapping_room(tools SOURCES
-    interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp sequence_options.cpp trajectory_updates.cpp version.cpp
+    interruption.cpp journal_output.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp scan_poses.cpp sequence_options.cpp trajectory_updates.cpp version.cpp
   LINK bki_mapping_city bki_mapping_journal bki_mapping_query bki_mapping_sequence Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_join(bki_mapping_tools)
@@ -59,9 +59,9 @@ function(bki_mapping_program folder name)
   bki_mapping_precompile(${name} REUSE bki_mapping_tools)
   set_property(GLOBAL APPEND PROPERTY BKI_MAPPING_PROGRAMS ${name})
 endfunction()
-foreach(name clear_map merge_maps migrate_map)
+foreach(name clear_map correct_map merge_maps migrate_map)
   bki_mapping_program(src/tools ${name})
 endforeach()
-foreach(name export_map inspect_map map_sequence query_city)
+foreach(name export_map forget_journal inspect_map map_sequence query_city)
   bki_mapping_program(src/tools ${name} bki_mapping_export nlohmann_json::nlohmann_json)
 endforeach()

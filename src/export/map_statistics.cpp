@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <set>
+#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -113,6 +115,19 @@ Eigen::AlignedBox3d MapStatistics::bounds(double resolution) const {
   if (low.x > high.x) return {};
   return {resolution * Eigen::Vector3d(low.x, low.y, low.z),
           resolution * Eigen::Vector3d(high.x + 1.0, high.y + 1.0, high.z + 1.0)};
+}
+
+JournalStatistics readJournalStatistics(MapFile& file) {
+  JournalStatistics found;
+  if (!file.hasJournal()) return found;
+  std::set<std::string> drives;
+  for (const ScanRecord& scan : file.scans()) {
+    drives.insert(scan.drive);
+    found.bytes += file.scanContent(scan.number).size();
+    ++found.scans;
+  }
+  found.drives = drives.size();
+  return found;
 }
 
 MapStatistics readStatistics(MapFile& file, const StateRules& rules, const BlockVisit& visit) {

@@ -29,6 +29,14 @@ struct MapStatistics {
   Eigen::AlignedBox3d bounds(double resolution) const;
 };
 
+/// The scans in the journal of a map file.
+struct JournalStatistics {
+  std::uint64_t scans = 0, drives = 0;
+  std::uint64_t bytes = 0;  ///< of the packed scans
+};
+/// Reads and checks them all. @throws MapFileError.
+JournalStatistics readJournalStatistics(MapFile& file);
+
 /// Reads the map in a file, the sum of all drives, tile by tile. @param rules as storedRules. @param visit is
 /// called for each block with the state of its voxels.
 /// @throws MapFileError.

@@ -26,8 +26,8 @@ Json driveJson(const DriveRecord& drive) {
 
 }  // namespace
 
-std::string statisticsJson(MapFile& file, const MapStatistics& found,
-                           const std::vector<DriveRecord>& drives) {
+std::string statisticsJson(MapFile& file, const MapStatistics& found, const std::vector<DriveRecord>& drives,
+                           const JournalStatistics& journal) {
   const MapInfo& info = file.info();
   const auto bytes = file.size().bytes;
   Json by_class = Json::object(), drive_list = Json::array();
@@ -51,7 +51,8 @@ std::string statisticsJson(MapFile& file, const MapStatistics& found,
               {"file_bytes", bytes},
               {"map_bytes", found.memory_bytes},
               {"file_bytes_per_known_voxel", per_voxel},
-              {"drives", drive_list}}
+              {"drives", drive_list},
+              {"journal", {{"scans", journal.scans}, {"bytes", journal.bytes}, {"drives", journal.drives}}}}
              .dump(2) +
          "\n";
 }

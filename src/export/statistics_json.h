@@ -10,6 +10,7 @@ namespace bki_mapping {
 
 /// One object, indented, as docs/map_file.md describes it. @param drives in the order of the result.
 /// @throws MapFileError.
-std::string statisticsJson(MapFile& file, const MapStatistics& found, const std::vector<DriveRecord>& drives);
+std::string statisticsJson(MapFile& file, const MapStatistics& found, const std::vector<DriveRecord>& drives,
+                           const JournalStatistics& journal);
 
 }  // namespace bki_mapping

@@ -36,6 +36,7 @@ LidarPoses readLidarPoses(const std::string& path, const std::string& calibratio
       if (!fault.empty()) throw std::runtime_error(fault);
     }
     lidar.poses.push_back(lidar.T_camera_sensor.inverse() * line.pose * lidar.T_camera_sensor);
+    if (line.seconds) lidar.seconds.push_back(*line.seconds);
   }
   return lidar;
 }

@@ -25,6 +25,7 @@ Trajectory readTrajectory(const std::string& path);
 /// Poses of the lidar.
 struct LidarPoses {
   std::vector<Eigen::Isometry3d> poses;  ///< in the frame of the file, as with map_sequence --poses
+  std::vector<double> seconds;           ///< their stamps; empty in a file without stamps
   Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();  ///< identity for poses of the lidar
 };
 

@@ -61,7 +61,15 @@ void printDrive(std::ostream& out, const DriveRecord& drive) {
   out << "\n";
 }
 
-void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
+/// The line on the journal; none if it is empty.
+void printJournal(std::ostream& out, const JournalStatistics& journal) {
+  if (journal.scans == 0) return;
+  out << "journal: " << counted(journal.scans, "scan") << " of " << counted(journal.drives, "drive")
+      << " that can be moved, " << static_cast<double>(journal.bytes) / 1e6 << " MB, "
+      << journal.bytes / journal.scans << " bytes a scan\n";
+}
+
+void print(std::ostream& out, MapFile& file, const MapStatistics& found, const JournalStatistics& journal) {
   const MapInfo& info = file.info();
   out << file.path() << ", by " << info.program << "\n"
       << "frame " << info.frame << ", resolution " << numberText(info.resolution) << " m, class table "
@@ -85,6 +93,7 @@ void print(std::ostream& out, MapFile& file, const MapStatistics& found) {
   }
   out << "\ndrives:\n";
   for (const DriveRecord& drive : drivesByTime(file)) printDrive(out, drive);
+  printJournal(out, journal);
   out << "occupied voxels by class:\n";
   for (const auto& [id, count] : found.occupied_by_class) {
     const SemanticClass* known = info.classes->find(id);
@@ -151,9 +160,10 @@ int inspect(const po::variables_map& given) {
   const StateRules rules = storedRules(path, file.info());
   const MapStatistics found = readStatistics(file, rules);
   const GridIndex last = lastDrawn(found, file.info().resolution, most);
-  print(std::cout, file, found);
+  const JournalStatistics journal = readJournalStatistics(file);
+  print(std::cout, file, found, journal);
   if (given.count("json")) {
-    writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found, drivesByTime(file)));
+    writeTextFile(given["json"].as<std::string>(), statisticsJson(file, found, drivesByTime(file), journal));
   }
   draw(file, rules, found, last, top, profile);
   return 0;

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bki_mapping/export/map_export.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
+#include "tools/journal_output.h"
 #include "tools/options.h"
 
 namespace bki_mapping::tools {
@@ -35,11 +37,14 @@ inline bool writesMapFile(const po::variables_map& given) {
 }
 
 /// Writes the map to the file of --output, if one is given. @param frame of the map. @param drives in it.
+/// @param journal for a map file.
 inline void writeMap(const po::variables_map& given, const SemanticMapper& mapper, const std::string& frame,
-                     const std::vector<DriveRecord>& drives) {
+                     const std::vector<DriveRecord>& drives, JournalOutput journal = {}) {
   if (given.count("output") == 0) return;
   const std::string output = given["output"].as<std::string>();
-  if (isMapFileName(output)) {
+  if (isMapFileName(output) && !journal.empty()) {
+    saveWithJournal(output, mapper, frame, drives, std::move(journal));
+  } else if (isMapFileName(output)) {
     saveMap(output, mapInfoOf(mapper, frame), drives, mapper.map());
   } else {
     exportMap(output, mapper.map(), mapper.rules(), mapper.classes(),

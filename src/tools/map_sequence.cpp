@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <iostream>
 #include <sstream>
+#include <utility>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/sequence/sequence.h"
@@ -12,6 +13,7 @@
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "export/cleaned_points.h"
+#include "journal/stored_journal.h"
 #include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 #include "tools/interruption.h"
@@ -47,6 +49,15 @@ po::options_description options() {
   tools::addJournal(options);
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
+}
+
+/// Scans that have moved may have left the bounds of their drive.
+void extendBounds(DriveRecord& drive, const ScanJournal& journal, const SemanticMap& map) {
+  for (ScanJournal::Number n = journal.begin(); n < journal.end(); ++n) {
+    const JournalScan& scan = journal.at(n);
+    if (scan.T_map_sensor.matrix() == scan.T_odometry_sensor.matrix()) continue;
+    drive.bounds.extend(boundsIn(map, scan.regions));
+  }
 }
 
 std::string progressText(const tools::ScanReport& scan) {
@@ -149,6 +160,7 @@ int mapSequence(const po::variables_map& given) {
   drive.id = driveId(given, sequence, first, last);
   drive.name = sequence.folder();
   std::vector<DriveRecord> drives;
+  tools::JournalOutput kept;
   if (given.count("resume")) {
     const std::string path = given["resume"].as<std::string>();
     DriveRecord planned = drive;
@@ -157,6 +169,8 @@ int mapSequence(const po::variables_map& given) {
     planned.last_stamp = sequence.stamp(last - 1);
     drives = resume(mapper, path, planned, given["allow-overlap"].as<bool>());
     if (given.count("output")) warnOfParts(path);
+    if (tools::writesMapFile(given))
+      kept.continued = tools::withJournal(path, given["output"].as<std::string>());
   }
 
   const auto journal = tools::JournalledMapping::begin(given, mapper);
@@ -187,8 +201,11 @@ int mapSequence(const po::variables_map& given) {
     throw tools::Stopped("stopped before the first scan; nothing was written");
   }
   if (stopped) drive.id = idOfPart(sequence, first, end, drives, drive.id);
+  if (journal) extendBounds(drive, journal->corrector().journal(), mapper.map());
   if (tools::writesMapFile(given) && drive.scans > 0) drives.push_back(drive);
-  tools::writeMap(given, mapper, kFrame, drives);
+  if (given.count("journal")) kept.corrector = &journal->corrector();
+  kept.drive = drive.id;
+  tools::writeMap(given, mapper, kFrame, drives, std::move(kept));
   std::size_t cleaned = mapped.size();
   if (given.count("points")) {
     const std::string path = given["points"].as<std::string>();

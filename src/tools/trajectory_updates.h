@@ -28,6 +28,7 @@ class JournalledMapping {
   ScanStats integrate(const Sequence& sequence, std::size_t i, const SequenceFrame& frame);
   /// Moves all scans that are still to be moved.
   void finish();
+  const MapCorrector& corrector() const { return corrector_; }
   /// What the corrections did, in a few lines for people.
   std::string summary() const;
 
