@@ -38,7 +38,7 @@ class WithoutLab(unittest.TestCase):
             for folder, _, files in os.walk(os.path.join(ROOT, 'src', room)):
                 for name in files:
                     self.assertTrue(not name.endswith('.cpp') or os.path.join(folder, name) in built, name)
-        for program in ('clear_map', 'export_map', 'inspect_map', 'map_sequence', 'merge_maps', 'migrate_map', 'query_city'):
+        for program in ('clear_map', 'correct_map', 'export_map', 'forget_journal', 'inspect_map', 'map_sequence', 'merge_maps', 'migrate_map', 'query_city'):
             self.assertIn(program, built)
 
 

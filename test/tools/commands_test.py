@@ -95,8 +95,8 @@ SHORTER = {
 }
 SHORT_BENCHMARKS = {'BENCHMARK_MIN_TIME': '0.001'}  # environment of Google Benchmark
 # First words of commands in a line of text; a single word is only the name of a program.
-PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'ctest', 'dynparam', 'evaluate_map',
-            'export_map', 'inspect_map', 'lab/', 'map_bag', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'query_city',
+PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'correct_map', 'ctest', 'dynparam', 'evaluate_map',
+            'export_map', 'forget_journal', 'inspect_map', 'lab/', 'map_bag', 'map_sequence', 'merge_maps', 'migrate_map', 'play_sequence', 'query_city',
             'ros', 'rviz', 'scripts/', 'sequence_to_bag', 'simulate_city', 'simulate_drive', 'source')
 # Not commands: fragments in a line of text, whose other arguments are up to the reader.
 PARTS = {

@@ -50,9 +50,9 @@ class Tools(unittest.TestCase):
 
     def test_programs_are_documented_with_all_options(self):
         rows = self.rows_of_document()
-        for program in ('clear_map', 'export_map', 'inspect_map', 'map_bag', 'map_sequence', 'merge_maps', 'query_city', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
+        for program in ('clear_map', 'correct_map', 'export_map', 'forget_journal', 'inspect_map', 'map_bag', 'map_sequence', 'merge_maps', 'query_city', 'simulate_city', 'simulate_drive', 'evaluate_map', 'benchmark_sequence'):
             options = set(re.findall(r'^ +(--[a-z-]+)', call(program, '--help').stdout, re.MULTILINE)) - {'--help', '--version'}
-            self.assertGreater(len(options), 1, program)
+            self.assertTrue(options, program)
             for option in options:
                 self.assertIn(option, rows[program], program)
 
@@ -865,11 +865,175 @@ class Tools(unittest.TestCase):
         self.fails('must end in .pcd', 'map_sequence', '--sequence', self.drive, '--points', self.path('points.ply'))
         self.fails('cannot be written', 'map_sequence', '--sequence', self.drive, '--points', '/no/such/points.pcd')
 
+    def poses_file(self, name, poses):
+        """A file of poses without rotations, each x, y, z, as matrices."""
+        with open(self.path(name), 'w') as file:
+            file.writelines(f'1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r}\n' for x, y, z in poses)
+        return self.path(name)
+
+    def stamped_file(self, name, poses):
+        """The same with stamps, each seconds, (x, y, z)."""
+        with open(self.path(name), 'w') as file:
+            file.writelines(f'{seconds!r} {x!r} {y!r} {z!r} 0 0 0 1\n' for seconds, (x, y, z) in poses)
+        return self.path(name)
+
+    def true_and_drifted(self):
+        """Positions of the scans that survive rounding to micrometres, and the same with a drift to the left; the drive is
+        straight."""
+        with open(os.path.join(self.drive, 'poses.txt')) as file:
+            rows = [list(map(float, line.split())) for line in file]
+        truth = [tuple(round(row[n] * 1024) / 1024 for n in (3, 7, 11)) for row in rows]
+        return truth, [(x, y + 0.25 * n, z) for n, (x, y, z) in enumerate(truth)]
+
+    KEPT = ('--config', 'robot', '--poses-in', 'lidar', '--journal', '0.01')
+
+    def kept(self, name, poses, *more):
+        """The map file of the drive with a journal."""
+        return self.mapped(name, '--poses', poses, *self.KEPT, *more)
+
+    def journal_of(self, path):
+        """The figures of inspect_map, and what it prints of them."""
+        printed = self.succeeds('inspect_map', path, '--json', self.path('journal.json')).stdout
+        with open(self.path('journal.json')) as file:
+            return json.load(file)['journal'], re.findall('^journal: .*$', printed, re.MULTILINE)
+
+    def rows_of_journal(self, path):
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            return database.execute('SELECT number, drive, stamp, settings, cleared, pose, tiles, content FROM scan '
+                                    'ORDER BY number').fetchall()
+
+    def test_a_corrected_map_is_that_of_the_corrected_poses(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        truth, drifted = self.poses_file('truth.txt', true_poses), self.poses_file('drifted.txt', drifted_poses)
+        wanted_file, wrong_file = self.kept('kept_true.bkm', truth), self.kept('kept_drifted.bkm', drifted)
+        wanted, wrong = self.tiles_of(wanted_file), self.tiles_of(wrong_file)
+        self.assertNotEqual(wanted, wrong)
+        corrected = self.path('corrected.bkm')
+        said = self.succeeds('correct_map', wrong_file, '--poses', truth, '--poses-in', 'lidar', '--output', corrected)
+        self.assertEqual(said.stderr, '')
+        self.assertRegex(said.stdout, r"corrected.bkm: 3 of 4 scans of drive 'drive/000000-000003' moved, the farthest by 0.75 m; "
+                                      r'\d\d+ tiles changed, in [\d.]+ s\n$')
+        self.assertTrue(self.tiles_of(corrected) == wanted, 'the map is not that of the true poses')
+        self.assertTrue(self.tiles_of(wrong_file) == wrong, 'the file has changed in spite of --output')
+        self.assertEqual(self.rows_of_journal(corrected), self.rows_of_journal(wanted_file))
+        # In place, to and fro.
+        for poses, expected, scans in ((truth, wanted, 3), (truth, wanted, 0), (drifted, wrong, 3)):
+            said = self.succeeds('correct_map', wrong_file, '--poses', poses, '--poses-in', 'lidar').stdout
+            self.assertIn(f'kept_drifted.bkm: {scans} of 4 scans', said)
+            self.assertTrue(self.tiles_of(wrong_file) == expected, poses)
+            self.succeeds('inspect_map', wrong_file)
+        # With stamps, of which two suffice because the drift is even; sequences begin at 0 s.
+        two = self.stamped_file('two.txt', [(0.0, true_poses[0]), (0.3000001, true_poses[3])])
+        self.succeeds('correct_map', wrong_file, '--poses', two, '--output', corrected)
+        self.assertTrue(self.tiles_of(corrected) == wanted, 'by stamps')
+        # Of a camera, whose axes are others.
+        camera, calib = self.poses_file('camera.txt', [(-y, -z, x) for x, y, z in true_poses]), self.path('of_camera.txt')
+        with open(calib, 'w') as file:
+            file.write('Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n')
+        self.succeeds('correct_map', wrong_file, '--poses', camera, '--calib', calib, '--output', corrected)
+        self.assertTrue(self.tiles_of(corrected) == wanted, 'of the camera')
+        said = self.succeeds('correct_map', wrong_file, '--poses', truth, '--poses-in', 'lidar', '--tolerance', '0.6').stdout
+        self.assertIn('1 of 4 scans', said)
+
+    def test_the_journal_of_a_continued_map_is_kept(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        truth, drifted = self.poses_file('truth.txt', true_poses), self.poses_file('drifted.txt', drifted_poses)
+        wanted = self.tiles_of(self.kept('kept_true.bkm', truth))
+        front = self.kept('kept_front.bkm', drifted, '--scans', '2')
+        both = self.kept('kept_both.bkm', drifted, '--first', '2', '--resume', front)
+        without = self.mapped('kept_without.bkm', '--poses', drifted, *self.KEPT[:-2], '--first', '2', '--resume', front)
+        self.assertEqual(self.rows_of_journal(without), self.rows_of_journal(front))
+        # The file itself is continued: it is the same.
+        self.kept('kept_front.bkm', drifted, '--first', '2', '--resume', front)
+        self.assertEqual(self.rows_of_journal(front), self.rows_of_journal(both))
+        self.assertEqual(self.tiles_of(front), self.tiles_of(both))
+        figures, _ = self.journal_of(both)
+        self.assertEqual((figures['scans'], figures['drives']), (4, 2))
+        self.assertEqual([row[0] for row in self.rows_of_journal(both)], [0, 1, 2, 3])
+        ends = self.poses_file('ends.txt', true_poses[2:])
+        self.fails("has scans of 2 drives; name one with --drive: 'drive/000000-000001', 'drive/000002-000003'",
+                   'correct_map', both, '--poses', ends, '--poses-in', 'lidar')
+        self.fails("has no scans of drive 'drive'; it has those of 'drive/000000-000001', 'drive/000002-000003'",
+                   'correct_map', both, '--poses', ends, '--poses-in', 'lidar', '--drive', 'drive')
+        self.assertIn('2 of 2 scans', self.succeeds('correct_map', both, '--poses', ends, '--poses-in', 'lidar', '--drive',
+                                                    'drive/000002-000003').stdout)
+        self.assertTrue(self.tiles_of(both) != wanted)
+        start = self.poses_file('start.txt', true_poses[:2])
+        self.assertIn('1 of 2 scans', self.succeeds('correct_map', both, '--poses', start, '--poses-in', 'lidar', '--drive',
+                                                    'drive/000000-000001').stdout)
+        self.assertTrue(self.tiles_of(both) == wanted, 'two drives were corrected, one after the other')
+
+    def test_what_was_cleared_stays_cleared_when_scans_move(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        a = self.kept('kept_cleared.bkm', self.poses_file('drifted.txt', drifted_poses))
+        self.succeeds('clear_map', a, '--box', '-inf -inf -inf inf inf inf')
+        self.succeeds('correct_map', a, '--poses', self.poses_file('truth.txt', true_poses), '--poses-in', 'lidar')
+        self.assertEqual(self.tiles_of(a), {})
+
+    def test_a_journal_is_shown_and_forgotten(self):
+        true_poses, _ = self.true_and_drifted()
+        truth, small, big = self.poses_file('truth.txt', true_poses), self.path('small.bkm'), self.kept('big.bkm', self.path('truth.txt'))
+        plain = self.mapped('plain.bkm', '--poses', truth, *self.KEPT[:-2])
+        figures, lines = self.journal_of(big)
+        size = sum(len(row[-1]) for row in self.rows_of_journal(big))
+        self.assertEqual(figures, {'scans': 4, 'bytes': size, 'drives': 1})
+        self.assertEqual(len(lines), 1)
+        self.assertRegex(lines[0], rf'4 scans of 1 drive that can be moved, [\d.]+ MB, {size // 4} bytes a scan')
+        self.assertEqual(self.journal_of(plain), ({'scans': 0, 'bytes': 0, 'drives': 0}, []))
+        tiles = self.tiles_of(big)
+        merged = self.succeeds('merge_maps', big, '--output', small)
+        self.assertRegex(merged.stderr, r'^warning: \S*big.bkm has scans in its journal, which the merged map does not have')
+        self.assertEqual(self.journal_of(small)[0]['scans'], 0)
+        said = f'4 scans of the journal forgotten, {size} bytes\n'
+        self.assertEqual(self.succeeds('forget_journal', big, '--output', small).stdout, f'{small}: {said}')
+        self.assertEqual(len(self.rows_of_journal(big)), 4)
+        self.assertEqual(self.succeeds('forget_journal', big).stdout, f'{big}: {said}')
+        for path in (small, big):
+            self.assertEqual(self.tiles_of(path), tiles)
+            self.assertEqual(self.journal_of(path), ({'scans': 0, 'bytes': 0, 'drives': 0}, []))
+        self.assertLess(os.path.getsize(small), os.path.getsize(big) - size // 2)
+        self.fails('has no scans in its journal', 'correct_map', big, '--poses', truth, '--poses-in', 'lidar')
+        self.fails('must end in .bkm', 'forget_journal', big, '--output', self.path('map.ply'))
+        self.fails('name one map file', 'forget_journal')
+
+    def test_corrections_that_are_refused(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        truth = self.poses_file('truth.txt', true_poses)
+        a = self.kept('kept_refused.bkm', self.poses_file('drifted.txt', drifted_poses))
+        before = self.content('kept_refused.bkm')
+        lidar = ('--poses-in', 'lidar')
+        self.fails('--poses FILE is missing', 'correct_map', a)
+        self.fails('name one map file', 'correct_map', '--poses', truth)
+        self.fails('missing.txt cannot be read', 'correct_map', a, '--poses', self.path('missing.txt'), *lidar)
+        self.fails("three.txt has 3 poses, but drive 'drive/000000-000003' has 4 scans in the journal; give a pose for each",
+                   'correct_map', a, '--poses', self.poses_file('three.txt', true_poses[:3]), *lidar)
+        self.fails('calib.txt cannot be read; poses of the camera need calib.txt', 'correct_map', a, '--poses', truth)
+        self.fails("--poses-in 'radar' is unknown", 'correct_map', a, '--poses', truth, '--poses-in', 'radar')
+        self.fails('late.txt has a stamp among those of the scans, from 0 to 0.3 s', 'correct_map', a, '--poses',
+                   self.stamped_file('late.txt', [(1.0, true_poses[0]), (1e12, true_poses[1])]))
+        self.fails('must be', 'correct_map', a, '--poses', truth, '--tolerance', '-1')
+        self.fails('must end in .bkm', 'correct_map', a, '--poses', truth, *lidar, '--output', self.path('map.ply'))
+        self.fails('cannot be opened', 'correct_map', self.path('missing.bkm'), '--poses', truth, *lidar)
+        self.fails('1 scan of drive', 'correct_map', a, *lidar, '--poses',
+                   self.poses_file('far.txt', [*true_poses[:3], (1e11, 0.0, 0.0)]))
+        plain = self.mapped('plain.bkm')
+        self.fails('plain.bkm has no scans in its journal; map them again with a journal', 'correct_map', plain, '--poses', truth, *lidar)
+        old = shutil.copy(os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'test', 'store', 'data', 'version_3.bkm'), self.folder)
+        self.fails('has no journal of scans, since it has an older version of the format', 'correct_map', old, '--poses', truth, *lidar)
+        self.assertEqual(self.content('kept_refused.bkm'), before)
+        with contextlib.closing(sqlite3.connect(a)) as database:
+            database.execute("UPDATE scan SET content = X'00' WHERE number = 2")
+            database.commit()
+        tiles = self.tiles_of(a)
+        self.fails('the checksum of scan 2 is wrong', 'correct_map', a, '--poses', truth, *lidar)
+        self.fails('the checksum of scan 2 is wrong', 'inspect_map', a)
+        self.assertEqual(self.tiles_of(a), tiles)
+
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
-        self.assertIn('version 3, from version 3', self.succeeds('migrate_map', a, copy).stdout)
+        self.assertIn('version 4, from version 4', self.succeeds('migrate_map', a, copy).stdout)
         first = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'test', 'store', 'data', 'version_1.bkm')
-        self.assertIn('version 3, from version 1', self.succeeds('migrate_map', first, self.path('second.bkm')).stdout)
+        self.assertIn('version 4, from version 1', self.succeeds('migrate_map', first, self.path('second.bkm')).stdout)
         self.assertEqual(self.tiles_of(copy), self.tiles_of(a))
         self.fails('exists already', 'migrate_map', a, copy)
         self.fails('needs two files', 'migrate_map', a)
