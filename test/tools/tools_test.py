@@ -3,7 +3,9 @@
 import array
 import contextlib
 import csv
+import itertools
 import json
+import math
 import os
 import re
 import shutil
@@ -13,6 +15,7 @@ import struct
 import subprocess
 import tempfile
 import unittest
+import zlib
 
 BIN = os.environ['BKI_MAPPING_BIN']
 
@@ -20,6 +23,55 @@ BIN = os.environ['BKI_MAPPING_BIN']
 def call(program, *arguments, **environment):
     return subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120,
                           env={**os.environ, **environment})
+
+
+def row_checksum(columns):
+    """Of a row of a map file."""
+    packed = b''
+    for value in columns:
+        if isinstance(value, int):
+            packed += struct.pack('<q', value)
+        elif isinstance(value, float):
+            packed += struct.pack('<d', value)
+        else:
+            content = value.encode() if isinstance(value, str) else value
+            packed += struct.pack('<q', len(content)) + content
+    return zlib.crc32(packed)
+
+
+def signed(number):
+    """The difference that is stored as an unsigned number."""
+    return -(number + 1) // 2 if number % 2 else number // 2
+
+
+def touched_tiles(packed):
+    """The column `tiles` of a scan, as z, y, x."""
+    numbers, shift = [0], 0
+    for byte in packed:
+        numbers[-1] |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            numbers.append(0)
+            shift = 0
+    differences = [signed(number) for number in numbers[:-1]]
+    sums = [list(itertools.accumulate(differences[axis::3])) for axis in range(3)]
+    return list(zip(*reversed(sums)))
+
+
+def unpacked(content):
+    """The hits of a packed scan in quanta, and their labels."""
+    begin, flags = struct.unpack_from('<II', content)
+    assert (begin, flags) == (0x31534b42, 0), 'only raw labels'
+    hits, shares, directions, size = struct.unpack_from('<4I', content, 48)
+    assert (shares, size) == (0, len(content) - 64)
+    planes = zlib.decompress(content[64:])
+    assert len(planes) == 16 * hits + 12 * directions
+
+    def numbers(first):
+        each = [planes[(first + n) * hits:(first + n + 1) * hits] for n in range(4)]
+        return [a | b << 8 | c << 16 | d << 24 for a, b, c, d in zip(*each)]
+    axes = [itertools.accumulate(map(signed, numbers(4 * axis))) for axis in range(3)]
+    return list(zip(*axes)), numbers(12)
 
 
 class Tools(unittest.TestCase):
@@ -995,6 +1047,65 @@ class Tools(unittest.TestCase):
         self.fails('has no scans in its journal', 'correct_map', big, '--poses', truth, '--poses-in', 'lidar')
         self.fails('must end in .bkm', 'forget_journal', big, '--output', self.path('map.ply'))
         self.fails('name one map file', 'forget_journal')
+
+    def test_the_journal_reads_as_documented(self):
+        """By docs/map_file.md alone."""
+        true_poses, _ = self.true_and_drifted()
+        a = self.kept('documented.bkm', self.poses_file('truth.txt', true_poses))
+        with contextlib.closing(sqlite3.connect(a)) as database:
+            rows = database.execute('SELECT * FROM scan ORDER BY number').fetchall()
+            tiles = set(database.execute('SELECT z, y, x FROM tile'))
+            self.assertEqual(database.execute('SELECT scans, settings, cleared FROM total').fetchone(), (4, 1, 0))
+            (parameters,), = database.execute('SELECT parameters FROM settings')
+            self.assertEqual((parameters,), database.execute('SELECT parameters FROM map').fetchone())
+        self.assertEqual(len(rows), 4)
+        for n, row in enumerate(rows):
+            *columns, checksum, content = row
+            number, drive, stamp, sensor, settings, cleared, jump, reach, pose, odometry, touched, size, content_checksum = columns
+            self.assertEqual((number, drive, stamp, sensor, settings, cleared, jump),
+                             (n, 'drive/000000-000003', 1000000000 + 100000000 * n, '', 0, 0, 0))
+            self.assertEqual((size, content_checksum), (len(content), zlib.crc32(content)))
+            self.assertEqual(checksum, row_checksum(columns))
+            x, y, z = true_poses[n]
+            self.assertEqual(struct.unpack('<12d', pose), (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z))
+            self.assertEqual(odometry, pose)
+            touched = touched_tiles(touched)
+            self.assertEqual(touched, sorted(set(touched)))
+            self.assertGreater(len(tiles & set(touched)), 10)
+            hits, labels = unpacked(content)
+            points = array.array('f')
+            with open(os.path.join(self.drive, 'velodyne', f'{n:06}.bin'), 'rb') as file:
+                points.frombytes(file.read())
+            self.assertEqual(len(hits), len(points) // 4)
+            for axis in range(3):
+                self.assertLess(max(abs(0.01 * hit[axis] - point) for hit, point in zip(hits, points[axis::4])), 0.00501)
+            self.assertAlmostEqual(reach, 0.01 * max(math.dist(hit, (0, 0, 0)) for hit in hits), places=9)
+            with open(os.path.join(self.drive, 'labels', f'{n:06}.label'), 'rb') as file:
+                self.assertEqual(labels, [label for label, in struct.iter_unpack('<I', file.read())])
+        self.assertLessEqual(tiles, {tile for row in rows for tile in touched_tiles(row[10])})
+
+    def test_stamps_of_scans_of_a_node_are_those_of_the_poses(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        wanted = self.tiles_of(self.kept('kept_true.bkm', self.poses_file('truth.txt', true_poses)))
+        a = self.kept('of_node.bkm', self.poses_file('drifted.txt', drifted_poses))
+
+        def set_sensors(*names):
+            with contextlib.closing(sqlite3.connect(a)) as database:
+                for number, name in enumerate(names):
+                    *columns, checksum, _ = database.execute('SELECT * FROM scan WHERE number = ?', (number,)).fetchone()
+                    columns[3] = name
+                    database.execute('UPDATE scan SET sensor = ?, checksum = ? WHERE number = ?', (name, row_checksum(columns), number))
+                    database.execute('UPDATE total SET checksums = checksums + ?', (row_checksum(columns) - checksum,))
+                *totals, _ = database.execute('SELECT * FROM total').fetchone()
+                database.execute('UPDATE total SET checksum = ?', (row_checksum(totals),))
+                database.commit()
+        two = self.stamped_file('two.txt', [(1.0, true_poses[0]), (1.3, true_poses[3])])
+        set_sensors('front', 'rear', 'rear', 'rear')
+        self.fails("the drive has scans of several sensors, 'front' and 'rear', and poses with stamps are of one; give a matrix for each scan",
+                   'correct_map', a, '--poses', two)
+        set_sensors('front', 'front', 'front', 'front')
+        self.succeeds('correct_map', a, '--poses', two)
+        self.assertTrue(self.tiles_of(a) == wanted)
 
     def test_corrections_that_are_refused(self):
         true_poses, drifted_poses = self.true_and_drifted()
