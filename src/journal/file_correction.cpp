@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "core/counted.h"
+#include "journal/stored_settings.h"
 
 namespace bki_mapping {
 namespace {
@@ -25,7 +26,7 @@ MapCorrector::Settings withTolerance(double tolerance) {
 
 FileCorrection::FileCorrection(MapFile& file, double tolerance)
     : stored_(readMap(file)),
-      corrector_(settingsOfLooks(journalSettings(file)), file.info().classes, withTolerance(tolerance),
+      corrector_(settingsOfLooks(journalSettings(file)), journalClasses(file), withTolerance(tolerance),
                  {[this](const SemanticMap& difference) { return add(difference); },
                   [this](const GridIndex& region, const LooksByBlock& looks) {
                     changed_.insert(region);

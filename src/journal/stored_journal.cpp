@@ -2,32 +2,13 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
-#include <stdexcept>
 #include <utility>
 
-#include "bki_mapping/settings/yaml.h"
+#include "journal/stored_settings.h"
 #include "store/box_tiles.h"
 
 namespace bki_mapping {
 namespace {
-
-std::shared_ptr<const MapperConfig> settingsFrom(const std::string& yaml, const std::string& file) {
-  auto config = std::make_shared<MapperConfig>();
-  try {
-    const std::map<std::string, std::string> values = parseParameters(yaml);
-    std::map<std::string, std::string> known;
-    for (const Parameter& parameter : mapperParameters()) {
-      const auto found = values.find(parameter.name);
-      if (found != values.end()) known.insert(*found);
-    }
-    setParameters(*config, known);
-    checkParameters(*config);
-  } catch (const std::invalid_argument& error) {
-    throw MapFileError("the settings in the journal of " + file + " cannot be used: " + error.what());
-  }
-  return config;
-}
 
 /// The tiles of a file that a box of whole blocks reaches into.
 std::vector<GridIndex> tilesReached(MapFile& file, const Eigen::AlignedBox3d& box) {
@@ -95,12 +76,6 @@ ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored) {
   record.T_odometry_sensor = scan.T_odometry_sensor;
   record.tiles = scan.regions;
   return record;
-}
-
-std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file) {
-  std::vector<std::shared_ptr<const MapperConfig>> settings;
-  for (const std::string& yaml : file.settings()) settings.push_back(settingsFrom(yaml, file.path()));
-  return settings;
 }
 
 RestoredJournal restoreJournal(MapFile& file, MapCorrector& corrector, const std::string& drive) {

@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -24,10 +23,6 @@ struct StoredAs {
 
 /// The row of a scan where it is in the map now.
 ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored);
-
-/// The settings of a file's journal, by their numbers. Parameters that this version does not know are
-/// ignored. @throws MapFileError if they are not YAML, or not allowed.
-std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file);
 
 /// What a corrector does not know of the scans that restoreJournal() gives it.
 struct RestoredJournal {

@@ -7,9 +7,11 @@
 #include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/export/map_export.h"
+#include "core/counted.h"
 #include "export/export_file.h"
 #include "sequence/trajectory_file.h"
 #include "tools/options.h"
+#include "tools/scan_points.h"
 
 namespace {
 
@@ -30,6 +32,9 @@ po::options_description options() {
       "voxels in a .ply, .pcd or .html file: occupied,free,occluded; default: occupied, in a .html file all")(
       "box", tools::textOption("\"X0 Y0 Z0 X1 Y1 Z1\""),
       "export only what lies in a box: two opposite corners, in the map frame [m]; inf and -inf are allowed")(
+      "points", tools::textOption("FILE"),
+      "write the points of the scans in the journal of a map file, where they are in the map, to a .ply or "
+      ".pcd file, instead of the map")(
       "trajectory", po::value<std::vector<std::string>>()->value_name("PATH")->composing(),
       "draw where the sensor was in a .html file: the folder of a sequence, or a file with lines "
       "`stamp x y z qx qy qz qw`, in the map frame; repeatable")(
@@ -87,6 +92,22 @@ Eigen::AlignedBox3d boxOf(const po::variables_map& given) {
   return {Eigen::Vector3d::Constant(-kInfinity), Eigen::Vector3d::Constant(kInfinity)};
 }
 
+/// Writes the points of scans in place of the map.
+int exportPoints(const po::variables_map& given) {
+  const std::string path = tools::onlyMapFile(given), points = given["points"].as<std::string>();
+  for (const auto& [name, value] : given) {
+    if (value.defaulted() || name == "files" || name == "points" || name == "box") continue;
+    throw std::invalid_argument("--" + name + " cannot be given with --points, which exports no map");
+  }
+  MapFile file(path, MapFile::Access::kRead);
+  const tools::ScanPointCount count = tools::writeScanPoints(
+      points, file, boxOf(given),
+      [](std::size_t done, std::size_t all) { tools::showProgress(done, all, "scans"); });
+  std::cout << points << ": " << counted(count.points, "point") << " of " << counted(count.scans, "scan")
+            << ", in frame " << file.info().frame << "\n";
+  return 0;
+}
+
 /// Where the origin of a file's coordinates is, as a clause; "" if it is that of the map frame.
 std::string originText(const std::string& output, const SemanticMap& map) {
   if (std::filesystem::path(output).extension() != ".pcd") return "";
@@ -97,6 +118,7 @@ std::string originText(const std::string& output, const SemanticMap& map) {
 }
 
 int exportMapFile(const po::variables_map& given) {
+  if (given.count("points")) return exportPoints(given);
   const std::string path = tools::onlyMapFile(given), output = outputOf(given);
   const Eigen::AlignedBox3d box = boxOf(given);
   ExportOptions options = exportOptions(given);

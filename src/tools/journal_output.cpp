@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "journal/stored_journal.h"
+#include "journal/stored_settings.h"
 
 namespace bki_mapping::tools {
 namespace {
@@ -16,13 +16,13 @@ bool areSame(const std::string& path, const std::string& other) {
 }
 
 /// Adds the scans of a drive behind those that the journal of the continued map has.
-void addDrive(const MapCorrector& corrector, const std::string& drive, const MapperConfig& config,
+void addDrive(const MapCorrector& corrector, const std::string& drive, const std::string& settings,
               std::optional<MapFile>& continued, MapFile::Change& change) {
   const ScanJournal& journal = corrector.journal();
   if (journal.size() == 0) return;
   StoredAs stored;
   stored.drive = drive;
-  stored.settings = change.addSettings(parameterYaml(config));
+  stored.settings = change.addSettings(settings);
   if (continued) {
     stored.number = continued->scans().back().number + 1;
     stored.first_cleared = static_cast<int>(continued->clearedBoxes().size());
@@ -51,7 +51,8 @@ void saveWithJournal(const std::string& path, const SemanticMapper& mapper, cons
   for (const GridIndex& tile : tilesOf(mapper.map())) file.content().writeTile(mapper.map(), {tile});
   if (journal.continued) copyJournal(*journal.continued, file.content());
   if (journal.corrector) {
-    addDrive(*journal.corrector, journal.drive, mapper.config(), journal.continued, file.content());
+    addDrive(*journal.corrector, journal.drive, settingsText(mapper.config(), mapper.classes()),
+             journal.continued, file.content());
   }
   file.commit();
 }

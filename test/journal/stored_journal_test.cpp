@@ -5,11 +5,13 @@
 
 #include <random>
 
-#include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/mapper_file.h"
+#include "journal/file_correction.h"
 #include "journal/scan_codec.h"
+#include "journal/stored_settings.h"
 #include "reference/content.h"
 #include "reference/scenes.h"
+#include "store/map_maker.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -87,13 +89,12 @@ class Drives {
 
   /// The map of the scans, and their rows.
   SemanticMap map(std::vector<ScanRecord>* rows = nullptr, std::vector<DriveRecord>* drives = nullptr) const {
-    SemanticMap sum = SemanticMapper(settings_[0], reference::tableWithDynamicClass()).takeMap();
+    SemanticMap sum = SemanticMapper(settings_[0], table_).takeMap();
     std::size_t cleared = 0;
     for (std::size_t n = 0; n < entries_.size(); ++n) {
       const Entry& entry = entries_[n];
       for (; cleared < static_cast<std::size_t>(entry.cleared); ++cleared) clearBox(sum, boxes_[cleared]);
-      SemanticMapper mapper(settings_[static_cast<std::size_t>(entry.settings)],
-                            reference::tableWithDynamicClass());
+      SemanticMapper mapper(settings_[static_cast<std::size_t>(entry.settings)], table_);
       mapper.addMap(std::move(sum));
       mapper.integrate(place(entry.scan, entry.pose));
       if (rows) rows->push_back(rowOfEntry(n, mapper.touchedBlocks()));
@@ -108,10 +109,11 @@ class Drives {
     std::vector<ScanRecord> rows;
     std::vector<DriveRecord> drives;
     const SemanticMap sum = map(&rows, &drives);
-    NewMapFile file(path, mapInfoOf(SemanticMapper(settings_[0], reference::tableWithDynamicClass()), "map"));
+    NewMapFile file(path, mapInfoOf(SemanticMapper(settings_[0], table_), "map"));
     for (const DriveRecord& drive : drives) file.content().putDrive(drive);
     for (const GridIndex& tile : tilesOf(sum)) file.content().writeTile(sum, {tile});
-    for (const MapperConfig& config : settings_) file.content().addSettings(parameterYaml(config));
+    for (const MapperConfig& config : settings_)
+      file.content().addSettings(settingsText(config, table_of_settings_ ? *table_of_settings_ : *table_));
     for (const Eigen::AlignedBox3d& box : boxes_) file.content().addClearedBox(box);
     for (std::size_t n = 0; n < rows.size(); ++n) {
       file.content().addScan(rows[n], packScan(entries_[n].scan));
@@ -119,6 +121,8 @@ class Drives {
     file.commit();
   }
 
+  std::shared_ptr<const ClassTable> table_ = reference::tableWithDynamicClass();
+  std::shared_ptr<const ClassTable> table_of_settings_ = nullptr;  ///< nullptr: the same
   std::vector<MapperConfig> settings_;
   std::vector<Entry> entries_;
   std::vector<Eigen::AlignedBox3d> boxes_;
@@ -398,6 +402,61 @@ TEST(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
   } catch (const MapFileError& error) {
     EXPECT_NE(std::string(error.what()).find("the settings in the journal of " + path), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("resolution"), std::string::npos) << error.what();
+  }
+}
+
+/// The class table of the file, with a class changed.
+std::shared_ptr<const ClassTable> changedTable(const std::function<void(SemanticClass&)>& change) {
+  std::vector<SemanticClass> classes = reference::tableWithDynamicClass()->classes();
+  change(classes[2]);
+  return std::make_shared<ClassTable>("dynamic", classes);
+}
+
+TEST(StoredJournal, KnowsFlagsOfClassesThatFilesDoNotStore) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.bkm";
+  std::mt19937 random(40);
+  Drives drives(manySettings(true));
+  drives.table_ = changedTable([](SemanticClass& c) { c.airborne = true; });
+  for (int n = 0; n < 4; ++n) drives.add("only", 0, random);
+  drives.save(path);
+  const Content before = reference::contentOf(drives.map());
+  MapFile file(path, MapFile::Access::kUpdate);
+  EXPECT_FALSE(file.info().classes->find(2)->airborne);
+  EXPECT_TRUE(journalClasses(file)->find(2)->airborne);
+  FileCorrection correction(file, 0.0);
+  EXPECT_EQ(correction.move("only", moveSome(drives, "", random)), "");
+  MapFile::Change change = file.change();
+  correction.write(change, "only", false);
+  change.commit();
+  const Content after = reference::contentOf(readMap(file).map);
+  EXPECT_FALSE(after == before);
+  EXPECT_TRUE(after == reference::contentOf(drives.map()));
+}
+
+TEST(StoredJournal, RefusesScansOfAnotherClassTable) {
+  const TemporaryFolder folder;
+  std::mt19937 random(41);
+  const std::vector<std::pair<std::function<void(SemanticClass&)>, bool>> changes = {
+      {[](SemanticClass& c) { c.color = {1, 2, 3}; }, true},
+      {[](SemanticClass& c) { c.cost = 7; }, true},
+      {[](SemanticClass& c) { c.raw.push_back(77); }, false},
+      {[](SemanticClass& c) { c.dynamic = true; }, false},
+      {[](SemanticClass& c) { c.free_gain = 2.0; }, false},
+  };
+  for (const auto& [change, allowed] : changes) {
+    const std::string path = folder / "map.bkm";
+    Drives drives(manySettings(true));
+    drives.add("only", 0, random);
+    drives.table_of_settings_ = changedTable(change);
+    drives.save(path);
+    MapFile file(path, MapFile::Access::kRead);
+    const std::string refusal = sentenceOf([&] { journalClasses(file); });
+    EXPECT_EQ(refusal.empty(), allowed) << refusal;
+    if (!allowed) {
+      EXPECT_NE(refusal.find("were mapped with a class table that has other labels or flags"),
+                std::string::npos);
+    }
   }
 }
 

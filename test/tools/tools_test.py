@@ -1057,7 +1057,9 @@ class Tools(unittest.TestCase):
             tiles = set(database.execute('SELECT z, y, x FROM tile'))
             self.assertEqual(database.execute('SELECT scans, settings, cleared FROM total').fetchone(), (4, 1, 0))
             (parameters,), = database.execute('SELECT parameters FROM settings')
-            self.assertEqual((parameters,), database.execute('SELECT parameters FROM map').fetchone())
+            of_map, = database.execute('SELECT parameters FROM map').fetchone()
+            self.assertTrue(parameters.startswith(of_map))
+            self.assertRegex(parameters[len(of_map):], r'^\nclass_table:\n  airborne: ""\n  digest: \d+\n$')
         self.assertEqual(len(rows), 4)
         for n, row in enumerate(rows):
             *columns, checksum, content = row
@@ -1083,6 +1085,50 @@ class Tools(unittest.TestCase):
             with open(os.path.join(self.drive, 'labels', f'{n:06}.label'), 'rb') as file:
                 self.assertEqual(labels, [label for label, in struct.iter_unpack('<I', file.read())])
         self.assertLessEqual(tiles, {tile for row in rows for tile in touched_tiles(row[10])})
+
+    def test_points_of_the_journal_are_exported(self):
+        true_poses, drifted_poses = self.true_and_drifted()
+        a = self.kept('pointed.bkm', self.poses_file('drifted.txt', drifted_poses))
+        self.succeeds('correct_map', a, '--poses', self.poses_file('truth.txt', true_poses), '--poses-in', 'lidar')
+        expected, raw = [], []
+        for n, place in enumerate(true_poses):
+            hits, labels = unpacked(self.rows_of_journal(a)[n][-1])
+            expected += [tuple(0.01 * hit[axis] + place[axis] for axis in range(3)) for hit in hits]
+            raw += labels
+        ply, pcd = self.path('points.ply'), self.path('points.pcd')
+        said = self.succeeds('export_map', a, '--points', ply).stdout
+        self.assertEqual(said, f'{ply}: {len(expected)} points of 4 scans, in frame map\n')
+        self.succeeds('export_map', a, '--points', pcd)
+        header, _, data = self.content('points.ply').partition(b'end_header\n')
+        self.assertIn(f'element vertex {len(expected):010}\nproperty float x\n'.encode(), header)
+        of_ply = list(struct.iter_unpack('<fff3sIB', data))
+        header, _, data = self.content('points.pcd').partition(b'DATA binary\n')
+        self.assertIn(f'POINTS {len(expected):010}\n'.encode(), header)
+        of_pcd = list(struct.iter_unpack('<fffIIB', data))
+        self.assertEqual(len(of_ply), len(expected))
+        self.assertEqual([point[4] for point in of_ply], raw)
+        for place, (*point, color, label, number), of_other in zip(expected, of_ply, of_pcd):
+            self.assertLess(math.dist(place, point), 1e-4)
+            self.assertEqual(of_other, (*point, int.from_bytes(color, 'big'), label, number))
+        building = {(color, number) for *_, color, label, number in of_ply if label == 50}
+        self.assertEqual(building, {(bytes((255, 200, 0)), 13)})
+        self.succeeds('export_map', a, '--points', ply, '--box', '0 0 -inf inf inf inf')
+        _, _, data = self.content('points.ply').partition(b'end_header\n')
+        self.assertEqual(list(struct.iter_unpack('<fff3sIB', data)), [point for point in of_ply if min(point[:2]) >= 0])
+        far = self.kept('far.bkm', self.poses_file('far.txt', [(x + 512000, y - 4096000, z) for x, y, z in true_poses]))
+        self.succeeds('export_map', far, '--points', ply)
+        header, _, data = self.content('points.ply').partition(b'end_header\n')
+        self.assertIn(b'property double x\n', header)
+        for place, (x, y, z, *_) in zip(expected, struct.iter_unpack('<ddd3sIB', data)):
+            self.assertLess(math.dist(place, (x - 512000, y + 4096000, z)), 1e-4)
+        self.succeeds('export_map', far, '--points', pcd)
+        header, _, data = self.content('points.pcd').partition(b'DATA binary\n')
+        self.assertIn(b'VIEWPOINT 512000 -4096000 0 1 0 0 0\n', header)
+        for place, (x, y, z, *_) in zip(expected, struct.iter_unpack('<fffIIB', data)):
+            self.assertLess(math.dist(place, (x, y, z)), 1e-4)
+        self.fails('has no scans in its journal, and so no points', 'export_map', self.mapped('plain.bkm'), '--points', ply)
+        self.fails('must end in .ply or .pcd', 'export_map', a, '--points', self.path('points.las'))
+        self.fails('--output cannot be given with --points', 'export_map', a, '--points', ply, '--output', pcd)
 
     def test_stamps_of_scans_of_a_node_are_those_of_the_poses(self):
         true_poses, drifted_poses = self.true_and_drifted()
