@@ -101,7 +101,7 @@ PROGRAMS = ('benchmark_', 'build/', 'catkin', 'clear_map', 'cmake', 'correct_map
 # Not commands: fragments in a line of text, whose other arguments are up to the reader.
 PARTS = {
     'benchmark_sequence --curves', 'dynparam set', 'evaluate_map --errors', 'evaluate_map --label-noise FRACTION',
-    'map_sequence --config NAME|FILE', 'map_sequence --output', 'map_sequence --points FILE.pcd',
+    'export_map --points FILE', 'map_sequence --config NAME|FILE', 'map_sequence --journal METRES', 'map_sequence --output', 'map_sequence --points FILE.pcd',
     'map_sequence --report', 'map_sequence --report FILE.json', 'merge_maps --keep-drives',
     'map_sequence --poses FILE', 'migrate_map OLD.bkm NEW.bkm', 'rosnode kill', 'rosrun bki_mapping map_city',
     'rosrun bki_mapping map_sequence',
