@@ -85,6 +85,10 @@ std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file) 
   std::vector<std::shared_ptr<const MapperConfig>> settings;
   for (const std::string& yaml : file.settings()) {
     settings.push_back(configOf(valuesOf(yaml, file.path()), file.path()));
+    if (settings.back()->resolution == file.info().resolution) continue;
+    throw MapFileError("the settings in the journal of " + file.path() + " cannot be used: resolution is " +
+                       numberText(settings.back()->resolution) + ", and that of the map " +
+                       numberText(file.info().resolution));
   }
   return settings;
 }

@@ -391,17 +391,19 @@ TEST(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
   const TemporaryFolder folder;
   const std::string path = folder / "map.bkm";
   std::mt19937 random(38);
-  twoDrives(true, random).save(path);
-  MapFile file(path, MapFile::Access::kUpdate);
-  MapFile::Change change = file.change();
-  change.addSettings("a_setting_of_the_future: 1\nresolution: -1\n");
-  change.commit();
-  try {
-    journalSettings(file);
-    FAIL();
-  } catch (const MapFileError& error) {
-    EXPECT_NE(std::string(error.what()).find("the settings in the journal of " + path), std::string::npos);
-    EXPECT_NE(std::string(error.what()).find("resolution"), std::string::npos) << error.what();
+  for (const auto& [settings, words] : std::vector<std::pair<std::string, std::string>>{
+           {"a_setting_of_the_future: 1\nresolution: -1\n", "resolution is"},
+           {"resolution: 0.5\n", "resolution is 0.5, and that of the map 0.3"},
+           {"free_space: {mode: lines}\n", "did you mean 'line'?"},
+           {"[", "a key must be plain text"}}) {
+    twoDrives(true, random).save(path);
+    MapFile file(path, MapFile::Access::kUpdate);
+    MapFile::Change change = file.change();
+    change.addSettings(settings);
+    change.commit();
+    const std::string refusal = sentenceOf([&] { FileCorrection(file, 0.0); });
+    EXPECT_EQ(refusal.rfind("the settings in the journal of " + path, 0), 0u) << refusal;
+    EXPECT_NE(refusal.find(words), std::string::npos) << refusal;
   }
 }
 
@@ -439,7 +441,7 @@ TEST(StoredJournal, RefusesScansOfAnotherClassTable) {
   std::mt19937 random(41);
   const std::vector<std::pair<std::function<void(SemanticClass&)>, bool>> changes = {
       {[](SemanticClass& c) { c.color = {1, 2, 3}; }, true},
-      {[](SemanticClass& c) { c.cost = 7; }, true},
+      {[](SemanticClass& c) { c.ignored = true; }, true},
       {[](SemanticClass& c) { c.raw.push_back(77); }, false},
       {[](SemanticClass& c) { c.dynamic = true; }, false},
       {[](SemanticClass& c) { c.free_gain = 2.0; }, false},
