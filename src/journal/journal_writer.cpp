@@ -3,9 +3,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "bki_mapping/settings/yaml.h"
 #include "journal/scan_codec.h"
 #include "journal/stored_journal.h"
+#include "journal/stored_settings.h"
 
 namespace bki_mapping {
 namespace {
@@ -28,11 +28,13 @@ std::function<std::string()> contentOf(const JournalScan& scan) {
 
 }  // namespace
 
-JournalWriter::JournalWriter(const JournalSize& size, std::string drive)
+JournalWriter::JournalWriter(const JournalSize& size, std::string drive,
+                             std::shared_ptr<const ClassTable> classes)
     : first_number_(size.next_number),
       first_cleared_(size.cleared),
       next_settings_(size.settings),
-      drive_(std::move(drive)) {}
+      drive_(std::move(drive)),
+      classes_(std::move(classes)) {}
 
 void JournalWriter::reset(std::string drive) {
   drive_ = std::move(drive);
@@ -47,7 +49,7 @@ int JournalWriter::numberOf(const std::shared_ptr<const MapperConfig>& settings,
   for (const auto& [known, number] : settings_) {
     if (known == settings) return number;
   }
-  change.settings.push_back(parameterYaml(*settings));
+  change.settings.push_back(settingsText(*settings, *classes_));
   settings_.emplace_back(settings, next_settings_);
   return next_settings_++;
 }

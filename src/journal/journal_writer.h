@@ -16,8 +16,9 @@ namespace bki_mapping {
 /// Numbers the scans and settings of a drive as rows of a map file. Not thread-safe.
 class JournalWriter {
  public:
-  /// @param size of the journal in the file, before the drive. @param drive DriveRecord::id.
-  JournalWriter(const JournalSize& size, std::string drive);
+  /// @param size of the journal in the file, before the drive. @param drive DriveRecord::id. @param classes
+  /// of the mapper.
+  JournalWriter(const JournalSize& size, std::string drive, std::shared_ptr<const ClassTable> classes);
 
   /// The file was emptied; a drive begins.
   void reset(std::string drive);
@@ -36,6 +37,7 @@ class JournalWriter {
   const std::uint64_t first_number_;
   int first_cleared_, next_settings_;
   std::string drive_;
+  std::shared_ptr<const ClassTable> classes_;
   std::vector<std::pair<std::shared_ptr<const MapperConfig>, int>> settings_;
   std::set<ScanJournal::Number> written_;      ///< scans that the file has
   std::set<std::uint64_t> jumps_;              ///< stamps of jumps that scans tell of [ns]

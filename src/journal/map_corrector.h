@@ -106,7 +106,6 @@ class MapCorrector {
   Changes takeChanges() { return std::exchange(changes_, {}); }
   /// Number of scans that were added since takeChanges().
   std::size_t unsavedScans() const { return changes_.added.size(); }
-  const ScanJournal& journal() const { return journal_; }
   /// Notes that a scan is on its way to a map file, from which it can be fetched.
   void noteStored(ScanJournal::Number number) { journal_.setStored(number); }
 

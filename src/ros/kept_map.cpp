@@ -99,7 +99,7 @@ void KeptMap::beginJournal(const ServerConfig& config) {
                                               CorrectedMap{add, replaceLooks, ready, fetch});
   if (!keeper_) return;
   corrector_->noteForeign(keeper_->storedTiles());
-  writer_ = std::make_unique<JournalWriter>(keeper_->journalSize(), drive_.id);
+  writer_ = std::make_unique<JournalWriter>(keeper_->journalSize(), drive_.id, mapper_.sharedClasses());
   keeper_->keepJournal([this] { return writer_->take(*corrector_, sensor_frames_); });
 }
 

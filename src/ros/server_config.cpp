@@ -159,7 +159,7 @@ std::vector<NamedParameter<ServerConfig>> serverParameters() {
       realParameter("save_period", &C::save_period, NumberRange::atLeast(0.0).slider(0.0, 3600.0), "s",
                     Changes::kWhileMapping,
                     "Time between two saves of map_file. Lower it to lose less when the power fails; 0 saves "
-                    "only at the end."),
+                    "only at the end, and with a journal when much waits for it."),
       realParameter("diagnostic_period", &C::diagnostic_period, NumberRange::above(0.0), "s",
                     Changes::kAtStart, "Time between two reports on /diagnostics."),
       realParameter(

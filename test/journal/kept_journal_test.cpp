@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <random>
 
-#include "bki_mapping/settings/yaml.h"
 #include "journal/journal_writer.h"
 #include "journal/scan_codec.h"
+#include "journal/stored_settings.h"
 #include "store/kept_mapper.h"
 
 namespace bki_mapping {
@@ -38,7 +38,7 @@ class Journalled {
   Journalled(const std::string& path, const std::string& drive, const MapperConfig& config)
       : mapper_(config, reference::smallTable()),
         keeper_(mapper_, path, infoOfMapper(mapper_), newDrive(drive), true),
-        writer_(keeper_.journalSize(), drive),
+        writer_(keeper_.journalSize(), drive, reference::smallTable()),
         corrector_(config, reference::smallTable(), settings(),
                    {[this](SemanticMap difference) {
                       keeper_.change(std::move(difference));
@@ -122,10 +122,9 @@ class Journalled {
 SemanticMap mapOfJournal(MapFile& file) {
   SemanticMap sum = file.info().emptyMap();
   const std::vector<Eigen::AlignedBox3d> boxes = file.clearedBoxes();
+  const auto settings = journalSettings(file);
   for (const ScanRecord& scan : file.scans()) {
-    MapperConfig settings;
-    setParameters(settings, parseParameters(file.settings().at(static_cast<std::size_t>(scan.settings))));
-    SemanticMapper mapper(settings, reference::smallTable());
+    SemanticMapper mapper(*settings.at(static_cast<std::size_t>(scan.settings)), reference::smallTable());
     mapper.integrate(place(unpackScan(file.scanContent(scan.number)), scan.T_map_sensor));
     const std::vector<GridIndex> tiles = tilesOf(mapper.map());
     EXPECT_TRUE(std::includes(scan.tiles.begin(), scan.tiles.end(), tiles.begin(), tiles.end()));
@@ -244,7 +243,7 @@ TEST(JournalWriter, TellsOfJumpsThatAreNoticedLate) {
   MapCorrector corrector(config(), reference::smallTable(), {},
                          {[](SemanticMap) { return std::vector<GridIndex>(); },
                           [](const GridIndex&, const LooksByBlock&) { return std::vector<GridIndex>(); }});
-  JournalWriter writer({10, 0, 0}, "drive");
+  JournalWriter writer({10, 0, 0}, "drive", reference::smallTable());
   const auto add = [&](std::uint64_t stamp) {
     Scan scan = scanAt(0.0, 0.0, stamp);
     scan.origin.setZero();

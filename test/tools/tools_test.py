@@ -952,7 +952,7 @@ class Tools(unittest.TestCase):
     def rows_of_journal(self, path):
         with contextlib.closing(sqlite3.connect(path)) as database:
             return database.execute('SELECT number, drive, stamp, settings, cleared, pose, tiles, content FROM scan '
-                                    'ORDER BY number').fetchall()
+                                    'JOIN scan_content USING (number) ORDER BY number').fetchall()
 
     def test_a_corrected_map_is_that_of_the_corrected_poses(self):
         true_poses, drifted_poses = self.true_and_drifted()
@@ -1053,7 +1053,7 @@ class Tools(unittest.TestCase):
         true_poses, _ = self.true_and_drifted()
         a = self.kept('documented.bkm', self.poses_file('truth.txt', true_poses))
         with contextlib.closing(sqlite3.connect(a)) as database:
-            rows = database.execute('SELECT * FROM scan ORDER BY number').fetchall()
+            rows = database.execute('SELECT scan.*, content FROM scan JOIN scan_content USING (number) ORDER BY number').fetchall()
             tiles = set(database.execute('SELECT z, y, x FROM tile'))
             self.assertEqual(database.execute('SELECT scans, settings, cleared FROM total').fetchone(), (4, 1, 0))
             (parameters,), = database.execute('SELECT parameters FROM settings')
@@ -1138,7 +1138,7 @@ class Tools(unittest.TestCase):
         def set_sensors(*names):
             with contextlib.closing(sqlite3.connect(a)) as database:
                 for number, name in enumerate(names):
-                    *columns, checksum, _ = database.execute('SELECT * FROM scan WHERE number = ?', (number,)).fetchone()
+                    *columns, checksum = database.execute('SELECT * FROM scan WHERE number = ?', (number,)).fetchone()
                     columns[3] = name
                     database.execute('UPDATE scan SET sensor = ?, checksum = ? WHERE number = ?', (name, row_checksum(columns), number))
                     database.execute('UPDATE total SET checksums = checksums + ?', (row_checksum(columns) - checksum,))
