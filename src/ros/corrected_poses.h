@@ -39,6 +39,8 @@ class CorrectedPoses {
 
   /// The frames of the sensors, by their numbers in the corrector.
   const std::vector<std::string>& sensorFrames() const { return sensor_frames_; }
+  /// The scans were forgotten, and with them their sensors.
+  void reset() { sensor_frames_.clear(); }
   /// Notes that tf has jumped between the map and a sensor. @param stamp of the first transform after it.
   void noteJump(const ros::Time& stamp);
   /// Uses the last message, if it is time. @return whether there is news for the status: the last scan has

@@ -53,6 +53,7 @@ void MappingServer::reset() {
     return;
   }
   kept_->reset();
+  if (corrected_) corrected_->reset();
   trajectory_.clear();
   wholeMapChanged();
   status_publisher_.publish(status());
