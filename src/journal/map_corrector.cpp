@@ -130,6 +130,15 @@ void MapCorrector::reset() {
   progress_.fault.clear();
 }
 
+void MapCorrector::forget() {
+  std::set<GridIndex> regions = journal_.foreign();
+  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    regions.insert(journal_.at(n).regions.begin(), journal_.at(n).regions.end());
+  }
+  reset();
+  journal_.noteForeign({regions.begin(), regions.end()});
+}
+
 bool MapCorrector::correct(const std::vector<StampedMotion>& keyframes,
                            const std::vector<Eigen::Isometry3d>& T_sensor_keyframe) {
   if (!journal_.setPath(keyframes, T_sensor_keyframe)) return false;

@@ -74,8 +74,10 @@ class MapCorrector {
   void noteForeign(const std::vector<GridIndex>& regions);
   /// Notes that the recorded poses jump (ScanJournal::noteJump).
   void noteJump(std::uint64_t stamp) { journal_.noteJump(stamp); }
-  /// Forgets all scans; the counts of Progress stay.
+  /// The map was emptied: forgets all scans; the counts of Progress stay.
   void reset();
+  /// Forgets all scans, which stay where they are in the map.
+  void forget();
 
   /// Sets where the scans belong (ScanJournal::setPath). What has been moved already stays moved.
   /// @return whether any keyframe lies among the scans; otherwise nothing has changed.

@@ -176,6 +176,15 @@ bool KeptMap::makeRoom() {
   return true;
 }
 
+std::uint64_t KeptMap::forgetJournal() {
+  if (!corrector_) throw std::invalid_argument("no scans are kept; set journal to true to keep them");
+  const std::uint64_t scans = corrector_->progress().scans;
+  if (keeper_) keeper_->forgetJournal();
+  corrector_->forget();
+  if (writer_) writer_->reset(drive_.id);
+  return scans;
+}
+
 void KeptMap::requireWritable() const {
   if (read_only_) throw std::invalid_argument("the map is read only; set read_only to false to change it");
 }

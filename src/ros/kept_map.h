@@ -44,6 +44,9 @@ class KeptMap {
   void nameSensors(std::vector<std::string> frames) { sensor_frames_ = std::move(frames); }
   const MapCorrector* corrector() const { return corrector_.get(); }
 
+  /// Forgets the scans of the journal, also in the map file. @return their number, as far as they are of this
+  /// drive. @throws std::invalid_argument if there is no journal.
+  std::uint64_t forgetJournal();
   /// Makes room for a scan that was refused for lack of memory. @return whether memory was gained.
   bool makeRoom();
   /// Clears the map, also in the file, and begins a drive. @throws std::invalid_argument if it is read only.

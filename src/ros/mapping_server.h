@@ -62,6 +62,7 @@ class MappingServer {
   bool onPublishMap(std_srvs::Empty::Request&, std_srvs::Empty::Response&);
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
+  bool onForgetJournal(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool onClearBox(BoundingBoxQuery::Request& request, BoundingBoxQuery::Response&);
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);

@@ -41,6 +41,8 @@ void MappingServer::offerServices() {
   services_.push_back(private_node_.advertiseService("pause", &MappingServer::onPause, this));
   services_.push_back(private_node_.advertiseService("resume", &MappingServer::onResume, this));
   services_.push_back(private_node_.advertiseService("clear_bbx", &MappingServer::onClearBox, this));
+  services_.push_back(
+      private_node_.advertiseService("forget_journal", &MappingServer::onForgetJournal, this));
   ros::NodeHandle saving(private_node_);
   saving.setCallbackQueue(&saving_queue_);
   services_.push_back(saving.advertiseService("save_map", &MappingServer::onSaveMap, this));
@@ -85,6 +87,20 @@ bool MappingServer::onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Res
   paused_ = false;
   status_publisher_.publish(status());
   ROS_INFO("%s", response.message.c_str());
+  return true;
+}
+
+bool MappingServer::onForgetJournal(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  try {
+    response.message = counted(kept_->forgetJournal(), "scan") + " forgotten, which stay where they are";
+    response.success = true;
+    corrected_->reset();
+    status_publisher_.publish(status());
+    ROS_INFO("forget_journal: %s", response.message.c_str());
+  } catch (const std::exception& fault) {
+    response.success = false;
+    response.message = fault.what();
+  }
   return true;
 }
 

@@ -349,6 +349,12 @@ const JournalSize& MapKeeper::journalSize() const {
   return state_->journal_size;
 }
 
+void MapKeeper::forgetJournal() {
+  save();
+  state_->store->eraseJournal();
+  state_->journal_size.settings = state_->journal_size.cleared = 0;
+}
+
 std::string MapKeeper::scanContent(std::uint64_t number) {
   return state_->store->scanContent(number);
 }

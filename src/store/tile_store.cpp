@@ -134,6 +134,14 @@ void TileStore::putDrive(const DriveRecord& drive) {
   enqueue({work});
 }
 
+void TileStore::eraseJournal() {
+  const auto work = [](MapFile&, MapFile::Change& change, Call) {
+    change.eraseJournal();
+    return true;
+  };
+  enqueue({work, 0, std::nullopt, false, false, true});
+}
+
 void TileStore::noteCleared(const Eigen::AlignedBox3d& box) {
   const auto work = [box](MapFile&, MapFile::Change& change, Call) {
     change.addClearedBox(box);

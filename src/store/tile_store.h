@@ -65,6 +65,8 @@ class TileStore {
   /// it.
   void changeTiles(std::vector<GridIndex> tiles, std::function<void(SemanticMap&)> change);
   void putDrive(const DriveRecord& drive);
+  /// Forgets the journal.
+  void eraseJournal();
   /// Notes in the journal that a box is cleared.
   void noteCleared(const Eigen::AlignedBox3d& box);
   /// Reads the packed points of a scan of the journal, and returns when that is done. May be called in any

@@ -18,7 +18,7 @@ from bki_mapping.msg import MappingStatus
 from bki_mapping.srv import SaveMap
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
@@ -191,6 +191,25 @@ class Corrections(unittest.TestCase):
         for n, place in enumerate(places):
             again.map([n], lambda _, place=place: place)
         self.assertEqual(content(path), again.content())
+
+    def test_scans_that_are_forgotten_stay(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'forgotten.bkm')
+        mapper = Mapper(self, 'forgetful', map_file=path, save_period=0.05)
+        mapper.map(range(5), drifted_place)
+        answer = rospy.ServiceProxy('/forgetful/forget_journal', Trigger)()
+        self.assertEqual((answer.success, answer.message), (True, '5 scans forgotten, which stay where they are'))
+        before = mapper.content()
+        mapper.map(range(5, 8), true_place)
+        mapper.correct(range(8), lambda n: (1.0 * n, 1.0, 0.0))
+        mapper.wait_for(lambda m: m.corrections == 1 and m.correction_done and m.correction_moved == 3, 'moving the others')
+        after = mapper.content()
+        self.assertTrue(all(key in after for key in before))
+        mapper.node.send_signal(signal.SIGINT)
+        self.assertEqual(mapper.node.wait(TIMEOUT), 0)
+        self.assertEqual(places_of_scans(path)[0], [(1.0 * n, 1.0, 0.0) for n in range(5, 8)])
+        self.assertEqual(content(path), after)
 
     def test_paths_of_no_use_change_nothing_and_are_said(self):
         mapper = Mapper(self, 'refusing')

@@ -65,6 +65,8 @@ class MapKeeper {
   void keepJournal(std::function<JournalChange()> take);
   /// The journal of the file when it was opened, or after a reset().
   const JournalSize& journalSize() const;
+  /// Saves the map, and forgets the journal of the file: all scans stay where they are.
+  void forgetJournal();
   /// Reads the packed points of a scan of the journal, and returns when that is done. May be called in any
   /// thread while this object exists. @throws MapFileError.
   std::string scanContent(std::uint64_t number);
