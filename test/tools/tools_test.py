@@ -1179,7 +1179,7 @@ class Tools(unittest.TestCase):
         self.fails('has no journal of scans, since it has an older version of the format', 'correct_map', old, '--poses', truth, *lidar)
         self.assertEqual(self.content('kept_refused.bkm'), before)
         with contextlib.closing(sqlite3.connect(a)) as database:
-            database.execute("UPDATE scan SET content = X'00' WHERE number = 2")
+            database.execute("UPDATE scan_content SET content = X'00' WHERE number = 2")
             database.commit()
         tiles = self.tiles_of(a)
         self.fails('the checksum of scan 2 is wrong', 'correct_map', a, '--poses', truth, *lidar)
