@@ -123,7 +123,7 @@ JournalStatistics readJournalStatistics(MapFile& file) {
   std::set<std::string> drives;
   for (const ScanRecord& scan : file.scans()) {
     drives.insert(scan.drive);
-    found.bytes += file.scanContent(scan.number).size();
+    found.bytes += scan.bytes;
     ++found.scans;
   }
   found.drives = drives.size();

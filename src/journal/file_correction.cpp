@@ -51,6 +51,7 @@ std::string FileCorrection::move(const std::string& drive, const std::vector<Eig
     throw MapFileError(counted(done.failed, "scan") + " of drive '" + drive +
                        "' cannot be moved, and nothing was written: " + done.fault);
   }
+  if (progress_ && done.moved > 0) progress_(done.moved, done.moved);
   return done.fault.empty() ? "" : "looks of some regions stay as they were: " + done.fault;
 }
 
@@ -63,7 +64,7 @@ void FileCorrection::write(MapFile::Change& change, const std::string& drive, bo
   for (std::size_t n = 0; n < rows_.scans.size(); ++n) {
     if (hasMoved(n)) change.moveScan(recordOf(corrector_.journal().at(n), rows_.scans[n]));
   }
-  putDrive(change, drive);
+  if (moved() > 0) putDrive(change, drive);
 }
 
 void FileCorrection::putDrive(MapFile::Change& change, const std::string& drive) const {

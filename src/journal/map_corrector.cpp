@@ -373,12 +373,7 @@ void MapCorrector::takeLooks(const Job& job, const Looking& looking) {
 
 void MapCorrector::leaveWhereItIs(Number number, const std::string& fault) {
   progress_.fault = fault;
-  if (!journal_.has(number)) return;
-  JournalScan& scan = journal_.at(number);
-  journal_.noteForeign(scan.regions);
-  scan.scan = nullptr;
-  scan.packed = nullptr;
-  scan.stored = scan.off = false;
+  journal_.leave(number);
 }
 
 std::vector<GridIndex> MapCorrector::replaceLooks() {
@@ -435,8 +430,8 @@ void MapCorrector::giveUp(const Moving& moving, const std::string& fault) {
 }
 
 std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
-  const bool all_known =
-      std::all_of(moving.numbers.begin(), moving.numbers.end(), [&](Number n) { return journal_.has(n); });
+  const bool all_known = std::all_of(moving.numbers.begin(), moving.numbers.end(),
+                                     [&](Number n) { return journal_.has(n) && journal_.at(n).isKept(); });
   std::vector<GridIndex> changed;
   if (job.generation != generation_ || !all_known) {
     countToGo();
@@ -507,6 +502,9 @@ void MapCorrector::perform(Job& job) {
         mover_->addLooks(looking->scans[looking->done], *looking->to);
       }
     }
+  } catch (const ScanRefused& refused) {
+    job.fault = refused.what();
+    job.unreadable = refused.reason() != ScanRefused::Reason::kMemory;
   } catch (const std::runtime_error& error) {
     job.fault = error.what();
     job.unreadable = true;

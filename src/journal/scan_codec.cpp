@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 namespace bki_mapping {
 namespace {
@@ -18,6 +17,8 @@ namespace {
 constexpr std::uint32_t kMagic = 0x31534b42;  // "BKS1"
 /// Deflate's limit: a packed byte expands to at most this many.
 constexpr std::uint64_t kMostExpansion = 1032;
+/// Hits, directions or shares of a scan, so that a small file cannot take all memory.
+constexpr std::size_t kMostPoints = std::size_t{1} << 26;
 
 enum Flags : std::uint32_t { kIds = 1, kSoft = 2, kSensor = 4 };
 
@@ -138,7 +139,10 @@ Header headerOf(std::string_view bytes) {
   std::memcpy(&header, bytes.data(), sizeof(header));
   if (header.magic != kMagic) throw ScanDamaged("it does not begin as a scan");
   if (bytes.size() - sizeof(header) != header.packed_size) throw ScanDamaged("its size is not as it says");
-  if (bodySize(header) > kMostExpansion * header.packed_size) throw ScanDamaged("it claims too many points");
+  if (bodySize(header) > kMostExpansion * header.packed_size || header.points > kMostPoints ||
+      header.no_returns > kMostPoints || header.shares > kMostPoints) {
+    throw ScanDamaged("it claims too many points");
+  }
   const bool real = std::isfinite(header.quantum) && header.quantum > 0.0 &&
                     std::isfinite(header.min_range) && std::isfinite(header.max_range) &&
                     std::isfinite(header.height);
@@ -149,8 +153,8 @@ Header headerOf(std::string_view bytes) {
 }  // namespace
 
 std::string packScan(const SensorScan& scan) {
-  if (scan.points.size() > std::numeric_limits<std::uint32_t>::max() / 16 ||
-      scan.no_returns.size() > std::numeric_limits<std::uint32_t>::max() / 16) {
+  if (scan.points.size() > kMostPoints || scan.no_returns.size() > kMostPoints ||
+      scan.soft_ids.size() > kMostPoints) {
     throw std::length_error("a scan has more points than a journal can hold");
   }
   const bool soft = !scan.soft_counts.empty();

@@ -28,6 +28,15 @@ void ScanJournal::setPacked(Number number, std::shared_ptr<const std::string> pa
   keepWithinMemory();
 }
 
+void ScanJournal::leave(Number number) {
+  if (!has(number)) return;
+  JournalScan& scan = at(number);
+  noteForeign(scan.regions);
+  release(scan);
+  scan.scan = nullptr;
+  scan.stored = scan.off = false;
+}
+
 void ScanJournal::setStored(Number number) {
   if (!has(number)) return;
   JournalScan& scan = at(number);

@@ -55,6 +55,8 @@ class ScanJournal {
   Number add(JournalScan scan);
   /// Stores the packed form of a scan, unless it has been forgotten.
   void setPacked(Number number, std::shared_ptr<const std::string> packed);
+  /// A scan cannot be placed anywhere else: it stays where it is.
+  void leave(Number number);
   /// Notes that a map file has a scan, from which it can be fetched.
   void setStored(Number number);
   /// Notes that a box of the map was cleared.

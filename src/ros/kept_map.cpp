@@ -82,6 +82,7 @@ void KeptMap::beginJournal(const ServerConfig& config) {
     if (keeper_) {
       keeper_->change(std::move(difference));
     } else {
+      drive_.addTouched(mapper_.map().geometry(), changed);
       mapper_.addMap(std::move(difference));
     }
     save_.noteChange();
@@ -92,9 +93,10 @@ void KeptMap::beginJournal(const ServerConfig& config) {
     return keeper_ ? keeper_->replaceLooks(region, looks) : mapper_.replaceLooks(region, looks);
   };
   const auto ready = [this] { return !keeper_ || keeper_->waitingBytes() < kMostWaiting; };
-  const auto fetch = [this](std::uint64_t number) {
-    return keeper_->scanContent(writer_->fileNumber(number));
-  };
+  ScanMover::Fetch fetch;
+  if (keeper_) {
+    fetch = [this](std::uint64_t number) { return keeper_->scanContent(writer_->fileNumber(number)); };
+  }
   corrector_ = std::make_unique<MapCorrector>(mapper_.config(), mapper_.sharedClasses(), settings,
                                               CorrectedMap{add, replaceLooks, ready, fetch});
   if (!keeper_) return;

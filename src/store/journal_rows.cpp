@@ -19,6 +19,9 @@ constexpr std::uint64_t kMostStamp = std::numeric_limits<std::int64_t>::max();
 /// So that there are numbers above it.
 constexpr std::uint64_t kMostNumber = std::uint64_t{1} << 62;
 
+/// The largest packed scan [bytes]: below the largest value that a Database takes.
+constexpr std::size_t kMostContent = 250'000'000;
+
 /// Coordinates of poses and ranges beyond this are no places [m].
 constexpr double kFarthest = 1e12;
 
@@ -141,6 +144,7 @@ ScanRecord readRow(RowReader& reader, const std::string& name, ScanRow& row, std
   scan.T_map_sensor = poseOf(row.pose, name);
   scan.T_odometry_sensor = poseOf(row.odometry, name);
   scan.tiles = tilesFrom(row.tiles, name);
+  scan.bytes = row.bytes;
   try {
     checkScan(scan);
   } catch (const std::invalid_argument& error) {
@@ -292,6 +296,11 @@ std::string readScanContent(Database& database, std::uint64_t number) {
 
 void insertScan(Database& database, const ScanRecord& scan, const std::string& content, Totals& totals) {
   checkScan(scan);
+  if (content.size() > kMostContent) {
+    throw std::invalid_argument("the points of scan " + std::to_string(scan.number) + " take " +
+                                std::to_string(content.size()) + " bytes, and a map file holds at most " +
+                                std::to_string(kMostContent) + " of a scan");
+  }
   Statement insert = database.prepare("INSERT INTO scan VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   RowWriter writer(insert);
   ScanRow row;

@@ -65,6 +65,10 @@ void DriveRecord::addScan(std::uint64_t stamp, const GridGeometry& geometry,
   first_stamp = scans == 0 ? stamp : std::min(first_stamp, stamp);
   last_stamp = std::max(last_stamp, stamp);
   ++scans;
+  addTouched(geometry, touched);
+}
+
+void DriveRecord::addTouched(const GridGeometry& geometry, const std::vector<GridIndex>& touched) {
   for (const GridIndex& block : touched) {
     const Eigen::Vector3d low = geometry.blockOrigin({block});
     bounds.extend(low);

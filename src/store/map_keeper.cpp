@@ -409,6 +409,9 @@ void MapKeeper::reset(const DriveRecord& drive) {
 void MapKeeper::change(SemanticMap difference) {
   State& s = *state_;
   s.mapper.map().checkAddable(difference);
+  std::vector<GridIndex> touched;
+  for (const auto& [index, block] : difference.entries()) touched.push_back(index);
+  s.drive.addTouched(s.mapper.map().geometry(), touched);
   for (const GridIndex& tile : difference.regions()) {
     s.differences.emplace_back(tile, difference.takeRegion(tile));
   }

@@ -8,6 +8,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/store/mapper_file.h"
+#include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/stopwatch.h"
 #include "journal/file_correction.h"
@@ -112,6 +113,7 @@ int correctMap(const po::variables_map& given) {
   const LidarPoses poses = posesOf(given);
   std::error_code missing;
   const bool in_place = output == path || std::filesystem::equivalent(path, output, missing);
+  if (!in_place) checkWritable(output);
   Stopwatch watch;
   MapFile file(path, in_place ? MapFile::Access::kUpdate : MapFile::Access::kRead);
   const auto scans = scansByDrive(file);

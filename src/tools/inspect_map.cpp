@@ -160,6 +160,7 @@ int inspect(const po::variables_map& given) {
   const StateRules rules = storedRules(path, file.info());
   const MapStatistics found = readStatistics(file, rules);
   const GridIndex last = lastDrawn(found, file.info().resolution, most);
+  for (const ScanRecord& scan : file.scans()) file.scanContent(scan.number);  // checks it
   const JournalStatistics journal = readJournalStatistics(file);
   print(std::cout, file, found, journal);
   if (given.count("json")) {

@@ -76,6 +76,8 @@ struct DriveRecord {
 
   /// Counts a scan. @param stamp of the scan [ns]. @param touched the blocks that it touched.
   void addScan(std::uint64_t stamp, const GridGeometry& geometry, const std::vector<GridIndex>& touched);
+  /// Extends the bounds by blocks that its scans touch after they have moved.
+  void addTouched(const GridGeometry& geometry, const std::vector<GridIndex>& touched);
 };
 
 /// Names a tile of 8 x 8 x 8 blocks: its index, as Region::regionOf gives it, and the part of the file that

@@ -21,6 +21,7 @@ struct ScanRecord {
   int settings = 0;          ///< number of the settings with which it was integrated (MapFile::settings)
   int cleared = 0;           ///< number of boxes that had been cleared before (MapFile::clearedBoxes)
   bool jump = false;         ///< between the scan before and this one, the recorded poses jump
+  std::uint64_t bytes = 0;   ///< of its packed points; set when it is read
   double reach = 0.0;        ///< of its farthest hit [m]
   Eigen::Isometry3d T_map_sensor = Eigen::Isometry3d::Identity();  ///< where it is in the map
   /// Where it was recorded, in a frame that does not jump.
