@@ -319,7 +319,7 @@ class Attack {
   bool isCorrected() const { return settings_.values.count("journal") > 0; }
   void send(const CorrectionKind& kind) {
     begin(kind.name);
-    callEmpty("reset");  // forgets the frames of other clouds, of which the path cannot be
+    callEmpty("reset");            // forgets the frames of other clouds, of which the path cannot be
     for (int n = 0; n < 3; ++n) {  // among which the poses are
       publish(changedCloud(cloudKinds().front()));
       expectAnswer({"mapped"});
