@@ -6,6 +6,7 @@
 #include <random>
 
 #include "free_space/registry.h"
+#include "journal/random_motion.h"
 #include "reference/content.h"
 #include "reference/scenes.h"
 
@@ -13,18 +14,6 @@ namespace bki_mapping {
 namespace {
 
 using Keyframes = std::vector<StampedMotion>;
-
-Eigen::Isometry3d smallMotion(std::mt19937& random, double metres, double radians) {
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const auto vector = [&] {
-    const double x = uniform(random), y = uniform(random), z = uniform(random);
-    return Eigen::Vector3d(x, y, z);
-  };
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = Eigen::AngleAxisd(radians * uniform(random), vector().normalized()).toRotationMatrix();
-  motion.translation() = metres * vector();
-  return motion;
-}
 
 /// A scan from a place on a way through a room: hits on its walls, and some anywhere.
 Scan scanAt(const Eigen::Isometry3d& pose, std::uint64_t stamp, std::mt19937& random) {
@@ -133,7 +122,7 @@ TEST(MapCorrector, TheMapIsThatOfTheCorrectedPoses) {
     for (int step = 0; step < 40; ++step) {
       if (random() % 8) {
         stamp += 70'000'000 + random() % 300'000'000;
-        if (random() % 6 == 0) drift = drift * smallMotion(random, 0.3, 0.05);
+        if (random() % 6 == 0) drift = drift * randomMotion(random, 0.3, 0.05);
         Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
         truth.translation() = Eigen::Vector3d(0.1 * step - 2.0, 0.3 * std::sin(step), 0.0);
         const Eigen::Isometry3d pose = drift * truth;
@@ -142,7 +131,8 @@ TEST(MapCorrector, TheMapIsThatOfTheCorrectedPoses) {
       } else if (!map.scans_.empty()) {
         Keyframes keyframes;
         for (std::size_t n = random() % 3; n < map.scans_.size(); n += 1 + random() % 4) {
-          keyframes.push_back({map.scans_[n].stamp, smallMotion(random, 0.5, 0.1) * map.odometry_[n].motion});
+          keyframes.push_back(
+              {map.scans_[n].stamp, randomMotion(random, 0.5, 0.1) * map.odometry_[n].motion});
         }
         map.correct(keyframes);
       }

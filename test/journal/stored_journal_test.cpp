@@ -7,6 +7,7 @@
 
 #include "bki_mapping/store/mapper_file.h"
 #include "journal/file_correction.h"
+#include "journal/random_motion.h"
 #include "journal/scan_codec.h"
 #include "journal/stored_settings.h"
 #include "reference/content.h"
@@ -35,18 +36,6 @@ std::vector<MapperConfig> manySettings(bool looks) {
   settings[1].sensor_model.max_range = 3.0;
   settings[2].downsample_resolution = 0.15;
   return settings;
-}
-
-Eigen::Isometry3d randomMotion(std::mt19937& random, double metres, double radians) {
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const auto vector = [&] {
-    const double x = uniform(random), y = uniform(random), z = uniform(random);
-    return Eigen::Vector3d(x, y, z);
-  };
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = Eigen::AngleAxisd(radians * uniform(random), vector().normalized()).toRotationMatrix();
-  motion.translation() = metres * vector();
-  return motion;
 }
 
 /// A map of scans, with all that its file needs; what is in it is made afresh for each use.
