@@ -117,11 +117,8 @@ if(BKI_MAPPING_JOIN)
 endif()
 
 # Scans as they were recorded, which follow corrected poses.
-bki_mapping_room(journal SOURCES
+bki_mapping_core_room(journal SOURCES
     corrected_path.cpp file_correction.cpp journal_writer.cpp map_corrector.cpp rigid_motion.cpp scan_codec.cpp
     scan_journal.cpp scan_mover.cpp sensor_scan.cpp stored_journal.cpp stored_settings.cpp
   LINK bki_mapping_store)
 target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)
-bki_mapping_join(bki_mapping_journal)
-bki_mapping_light(bki_mapping_journal)
-bki_mapping_precompile(bki_mapping_journal REUSE bki_mapping_settings)
