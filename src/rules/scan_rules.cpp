@@ -122,12 +122,6 @@ EvidenceUnits roundedUnits(float sum) {
   return static_cast<EvidenceUnits>(static_cast<double>(std::min(sum, kMostSum) / kEvidenceUnit) + 0.5);
 }
 
-bool addsEvidence(const LimitKernels& kernels, const BlockSums& sums) {
-  return std::any_of(sums.begin(), sums.end(), [&](const BlockSums::Plane& plane) {
-    return atLeast(0.5f * kEvidenceUnit, plane, kernels).any();
-  });
-}
-
 EvidenceUnits heldBack(const ScanRules& rules, float sum) {
   const float kept = std::min(std::max(sum - rules.free_threshold, 0.0f), rules.most_free);
   return roundedUnits(std::min(sum, rules.most_free)) - roundedUnits(kept);

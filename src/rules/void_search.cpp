@@ -84,19 +84,19 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
   });
   const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].fixed; };
   forEachBlock([&](std::size_t b) {
-    const VoxelMask own = seen(b);
-    along_x_[b] = along_y_[b] = own;
-    if (own.none()) return;
-    along_x_[b] &= betweenIn(b, 0, seen);
-    along_y_[b] &= betweenIn(b, 1, seen);
+    along_x_[b] = seen(b);
+    if (along_x_[b].any()) along_x_[b] &= betweenIn(b, 0, seen);
   });
   // With both neighbours across the faces, those across an edge are two steps away, along different axes.
   forEachBlock([&](std::size_t b) {
-    voids_[b] = empty_[b] & along_x_[b] & along_y_[b];
-    if (voids_[b].none()) return;
     const auto along_x = [&](std::size_t n) -> const VoxelMask& { return along_x_[n]; };
-    const auto along_y = [&](std::size_t n) -> const VoxelMask& { return along_y_[n]; };
-    voids_[b] &= betweenIn(b, 1, along_x) & betweenIn(b, 2, along_x) & betweenIn(b, 2, along_y);
+    const auto along_y = [&](std::size_t n) { return seen(n) & betweenIn(n, 1, seen); };
+    VoxelMask& voids = voids_[b];
+    // Cheapest first: far from the sensor, beams are sheets, and voxels above or below them are not seen.
+    voids = empty_[b] & along_x_[b];
+    if (voids.any()) voids &= betweenIn(b, 2, along_x);
+    if (voids.any()) voids &= betweenIn(b, 1, along_x);
+    if (voids.any()) voids &= along_y(b) & betweenIn(b, 2, along_y);
   });
 }
 

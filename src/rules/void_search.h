@@ -30,7 +30,7 @@ class VoidSearch {
   void start(std::size_t blocks) {
     seen_.assign(blocks, {});
     beside_.resize(blocks);
-    for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &along_y_, &voids_}) masks->resize(blocks);
+    for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &voids_}) masks->resize(blocks);
   }
   /// What the scan says of a block; different threads may write to different blocks.
   SeenVoxels& at(std::size_t block) { return seen_[block]; }
@@ -53,7 +53,7 @@ class VoidSearch {
   std::vector<SeenVoxels> seen_;
   std::vector<Beside> beside_;
   std::vector<VoxelMask> empty_;              ///< crossed or bridged
-  std::vector<VoxelMask> along_x_, along_y_;  ///< seen, with both neighbours along an axis
+  std::vector<VoxelMask> along_x_;            ///< seen, with both neighbours along x
   std::vector<VoxelMask> voids_;
 };
 

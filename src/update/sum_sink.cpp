@@ -28,9 +28,6 @@ void SumSink::addSums(const GroupBlock& to) {
     const VoxelMask reached = applyRulesToFree(to);
     if (work_.rules_.seeksVoids()) to.seen_->crossed = reached & ~work_.hit_[to.slot_];
   }
-  if (work_.rules_.keeps_looks && !to.seen_->adds) {
-    to.seen_->adds = addsEvidence(*work_.limits_, work_.sums_);
-  }
   const auto add = work_.withdraws_ ? work_.kernels_->withdraw : work_.kernels_->add;
   for (const BlockSums::Plane& sums : work_.sums_) {
     Block::Layers layers = sums.layers;
@@ -38,6 +35,7 @@ void SumSink::addSums(const GroupBlock& to) {
       // Planes are in no cache near the core: what is left out is not fetched. On average it is half of them.
       layers = work_.kernels_->find_layers(sums.values, layers);
       if (layers.begin == layers.end) continue;
+      if (work_.rules_.keeps_looks) to.seen_->adds = true;
     }
     to.block_->change(sums.label,
                       [&](EvidenceUnits* plane) { return add(sums.values, layers, plane, work_.counts_); });
