@@ -30,6 +30,12 @@ constexpr int kBeamColumns = 1024;
   return row < 0.0f ? 0 : (row < kBeamRows - 1 ? static_cast<int>(row) : kBeamRows - 1);
 }
 
+/// The direction bins near each of the 64 voxels of a layer of a block: those of all lines through the sensor
+/// that pass within some distance. Columns wrap where the first is after the last.
+struct CellWindows {
+  std::int32_t first_row[64], last_row[64], first_column[64], last_column[64];
+};
+
 /// Loops over beams may read up to this many elements past the end.
 constexpr std::uint32_t kBeamPadding = 16;
 

@@ -27,12 +27,14 @@ void BeamField::setBeams(const Beams& beams, ThreadPool& pool) {
   beams_.origin = beams.origin;
   beams_.ends.resize(count);
   inverse_length_.resize(count);
+  sorted_cells_.resize(count);
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
       // A local copy: reading beams_.ends[b] back would wait for the store.
       const Eigen::Vector3f beam = beams.ends[order_[b]];
       inverse_length_[b] = static_cast<float>(1.0 / beam.cast<double>().norm());
       beams_.ends[b] = beam;
+      sorted_cells_[b] = cells_[order_[b]];
     }
   });
   longest_ =
@@ -98,6 +100,27 @@ void BeamField::findRangesNear(const Eigen::Vector3d& centre, double radius_metr
     }
   }
   ranges.resize(kept);
+}
+
+std::size_t BeamField::rangesIn(const CellWindows& windows, int voxel, BeamRange* ranges) const {
+  const std::vector<std::uint32_t>& begin = table_.begin();
+  std::size_t count = 0;
+  const auto add = [&](int row, int first, int last) {
+    const auto base = static_cast<std::size_t>(row) * kBeamColumns;
+    ranges[count] = {begin[base + static_cast<std::size_t>(first)],
+                     begin[base + static_cast<std::size_t>(last) + 1]};
+    count += ranges[count].first < ranges[count].last;
+  };
+  const int first = windows.first_column[voxel], last = windows.last_column[voxel];
+  for (int row = windows.first_row[voxel]; row <= windows.last_row[voxel]; ++row) {
+    if (first <= last) {
+      add(row, first, last);
+    } else {
+      add(row, first, kBeamColumns - 1);
+      add(row, 0, last);
+    }
+  }
+  return count;
 }
 
 LocalBeam BeamField::localBeam(std::size_t b, const BlockIndex& index) const {

@@ -37,6 +37,10 @@ class BeamField {
   /// In the order of the index.
   const Beams& beams() const { return beams_; }
   BeamBox boxOf(const BlockGroup& group) const;
+  /// Those of a direction bin.
+  BeamRange beamsIn(std::size_t cell) const { return {table_.begin()[cell], table_.begin()[cell + 1]}; }
+  std::uint32_t cellOf(std::size_t beam) const { return sorted_cells_[beam]; }     ///< direction bin
+  float inverseLengthOf(std::size_t beam) const { return inverse_length_[beam]; }  ///< [1 / m]
 
   /// The greatest distance from a beam at which it reaches a voxel centre [m].
   double reachMetres() const { return reach_ * geometry_.resolution(); }
@@ -50,6 +54,10 @@ class BeamField {
 
   /// The same for the blocks of a group.
   void findRangesNear(const BlockGroup& group, NearBeams& near) const;
+
+  /// Sets `ranges` to those of the beams in the window of a voxel. @param voxel of the layer. @param ranges
+  /// room for BeamTable::kMostRanges. @return their number.
+  std::size_t rangesIn(const CellWindows& windows, int voxel, BeamRange* ranges) const;
 
   /// Calls visit(offset, rho, length) for every beam and every voxel of the block that its line reaches,
   /// where rho is the projection of the voxel's centre on the beam, and length the beam's length [m].
@@ -77,7 +85,7 @@ class BeamField {
   std::vector<float> inverse_length_;  ///< [1 / m]
   BeamTable table_;
   std::unique_ptr<BeamIndex> rtree_;
-  std::vector<std::uint32_t> cells_, order_;
+  std::vector<std::uint32_t> cells_, order_, sorted_cells_;
 };
 
 /// The beams of a scan; builds their field on first use.

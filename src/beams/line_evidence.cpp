@@ -57,6 +57,9 @@ const std::vector<GridIndex>& LineEvidence::touchedBlocks(const SemanticMap& map
                                                           ThreadPool& pool) {
   const double reach = field_->reachMetres();
   touched_.clear();
+  if (field_->kernel().type == KernelType::kSparse) {
+    near_sensor_.set(*field_, lines_, weight_, enough_ / field_->kernel().scale, pool);
+  }
   if (extent_ == FreeSpaceExtent::kMapped) {
     insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {
@@ -69,7 +72,10 @@ void LineEvidence::reserve(std::size_t workers) {
   workspaces_.resize(workers);
   for (Workspace& each : workspaces_) {
     field_->reserve(each.near);
-    if (field_->kernel().type == KernelType::kSparse) each.group.reserve(field_->beams().ends.size());
+    if (field_->kernel().type == KernelType::kSparse) {
+      each.group.reserve(field_->beams().ends.size());
+      near_sensor_.reserve(each.near_sensor);
+    }
   }
 }
 
@@ -92,8 +98,13 @@ void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBl
   const bool counting = field_->kernel().type == KernelType::kCounting;
   if (!counting) {
     field_->findRangesNear(group, own.near);
-    kernels_.trace_beams(lines_.arrays(), own.near.ranges.data(), own.near.ranges.size(),
-                         field_->boxOf(group), weight_, own.group);
+    near_sensor_.start(group, blocks, own.near.ranges, own.near_sensor,
+                       [&](std::size_t b) { return sink.protectedOf(b); });
+    const BlockGroup others = {group.index, group.blocks & ~own.near_sensor.blocks};
+    if (others.blocks != 0) {
+      kernels_.trace_beams(lines_.arrays(), own.near.ranges.data(), own.near.ranges.size(),
+                           field_->boxOf(others), weight_, own.group);
+    }
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockIndex& index = blocks[b].index;
@@ -104,6 +115,8 @@ void LineEvidence::accumulate(const BlockGroup& group, const std::vector<GroupBl
       if (counting) {
         countCrossings(index, own.near, values);
         some = scaleSums(scale, values);
+      } else if ((own.near_sensor.blocks >> slotInGroup(index) & 1) != 0) {
+        some = near_sensor_.sumsOf(index, own.near_sensor, values);
       } else {
         some = own.group.sumsOf(
             {coordinateInGroup(index.x), coordinateInGroup(index.y), coordinateInGroup(index.z)}, scale,

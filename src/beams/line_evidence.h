@@ -5,6 +5,7 @@
 
 #include "beams/beam_field.h"
 #include "beams/block_walk.h"
+#include "beams/near_sensor.h"
 #include "beams/raster/group_sums.h"
 #include "beams/raster/line_kernels.h"
 #include "update/evidence.h"
@@ -18,11 +19,12 @@ class LineEvidence : public Evidence {
  public:
   /// @param instruction_set one of instructionSets(); "" selects the best that the processor has.
   LineEvidence(BeamWeight weight, FreeSpaceExtent extent, const std::string& instruction_set = "")
-      : weight_(weight), extent_(extent), kernels_(lineKernelsFor(instruction_set)) {}
+      : weight_(weight), extent_(extent), kernels_(lineKernelsFor(instruction_set)), near_sensor_(kernels_) {}
 
   /// Replaces the beams. @param field must stay valid until the scan is done.
   void setField(const BeamField& field, ThreadPool& pool);
 
+  void limitTo(float enough) override { enough_ = enough; }
   const std::vector<GridIndex>& touchedBlocks(const SemanticMap& map, std::size_t most,
                                               ThreadPool& pool) override;
   void markClasses(std::size_t, ClassSet& classes) const override { classes.set(kFreeClass); }
@@ -37,6 +39,7 @@ class LineEvidence : public Evidence {
   struct alignas(kThreadsApart) Workspace {
     NearBeams near;
     GroupSums group;
+    NearSensor::Workspace near_sensor;
   };
   /// Sums for the counting kernel: the weights of the beams that cross each voxel. @param sums of a block.
   void countCrossings(const BlockIndex& index, NearBeams& near, float* sums) const;
@@ -46,6 +49,8 @@ class LineEvidence : public Evidence {
   FreeSpaceExtent extent_;
   const LineKernels& kernels_;
   LineSetups lines_;
+  NearSensor near_sensor_;
+  float enough_ = std::numeric_limits<float>::infinity();
   BlockWalk walk_;
   IndexNumbering touched_;
   std::vector<Workspace> workspaces_;

@@ -35,6 +35,8 @@ struct ScanRules {
   bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
   /// Whether the threshold depends on the voxel below.
   bool asksBelow() const { return free_threshold > 0.0f && std::isfinite(most_free); }
+  /// More evidence for `free` than this makes no difference.
+  float enoughFree() const { return free_threshold + most_free; }
   bool seeksVoids() const { return void_evidence > 0.0f || keeps_looks; }
 };
 
@@ -60,9 +62,6 @@ VoxelMask applyToFree(const ScanRules& rules, const LimitKernels& kernels, const
 
 /// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
 EvidenceUnits roundedUnits(float sum);
-
-/// Whether any sum of a block, limits applied, rounds to a unit or more.
-bool addsEvidence(const LimitKernels& kernels, const BlockSums& sums);
 
 /// The units that the threshold has taken from a sum >= 0 of a voxel, but would not above a crossed one.
 EvidenceUnits heldBack(const ScanRules& rules, float sum);

@@ -35,6 +35,10 @@ class BlockTask {
 /// them. MapUpdater applies the rules of the scan and adds the sums to the blocks.
 class Evidence : public BlockTask {
  public:
+  /// Says of which sums of a voxel only counts that they are larger; infinity: of none. Called before
+  /// touchedBlocks().
+  virtual void limitTo(float /*enough*/) {}
+
   /// Inserts the classes for which accumulate() may hand over sums. @param position of the block in
   /// touchedBlocks().
   virtual void markClasses(std::size_t position, ClassSet& classes) const = 0;

@@ -20,6 +20,7 @@ void MapUpdater::setTasks(const ScanEvidence& scan) {
   for (Evidence* evidence : {scan.hits, scan.free}) {
     if (!evidence) continue;
     tasks_[task_count_].kind = evidence == scan.hits ? SumSink::Kind::kHits : SumSink::Kind::kFree;
+    if (evidence == scan.free) evidence->limitTo(rules_.enoughFree());
     tasks_[task_count_].evidence = evidence;
     tasks_[task_count_++].work = evidence;
   }

@@ -91,6 +91,12 @@ class SumSink {
   SumSink(GroupInWork& group, Kind kind, const std::vector<GroupBlock>& blocks)
       : work_(group.workspace_), kind_(kind), blocks_(blocks) {}
 
+  /// The voxels of the i-th block that take no evidence from what is added now.
+  VoxelMask protectedOf(std::size_t i) const {
+    if (kind_ == Kind::kHits || !work_.rules_.protectsVoxels()) return {};
+    return work_.protected_[blocks_[i].slot_];
+  }
+
   /// Adds to the i-th block what `fill(BlockSums&)` puts into its empty sums. Call it by rising i.
   template <typename Fill>
   void add(std::size_t i, Fill&& fill) {

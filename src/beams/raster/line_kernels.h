@@ -5,6 +5,7 @@
 #include <string>
 
 #include "beams/beam_cells.h"
+#include "beams/beam_directions.h"
 #include "beams/raster/group_sums.h"
 #include "beams/raster/line_setup.h"
 #include "bki_mapping/beams/beam_config.h"
@@ -29,6 +30,20 @@ struct LineKernels {
                       const BeamBox& box, BeamWeight weight, GroupSums& sums);
   /// Replaces kWeighed projections rho by the weights there, as in trace_beams.
   void (*weigh)(BeamWeight weight, float* rho);
+  /// Computes the directions of beams. @param beams, resolution as for set_up_lines.
+  void (*set_up_directions)(const Eigen::Vector3f* beams, std::size_t count, double resolution,
+                            const BeamDirectionTargets& to);
+  /// The sum of w(rho) k(d) over the beams of some ranges at one voxel, which is not the sensor's own place.
+  /// @param reach length of the kernel [voxels].
+  float (*sum_at)(const BeamDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
+                  const PointDirection& voxel, float reach, BeamWeight weight);
+  /// Finds the direction bins of the 64 voxels of a layer of a block, and the squares of their distances
+  /// [voxels^2]. @param first the coordinates of the first of them, from the sensor [voxels].
+  void (*find_cells)(const float* first, std::int32_t* cells, float* distances2);
+  /// Finds the direction bins of the lines that pass within `reach` [voxels] of voxels of a layer.
+  void (*find_windows)(const float* first, float reach, CellWindows& windows);
+  /// Of two arrays, the greater values, place by place. @param to neither of them.
+  void (*find_greater)(const float* a, const float* b, int count, float* to);
   float kernel_scale;  ///< lines measure distances in lengths of the kernel / sqrt(kernel_scale)
 };
 

@@ -27,6 +27,7 @@
 #include "beams/raster/narrow_kernel_inl.h"
 #include "beams/raster/pass_search_inl.h"
 #include "beams/raster/slices_inl.h"
+#include "beams/raster/voxel_sums_inl.h"
 #include "beams/raster/wide_kernel_inl.h"
 
 namespace bki_mapping {
@@ -127,7 +128,17 @@ void weigh(BeamWeight weight, float* rho) {
   withWeight(weight, [&](auto w) { weighWith<decltype(w)::value>(rho); });
 }
 
-constexpr LineKernels kLineKernels = {kInstructionSet, setUpLines, traceBeams, weigh, VecKernel::kScale};
+float sumAt(const BeamDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
+            const PointDirection& voxel, float reach, BeamWeight weight) {
+  float sum = 0.0f;
+  withWeight(weight,
+             [&](auto w) { sum = sumAtWith<decltype(w)::value>(beams, ranges, count, voxel, reach); });
+  return sum;
+}
+
+constexpr LineKernels kLineKernels = {
+    kInstructionSet, setUpLines, traceBeams,  weigh,       setUpDirections,
+    sumAt,           findCells,  findWindows, findGreater, VecKernel::kScale};
 
 }  // namespace
 }  // namespace bki_mapping

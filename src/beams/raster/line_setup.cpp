@@ -22,4 +22,19 @@ void LineSetups::set(const Beams& beams, double resolution, double length, const
   });
 }
 
+void LineSetups::setEvery(std::size_t one_of, const LineSetups& others, std::size_t all) {
+  const std::size_t count = (all + one_of - 1) / one_of, padded = count + kBeamPadding;
+  axis_.resize(padded, 0);
+  for (auto* each : {&slope_side_, &slope_height_, &end_, &shear_}) each->resize(padded, 0.0f);
+  lines_.resize(count);
+  for (std::size_t to = 0, from = 0; to < count; ++to, from += one_of) {
+    axis_[to] = others.axis_[from];
+    slope_side_[to] = others.slope_side_[from];
+    slope_height_[to] = others.slope_height_[from];
+    end_[to] = others.end_[from];
+    shear_[to] = others.shear_[from];
+    lines_[to] = others.lines_[from];
+  }
+}
+
 }  // namespace bki_mapping

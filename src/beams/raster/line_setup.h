@@ -59,6 +59,9 @@ class LineSetups {
   void set(const Beams& beams, double resolution, double length, const LineKernels& kernels,
            ThreadPool& pool);
 
+  /// Takes one of so many lines of others. @param count of the others.
+  void setEvery(std::size_t one_of, const LineSetups& others, std::size_t count);
+
   LineSetupArrays arrays() const {
     return {axis_.data(), slope_side_.data(), slope_height_.data(),
             end_.data(),  shear_.data(),      lines_.data()};
