@@ -164,6 +164,9 @@ DriveConfig usualDrive(SceneKind scene) {
     case SceneKind::kArrivals:
       drive.speed = 1.0;
       break;
+    case SceneKind::kQueue:
+      drive.speed = 0.5;
+      break;
     case SceneKind::kRooms:
       drive.speed = 0.5;
       drive.height = 0.35;

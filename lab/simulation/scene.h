@@ -93,12 +93,13 @@ enum class SceneKind {
   kTraffic,     ///< stop-and-go traffic in both directions, and parked cars of which some drive off
   kCrowd,       ///< many pedestrians, who walk and stand, and cyclists
   kArrivals,    ///< cars that come, park and leave, people who stop or sit down, trolleys, gates
+  kQueue,       ///< cars that creep in both lanes, and parked cars
   kRooms,       ///< no street: furnished rooms along a corridor, people who walk and stand, doors
   kTrajectory,  ///< a street along given poses: makeStreetAlong
 };
 /// @throws std::invalid_argument if there is no kind of this name.
 SceneKind sceneKindNamed(const std::string& name);
-/// "street", "traffic", "crowd", "arrivals", "rooms" or "trajectory".
+/// "street", "traffic", "crowd", "arrivals", "queue", "rooms" or "trajectory".
 std::string nameOf(SceneKind kind);
 
 /// A street along x with buildings, fences, trees, poles, signs, and the road users of its kind; or the rooms

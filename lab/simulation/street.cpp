@@ -46,6 +46,26 @@ void addQueues(double length, double duration, double speed, Dice& dice, std::ve
     addCar(x, 1.5, Motion::inTurns(-5.0, go, stand, oncoming, duration), shapes);
 }
 
+/// Goes on and on, at a pace that changes every few seconds. @param slowest, fastest [m/s].
+Motion creeping(double direction, double slowest, double fastest, double duration, Dice& dice) {
+  Motion motion;
+  for (double time = 0.0; time < duration;) {
+    time += dice.between(2.0, 6.0);
+    motion.legs.push_back({time, {direction * dice.between(slowest, fastest), 0.0, 0.0}});
+  }
+  return motion;
+}
+
+/// Queues that creep and never stand: one from close ahead of the sensor on, and one oncoming.
+void addCreepingQueues(double length, double duration, double speed, Dice& dice, std::vector<Shape>& shapes) {
+  constexpr double kFastest = 2.0, kSlowest = 0.5;  // [m/s]
+  const Motion ahead = creeping(1.0, speed, speed + kFastest - kSlowest, duration, dice);
+  for (double x = 7.0; x < kStart + length; x += dice.between(6.5, 9.0)) addCar(x, -1.5, ahead, shapes);
+  const Motion oncoming = creeping(-1.0, kSlowest, kFastest, duration, dice);
+  for (double x = kStart; x < kStart + length + kFastest * duration; x += dice.between(6.5, 9.0))
+    addCar(x, 1.5, oncoming, shapes);
+}
+
 /// Pedestrians and cyclists on the whole street, except where the sensor drives.
 void addCrowd(double length, double duration, Dice& dice, std::vector<Shape>& shapes) {
   for (double x = kStart; x < kStart + length; x += dice.between(0.5, 1.5)) {
@@ -95,17 +115,18 @@ void addVisitors(double length, double duration, Dice& dice, std::vector<Shape>&
     addGate(x, 8.5, Motion::sliding(2.3, dice.between(2.0, 6.0), dice.between(2.0, 6.0), duration), shapes);
 }
 
-constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals", "rooms", "trajectory"};
+constexpr const char* kNames[] = {"street", "traffic", "crowd", "arrivals", "queue", "rooms", "trajectory"};
 
 }  // namespace
 
 SceneKind sceneKindNamed(const std::string& name) {
-  for (const SceneKind kind : {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd,
-                               SceneKind::kArrivals, SceneKind::kRooms, SceneKind::kTrajectory}) {
+  for (const SceneKind kind :
+       {SceneKind::kStreet, SceneKind::kTraffic, SceneKind::kCrowd, SceneKind::kArrivals, SceneKind::kQueue,
+        SceneKind::kRooms, SceneKind::kTrajectory}) {
     if (nameOf(kind) == name) return kind;
   }
   throw std::invalid_argument("there is no scene " + name +
-                              "; known scenes: street, traffic, crowd, arrivals, rooms");
+                              "; known scenes: street, traffic, crowd, arrivals, queue, rooms");
 }
 
 std::string nameOf(SceneKind kind) {
@@ -144,6 +165,9 @@ Scene makeScene(SceneKind kind, double length, double duration, double speed, st
       break;
     case SceneKind::kArrivals:
       addVisitors(length, duration, dice, shapes);
+      break;
+    case SceneKind::kQueue:
+      addCreepingQueues(length, duration, speed, dice, shapes);
       break;
     case SceneKind::kRooms:
     case SceneKind::kTrajectory:

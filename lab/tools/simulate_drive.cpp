@@ -21,7 +21,8 @@ po::options_description options() {
       "scene", tools::textOption("KIND")->default_value("street"),
       "street: cars that pass or are parked; traffic: stop-and-go, and parked cars that drive off; crowd: "
       "many pedestrians and cyclists; arrivals: cars that come, park and leave, people who stop or "
-      "sit down, trolleys, gates; rooms: furnished rooms along a corridor, people, doors")(
+      "sit down, trolleys, gates; queue: cars that creep; rooms: furnished rooms along a corridor, people, "
+      "doors")(
       "trajectory", tools::textOption("FILE"),
       "poses of the sensor, one for each scan, along which a street is laid out; --scene and --speed do not "
       "apply")(
@@ -40,9 +41,9 @@ po::options_description options() {
       "max-range", tools::optionWith("M", lidar.max_range), "range beyond which there is no return [m]")(
       "range-noise", tools::optionWith("M", lidar.range_noise), "standard deviation of the ranges [m]")(
       "label-noise", tools::optionWith("FRACTION", lidar.label_noise),
-      "fraction of points with a wrong label")(
-      "speed", po::value<double>()->value_name("M/S"),
-      "speed of the drive [m/s]; default: 8, in traffic 3, in a crowd 2, among arrivals 1, in rooms 0.5")(
+      "fraction of points with a wrong label")("speed", po::value<double>()->value_name("M/S"),
+                                               "speed of the drive [m/s]; default: 8, in traffic 3, in a "
+                                               "crowd 2, among arrivals 1, in a queue and in rooms 0.5")(
       "height", po::value<double>()->value_name("M"),
       "height of the sensor above the ground [m]; default: 1.73, in rooms 0.35")(
       "weather", tools::textOption("KIND,RATE")->default_value("dry"),

@@ -108,6 +108,23 @@ TEST(Scene, TrafficWaitsAndGoesAndParkedCarsDriveOff) {
   }
 }
 
+TEST(Scene, AQueueCreepsAndLeavesTheSensorAlone) {
+  const Scene scene = makeScene(SceneKind::kQueue, 150.0, 30.0, 0.5, 1);
+  std::set<double> paces;
+  for (const auto& way : waysOf(scene, 252, {2.0, 10.0, 10.1, 30.0})) {
+    for (const double pace : {way[0] / 2.0, (way[2] - way[1]) / 0.1, way[3] / 30.0}) {
+      EXPECT_GE(pace, 0.5 - 1e-9);
+      EXPECT_LE(pace, 2.0 + 1e-9);
+      paces.insert(std::round(1e3 * pace));
+    }
+  }
+  EXPECT_GT(paces.size(), 4u) << "the pace changes, and differs from lane to lane";
+  EXPECT_GT(waysOf(scene, 10, {1.0}).size(), 10u);
+  for (double time = 0.0; time < 30.0; time += 0.1) {
+    EXPECT_FALSE(scene.labelAt({0.5 * time, -1.5, 1.0}, time)) << time;
+  }
+}
+
 TEST(Scene, ACrowdStandsAndWalks) {
   const Scene scene = makeScene(SceneKind::kCrowd, 150.0, 30.0, 2.0, 1);
   EXPECT_GT(waysOf(scene, 254, {1.0}).size(), 100u);

@@ -380,7 +380,7 @@ class Tools(unittest.TestCase):
 
     def test_simulated_scenes(self):
         moving = {}
-        for scene in ('street', 'traffic', 'crowd', 'rooms'):
+        for scene in ('street', 'traffic', 'crowd', 'queue', 'rooms'):
             folder = self.path(scene)
             result = call('simulate_drive', '--output', folder, '--scene', scene, '--scans', '2', '--lidar', 'vlp16',
                           '--columns', '300')
