@@ -18,12 +18,6 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           "in a voxel, what stands is kept although beams graze it, and what has left is cleared. "
           "The other settings of rules/ then say how."),
       realParameter(
-          "hit_outweighs", &C::hit_outweighs, NumberRange::atLeast(1.0).upTo(100.0), "scans",
-          Changes::kAtStart,
-          "How many scans whose beams cross a voxel it takes to outweigh one that hits it, where what "
-          "can move stands. Lower it to clear what has left after a long stop sooner; raise it to keep "
-          "parked things that beams graze."),
-      realParameter(
           "void_outweighs", &C::void_outweighs, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
           Changes::kWhileMapping,
           "How many scans that hit a voxel are outweighed by one that sees it void: crossed together "

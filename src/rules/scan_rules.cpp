@@ -73,7 +73,7 @@ ScanLimitConfig limitsOf(const RulesConfig& rules) {
   ScanLimitConfig limits;
   limits.hits_before_misses = limits.evidence_before_misses = true;
   limits.static_spread = false;
-  limits.hits = rules.hit();
+  limits.hits = RulesConfig::kHit;
   limits.free = RulesConfig::kCrossing;
   limits.void_space = rules.emptiness();
   return limits;

@@ -32,10 +32,10 @@ constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAft
 
 /// Evidence from which on a thing stands that does so after this many scans with hits in a voxel of 0.3 m.
 /// What passes stays in a voxel for its own depth and the voxel's edge. Half a hit may be missing.
-double evidenceToStand(double scans, const RulesConfig& config, double resolution) {
+double evidenceToStand(double scans, double resolution) {
   constexpr double kDepth = 0.2, kUsual = 0.3;  // [m]
   const double here = scans * (resolution + kDepth) / (kUsual + kDepth);
-  return std::max(here - 0.5, 0.0) * config.hit();
+  return std::max(here - 0.5, 0.0) * RulesConfig::kHit;
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
   const double ratio = !(config.together > 0.0) ? 0.0
                        : says_what_moves        ? kNeighbourhoodRatio
                                                 : kRatioOfUnknown;
-  *this = withHitOfScan(config.hit())
+  *this = withHitOfScan(RulesConfig::kHit)
               .withRemaining(kRemaining, fixedClasses(classes))
               // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
               .withNeighbourhood(ratio, askingClasses(classes), says_what_moves, reach)
@@ -62,12 +62,12 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
                            : c.living       ? config.living_stands_after
                                             : config.stands_after;
       *this = withFreeGain(c.id, says_what_moves ? kGainOfPassing : kGainOfUnknown,
-                           evidenceToStand(scans, config, resolution));
+                           evidenceToStand(scans, resolution));
     } else if (!c.unlabelled) {
       *this = withFreeGain(c.id, kGainOfFixed);
       const double confirmed = config.fixed_stands_after;  // half a hit may be missing
       if (confirmed > 1.0 && !c.ground)
-        *this = withConfirmation(c.id, kGainOfUnconfirmed, (confirmed - 0.5) * config.hit());
+        *this = withConfirmation(c.id, kGainOfUnconfirmed, (confirmed - 0.5) * RulesConfig::kHit);
     }
   }
 }

@@ -347,11 +347,7 @@ TEST(Bounds, SharesThatAreNoProbabilitiesAreCounted) {
 }
 
 TEST(Bounds, NoSettingMakesEvidenceInfinite) {
-  const char* const names[] = {"prior",
-                               "kernel/scale",
-                               "rules/hit_outweighs",
-                               "rules/void_outweighs",
-                               "rules/stands_after",
+  const char* const names[] = {"prior", "kernel/scale", "rules/void_outweighs", "rules/stands_after",
                                "rules/living_stands_after"};
   for (const char* name : names) {
     MapperConfig config;

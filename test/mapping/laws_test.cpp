@@ -486,7 +486,7 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   config.rules.enabled = true;
   config.rules.stands_after = 4.0;
   config.rules.living_stands_after = 8.0;
-  const auto hits = [&](double scans) { return static_cast<float>(scans * config.rules.hit()); };
+  const auto hits = [&](double scans) { return static_cast<float>(scans * RulesConfig::kHit); };
   EXPECT_EQ(rulesOf().freeGain(0, 0.0f), 1.0f) << "what is unlabelled";
   EXPECT_EQ(rulesOf().freeGain(1, hits(0.1)), 0.0f) << "what cannot move stays";
   config.rules.fixed_stands_after = 2.0;
