@@ -53,23 +53,15 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool c
     voids += sight == Sight::kVoid;
   }
   if (look == all.rend()) return kNotOverruled;
-  const auto has_stayed = [&] {
-    return stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, all.rend(), offset));
-  };
-  if (crossed == 0) return look->level() == 0 || has_stayed() ? kKept : kNotOverruled;
+  if (crossed == 0) {
+    const bool has_stayed =
+        stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, all.rend(), offset));
+    return look->level() == 0 || has_stayed ? kKept : kNotOverruled;
+  }
   if (voids >= kVoidsToClear) return kCleared;
   if (can_move && crossed >= kCrossedToClear && visitBefore(all.rbegin(), all.rend()) <= look)
     return kCleared;
-  if (!has_stayed()) return kNotOverruled;
-  // Hits at the ends of a run may have been at the ends of their intervals: those between count, and a tick.
-  std::uint64_t hits = 1, last = 0;
-  int intervals = 0;
-  for (; look != all.rend() && look->at(offset) != Sight::kVoid; ++look) {
-    if (look->at(offset) != Sight::kHit) continue;
-    if (++intervals > 2) hits += last;
-    last = look->length();
-  }
-  return hits >= kHitsOverCrossed * crossed ? kKept : kNotOverruled;
+  return kNotOverruled;
 }
 
 bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled) {

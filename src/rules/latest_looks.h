@@ -12,9 +12,6 @@ namespace bki_mapping {
 
 /// Number of intervals since the last hit in which a voxel was seen void, from which on it is free.
 constexpr int kVoidsToClear = 2;
-/// What has stayed long remains as long as it was hit for this many times as long as it has been crossed
-/// since.
-constexpr std::uint64_t kHitsOverCrossed = 3;
 /// A visit ends where the level of an interval is at least kVisitLevel, and at least kVisitLevels above that
 /// of the next one of its block: then nobody looked at the block in between for 2^(kVisitLevel - 2) ticks, 69
 /// s, or longer.
