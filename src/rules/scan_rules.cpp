@@ -71,7 +71,7 @@ double groundThreshold(double peak, double length, double height) {
 
 ScanLimitConfig limitsOf(const RulesConfig& rules) {
   ScanLimitConfig limits;
-  limits.hits_before_misses = limits.evidence_before_misses = true;
+  limits.hits_before_misses = true;
   limits.static_spread = false;
   limits.hits = RulesConfig::kHit;
   limits.free = RulesConfig::kCrossing;
@@ -81,7 +81,6 @@ ScanLimitConfig limitsOf(const RulesConfig& rules) {
 
 ScanRules::ScanRules(const ScanLimitConfig& config, const ClassTable& classes)
     : hits_before_misses(config.hits_before_misses),
-      evidence_before_misses(config.evidence_before_misses),
       free_threshold(static_cast<float>(config.free_threshold)),
       void_evidence(static_cast<float>(config.void_space)),
       fixed(fixedClasses(classes)) {
@@ -91,8 +90,8 @@ ScanRules::ScanRules(const ScanLimitConfig& config, const ClassTable& classes)
 
 void applyToHits(const ScanRules& rules, const LimitKernels& kernels, BlockSums& hits,
                  VoxelMask& is_protected) {
-  if (rules.hits_before_misses) is_protected |= hits.occupied;
-  if (rules.evidence_before_misses) {
+  if (rules.hits_before_misses) {
+    is_protected |= hits.occupied;
     for (const BlockSums::Plane& plane : hits) {
       is_protected |= atLeast(std::numeric_limits<float>::denorm_min(), plane, kernels);
     }

@@ -21,8 +21,8 @@ struct ScanRules {
   ScanRules() = default;
   ScanRules(const ScanLimitConfig& config, const ClassTable& classes);
 
-  bool hits_before_misses = false;      ///< a voxel that contains a hit takes no evidence for `free`
-  bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
+  /// A voxel that contains a hit, or to which a hit adds evidence, takes no evidence for `free`.
+  bool hits_before_misses = false;
   float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
   float most_free = std::numeric_limits<float>::infinity();
   /// Of evidence for `free`, only what exceeds this counts, before most_free limits it, unless that of the
@@ -32,7 +32,6 @@ struct ScanRules {
   bool keeps_looks = false;    ///< note when the scan looked at which voxels (Looks)
   ClassSet fixed;              ///< the classes that cannot move
 
-  bool protectsVoxels() const { return hits_before_misses || evidence_before_misses; }
   /// Whether the threshold depends on the voxel below.
   bool asksBelow() const { return free_threshold > 0.0f && std::isfinite(most_free); }
   /// More evidence for `free` than this makes no difference.

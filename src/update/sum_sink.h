@@ -71,7 +71,7 @@ class alignas(kThreadsApart) SumWorkspace {
 class GroupInWork {
  public:
   explicit GroupInWork(SumWorkspace& workspace) : workspace_(workspace) {
-    if (workspace.rules_.protectsVoxels()) workspace.protected_.fill({});
+    if (workspace.rules_.hits_before_misses) workspace.protected_.fill({});
     if (workspace.rules_.seeksVoids()) workspace.hit_.fill({});
     if (workspace.rules_.asksBelow()) workspace.reached_top_.fill(0);
   }
@@ -93,7 +93,7 @@ class SumSink {
 
   /// The voxels of the i-th block that take no evidence from what is added now.
   VoxelMask protectedOf(std::size_t i) const {
-    if (kind_ == Kind::kHits || !work_.rules_.protectsVoxels()) return {};
+    if (kind_ == Kind::kHits || !work_.rules_.hits_before_misses) return {};
     return work_.protected_[blocks_[i].slot_];
   }
 

@@ -206,7 +206,6 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.threads = 1;
       failEverywhere(config, fewPoints(0), fewPoints(1), on);
       config.scan_limit.hits_before_misses = true;
-      config.scan_limit.evidence_before_misses = true;
       config.scan_limit.hits = 0.2;
       config.scan_limit.free = 1e-3;
       config.scan_limit.free_threshold = 0.02;

@@ -105,7 +105,6 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     configs.emplace_back(mode + ", counting", config);
     config.kernel.type = KernelType::kSparse;
     config.scan_limit.hits_before_misses = true;
-    config.scan_limit.evidence_before_misses = true;
     config.scan_limit.hits = 0.05;
     config.scan_limit.free = 0.03;
     config.scan_limit.free_threshold = 0.002;

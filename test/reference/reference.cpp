@@ -365,13 +365,11 @@ Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
     return hitEvidence(voxel, *std::find_if(classes_.begin(), classes_.end(), is_asked));
   }
   Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
-  if (config_.scan_limit.evidence_before_misses) {
-    const Value hits = anyHit(voxel);
-    if (hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
-      value.slack += value.sum;
-    if (hits.sum >= 1e-6 * config_.kernel.scale) return Value();
-  }
   if (!config_.scan_limit.hits_before_misses) return value;
+  const Value hits = anyHit(voxel);
+  if (hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
+    value.slack += value.sum;
+  if (hits.sum >= 1e-6 * config_.kernel.scale) return Value();
   const Eigen::Vector3d centre = relativeCentre(voxel);
   for (const Point& hit : hits_) {
     const double outside = ((hit.p - centre) / config_.resolution).cwiseAbs().maxCoeff() - 0.5;

@@ -10,8 +10,9 @@ namespace bki_mapping {
 /// What one scan may add to a voxel; by default all of it, as in the paper. With RulesConfig::enabled, all
 /// but `blocks` follows from RulesConfig (limitsOf) and, for free_threshold, from the scan.
 struct ScanLimitConfig {
-  bool hits_before_misses = false;      ///< a voxel with a hit takes no evidence for `free` from its scan
-  bool evidence_before_misses = false;  ///< nor does a voxel to which a hit adds evidence
+  /// Whether a voxel that contains a hit, or to which a hit adds evidence, takes no evidence for `free` from
+  /// its scan.
+  bool hits_before_misses = false;
   /// Whether hits of classes that cannot move add evidence to all voxels within the kernel, as other hits do,
   /// or all of it to the voxel that contains them.
   bool static_spread = true;
