@@ -1,7 +1,7 @@
-"""Measures a preset on simulated drives and given sequences, with voxels of several sizes, and writes the table into a document.
+"""Measures a preset on simulated drives and given sequences, and writes the tables of a document.
 
-The table replaces what the document has between two marker lines; it says the date, the commit, and how many scans each
-simulated drive has. scripts/reproduce --quality calls it.
+A table replaces what the document has between its two marker lines; it says the date and the commit. Simulated drives have
+--scans scans, in rooms five times as many, because the robot there is slow. scripts/reproduce --quality calls this.
 """
 import argparse
 import datetime
@@ -10,38 +10,198 @@ import os
 from .programs import ROOT, Programs, commit
 from .tables import markdown
 
-# By how much each drive is longer than --scans: the robot in rooms is slow.
-SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'rooms': 5}
+SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'queue': 1, 'rooms': 5}  # by how much each drive is longer
 RESOLUTIONS = (0.1, 0.2, 0.3, 0.6)
-BEGIN, END = '<!-- quality: written by scripts/reproduce --quality -->\n', '<!-- end of quality -->\n'
-HEADER = ['drive', 'voxel [m]', 'SA', 'parked', 'holes', 'DA', 'DA where decidable', 'PA to 50 m']
-INTRODUCTION = '''Measured on {date}, commit {commit}, preset `{preset}`, {scans} scans of each simulated drive, in rooms {rooms};
-all figures in %. A cell without a figure: the drive has no such points.
-
-'''
-
-
-def figures_of(report):
-    """The figures of a row [fraction], of a report of evaluate_map; None where there are no such points."""
-    far = report['presence']['by_distance'][1]
-    return [report[name] for name in ('sa', 'sa_standing', 'floor_holes', 'da', 'da_decidable')] + [far['pa_moving']]
+FEW = ('04', 'traffic', 'crowd', 'street')  # drives on which settings are compared, if they are measured at all
+LIDARS = {'hdl64': 64, 'hdl32': 32, 'vlp16': 16}  # and their rows
+HEIGHTS = {'street': (0.6, 1.0, 1.7, 2.5), 'crowd': (0.6, 1.0, 1.7, 2.5), 'rooms': (0.35, 0.6, 1.0, 1.7)}
+JUDGED = ('stands_after=3', 'stands_after=8', 'living_stands_after=6', 'living_stands_after=20', 'together=0',
+          'together=0.3', 'together=0.9')
+MEASURED = ('void_outweighs=0', 'void_outweighs=20', 'void_outweighs=60')
+FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81}  # raw labels in rooms
+SHAKEN = ('--pose-noise', '0.05,0.3')
 
 
-def row_of(drive, resolution, report):
-    return [drive, f'{resolution:g}'] + ['' if value is None else f'{100 * value:.1f}' for value in figures_of(report)]
+def share(report, *path):
+    """A fraction of a report of evaluate_map in percent; '' where nothing is counted."""
+    for name in path:
+        report = report[name]
+    return '' if report is None else f'{100 * report:.1f}'
 
 
-def replaced(text, table):
-    """The text of the document with another table between the markers."""
-    if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
-        raise SystemExit(f'the document must have the lines {BEGIN.strip()} and {END.strip()}, once and in this order')
-    return text[:text.index(BEGIN)] + BEGIN + table + text[text.index(END):]
+def emptiness(report):
+    """The least fraction of free voxels that are mostly empty, of all distances, in percent."""
+    of_distances = (each['free_precision'] for each in report['truth']['by_distance'])
+    return f'{100 * min(each for each in of_distances if each is not None):.1f}'
 
 
-def measured(programs, sequences, resolutions, more=()):
-    """The rows of the table, one for each drive and resolution."""
-    return [row_of(name, resolution, programs.evaluate(sequence, {'resolution': resolution}, more))
-            for name, sequence in sequences.items() for resolution in resolutions]
+def delay(report, name):
+    """Median and 95 % quantile of a time [s]."""
+    times = report['presence'][name]
+    return ', '.join(value if isinstance(value, str) else '-' if value is None else f'{value:.1f}'
+                     for value in (times['median'], times['p95']))
+
+
+SA, PARKED, HOLES, DA, DECIDABLE = (('SA', lambda r: share(r, 'sa')), ('parked', lambda r: share(r, 'sa_standing')),
+                                    ('holes', lambda r: share(r, 'floor_holes')), ('DA', lambda r: share(r, 'da')),
+                                    ('DA where decidable', lambda r: share(r, 'da_decidable')))
+PA20, PA50 = ((f'PA to {distance} m', lambda r, n=n: share(r, 'presence', 'by_distance', n, 'pa_moving'))
+              for n, distance in enumerate((20, 50)))
+EMPTY = ('mostly empty', emptiness)
+MIOU, INPUT = ('mIoU', lambda r: share(r, 'miou_map_present')), ('input', lambda r: share(r, 'miou_input_present'))
+APPEAR, CLEAR = (('appear [s]', lambda r: delay(r, 'appear')), ('clear [s]', lambda r: delay(r, 'clear')))
+STAYED = ('stayed', lambda r: share(r, 'presence', 'stayed_present'))
+
+
+class Runs:
+    """The reports of evaluate_map; none is measured twice."""
+
+    def __init__(self, programs, presets=f'{ROOT}/config/presets', preset='robot', classes='semantic_kitti', threads=0):
+        self._programs, self._presets, self._preset, self._classes = programs, presets, preset, classes
+        self._threads, self._reports = ['--threads', str(threads)], {}
+
+    def report(self, sequence, settings=(), more=(), preset=None, classes=None):
+        """settings: text such as 'resolution=0.1'."""
+        key = sequence, tuple(settings), tuple(more), preset or self._preset, classes or self._classes
+        if key not in self._reports:
+            words = ['--config', os.path.join(self._presets, key[3] + '.yaml'), '--classes', key[4], *self._threads, *more]
+            self._reports[key] = self._programs.evaluate(sequence, dict(each.split('=') for each in settings), words)
+        return self._reports[key]
+
+
+def by_drive(runs, sequences, variants):
+    """One row for each drive. variants: for each of them, its name, arguments of Runs.report, and columns."""
+    header = ['drive'] + [': '.join(filter(None, (name if n == 0 else '', title)))
+                          for name, _, columns in variants for n, (title, _) in enumerate(columns)]
+    return markdown(header, [[drive] + [of(runs.report(sequence, **arguments)) for _, arguments, columns in variants
+                                        for _, of in columns] for drive, sequence in sequences.items()])
+
+
+def measured(runs, sequences, resolutions):
+    """The rows of the table of resolutions, one for each drive and resolution."""
+    columns = (SA, PARKED, HOLES, DA, DECIDABLE, PA50)
+    return [[drive, f'{resolution:g}'] + [of(runs.report(sequence, [f'resolution={resolution}'])) for _, of in columns]
+            for drive, sequence in sequences.items() for resolution in resolutions]
+
+
+def table_of_resolutions(runs, sequences, resolutions):
+    return markdown(['drive', 'voxel [m]', 'SA', 'parked', 'holes', 'DA', 'DA where decidable', 'PA to 50 m'],
+                    measured(runs, sequences, resolutions))
+
+
+def table_of_sensors(runs, programs, scans):
+    """For each scene, height and lidar: SA / parked / holes / DA where decidable / mostly empty."""
+    rows = []
+    for scene, heights in HEIGHTS.items():
+        for height in heights:
+            row = [scene, f'{height:g}']
+            for lidar in LIDARS:
+                count = SCENES[scene] * scans
+                drive = programs.simulate(f'{scene}{count}_{lidar}_{height:g}', scene=scene, scans=count, lidar=lidar,
+                                          height=height)
+                report = runs.report(drive)
+                row.append(' / '.join(of(report) or '-' for _, of in (SA, PARKED, HOLES, DECIDABLE, EMPTY)))
+            rows.append(row)
+    return markdown(['scene', 'height [m]'] + [f'{rows} rows' for rows in LIDARS.values()], rows)
+
+
+def table_of_settings(runs, sequences):
+    """Parked and DA of each setting, on a few drives."""
+    drives = {drive: sequences[drive] for drive in FEW if drive in sequences}
+    judge = [word for each in JUDGED for word in ('--judge', 'rules/' + each)]
+
+    def cell(figures):
+        return f"{share(figures, 'sa_standing')}, {share(figures, 'da')}"
+    rows = [['`robot`'] + [cell(runs.report(sequence, more=judge)) for sequence in drives.values()]]
+    for n, each in enumerate(JUDGED):
+        rows.append([f"`rules/{each.replace('=', '` ')}"]
+                    + [cell(runs.report(sequence, more=judge)['judged'][n]) for sequence in drives.values()])
+    for each in MEASURED:
+        rows.append([f"`rules/{each.replace('=', '` ')}"]
+                    + [cell(runs.report(sequence, ['rules/' + each])) for sequence in drives.values()])
+    return markdown(['setting', *drives], rows)
+
+
+def table_without_labels(runs, sequences):
+    """If no point has a label, and the height of the sensor is set; in rooms with several settings."""
+    columns = (SA, DA, DECIDABLE, PA50)
+    cases = [(drive, '', 1.73, []) for drive in sequences if drive != 'rooms'] + [
+        ('rooms', '', 0.35, []), ('rooms', ', 0.1 m', 0.35, ['resolution=0.1']),
+        ('rooms', ', 0.1 m, `rules/void_outweighs` 1', 0.35, ['resolution=0.1', 'rules/void_outweighs=1'])]
+    rows = []
+    for drive, name, height, settings in cases:
+        report = runs.report(sequences[drive], [f'sensor_model/height={height}', *settings], classes='occupancy')
+        kept = {each['label']: share(each, 'sa') for each in report['sa_by_label']} if drive == 'rooms' else {}
+        rows.append([drive + name] + [of(report) for _, of in columns] + [kept.get(label, '') for label in FURNITURE.values()])
+    return markdown(['drive', *(title for title, _ in columns), *FURNITURE], rows)
+
+
+def table_of_presence(runs, sequences):
+    """What comes and goes; of each pair of figures, the second is OctoMap's."""
+    columns = (PA20, PA50, APPEAR, CLEAR, STAYED, SA, PARKED, HOLES, DA)
+    rows = []
+    for drive, sequence in sequences.items():
+        report = runs.report(sequence, more=['--octomap', 'default'])
+        pairs = ((of(report), of(report['octomap'][0])) for _, of in columns)
+        rows.append([drive] + [' / '.join(pair) if any(pair) else '-' for pair in pairs])
+    return markdown(['drive', *(title for title, _ in columns)], rows)
+
+
+def tables_of(runs, programs, given, sequences):
+    """For each name of a table, what measures it."""
+    robot = (SA, PARKED, HOLES, DA)
+    noise = ['--label-noise', '0.3']
+    of_class, of_occupancy = (('', lambda r, kind=kind: share(r, kind + '_calibration_error'))
+                              for kind in ('class_probability', 'occupancy'))
+
+    def some(*drives):
+        return {drive: sequences[drive] for drive in drives if drive in sequences}
+
+    def kinds():
+        return by_drive(runs, some('04', '05', 'street'), [
+            (kind, {'more': [*noise, '--label-errors', kind]}, (INPUT, ('`robot`', MIOU[1])))
+            for kind in ('even', 'network', 'objects')])
+
+    def shaken():
+        return by_drive(runs, some('04', '05', 'traffic'), [
+            (f'`{name}` {value}', {'settings': [f'{name}={value}'], 'more': SHAKEN}, robot)
+            for name, value in (('resolution', 0.1), ('resolution', 0.6), ('rules/stands_after', 3),
+                                ('rules/void_outweighs', 20), ('rules/void_outweighs', 120))])
+
+    def calibration():
+        variants = [(f'{kind}, `{preset}`{wrong}', {'preset': preset, 'more': more}, (of,))
+                    for kind, of in (('class', of_class), ('occupancy', of_occupancy))
+                    for preset in ('paper_none', 'paper_line', 'robot') for wrong, more in (('', []), (', wrong', noise))]
+        return by_drive(runs, {d: s for d, s in sequences.items() if d not in SCENES or d == 'street'}, variants)
+
+    return {
+        'quality': lambda: table_of_resolutions(runs, sequences, given.resolution),
+        'paper': lambda: by_drive(runs, sequences, [('', {'preset': 'paper_line'}, (*robot, DECIDABLE, PA50))]),
+        'sensors': lambda: table_of_sensors(runs, programs, given.scans),
+        'settings': lambda: table_of_settings(runs, sequences),
+        'no labels': lambda: table_without_labels(runs, sequences),
+        'presence': lambda: table_of_presence(runs, {d: s for d, s in sequences.items() if d not in ('street', 'rooms')}),
+        'labels': lambda: by_drive(runs, sequences, [('right', {}, (*robot, MIOU)),
+                                                     ('0.3 wrong', {'more': noise}, (*robot, MIOU, INPUT))]),
+        'errors': kinds,
+        'poses': lambda: by_drive(runs, sequences, [('true', {}, robot), ('independent', {'more': SHAKEN}, (*robot, PA50)),
+                                                    ('accumulating', {'more': ('--pose-drift', '0.01,0.05')}, robot)]),
+        'shaken': shaken,
+        'calibration': calibration,
+    }
+
+
+def marks(name):
+    """The lines before and after a table in the document."""
+    return f'<!-- {name}: written by scripts/reproduce --quality -->\n', f'<!-- end of {name} -->\n'
+
+
+def replaced(text, name, table):
+    """The text of the document with another table between its marks."""
+    begin, end = marks(name)
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise SystemExit(f'the document must have the lines {begin.strip()} and {end.strip()}, once and in this order')
+    return text[:text.index(begin)] + begin + table + text[text.index(end):]
 
 
 def main():
@@ -50,35 +210,41 @@ def main():
                         help='folder with the programs of the package')
     parser.add_argument('--scratch', required=True, help='folder for simulated drives')
     parser.add_argument('--document', default=f'{ROOT}/docs/quality.md', help='document with the marker lines')
+    parser.add_argument('--table', action='append', default=[], metavar='NAME', help='table to write; repeatable; default: all')
     parser.add_argument('--presets', default=f'{ROOT}/config/presets', help='folder with the presets')
     parser.add_argument('--preset', default='robot', help='the preset to measure')
     parser.add_argument('--classes', default=f'{ROOT}/config/classes/semantic_kitti.yaml', help='class table')
     parser.add_argument('--scans', type=int, default=60,
                         help='number of scans of each simulated drive; in rooms, five times as many')
-    parser.add_argument('--resolution', type=float, nargs='+', default=RESOLUTIONS, help='edges of voxels [m]')
+    parser.add_argument('--resolution', type=float, nargs='+', default=RESOLUTIONS,
+                        help='edges of voxels in the table named quality [m]')
     parser.add_argument('--threads', type=int, default=0, help='threads of the mapper; 0: all cores')
     parser.add_argument('--commit', help='commit of the programs; default: that of this tree')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
     given = parser.parse_args()
     programs = Programs(given.programs, os.path.abspath(given.scratch))
-    with open(given.document) as file:
-        text = file.read()
-    replaced(text, '')  # fails before the measurement, not after it
+    runs = Runs(programs, given.presets, given.preset, given.classes, given.threads)
     sequences = {os.path.basename(os.path.abspath(path)): path for path in given.sequence}
-    for scene, times in SCENES.items():
-        scans = times * given.scans
-        sequences[scene] = programs.simulate(f'{scene}{scans}', scene=scene, scans=scans)
-    more = ['--config', os.path.join(given.presets, given.preset + '.yaml'), '--classes', given.classes,
-            '--threads', str(given.threads)]
-    rows = measured(programs, sequences, given.resolution, more)
-    introduction = INTRODUCTION.format(date=datetime.date.today(), commit=given.commit or commit(), preset=given.preset,
-                                       scans=given.scans, rooms=SCENES['rooms'] * given.scans)
+    tables = tables_of(runs, programs, given, sequences)
+    names = given.table or list(tables)
+    if not set(names) <= set(tables):
+        raise SystemExit(f'--table must be one of {", ".join(tables)}')
     with open(given.document) as file:
         text = file.read()
-    with open(given.document, 'w') as file:
-        file.write(replaced(text, '\n' + introduction + markdown(HEADER, rows) + '\n'))
-    print(f'    {given.document}', flush=True)
+    for name in names:
+        replaced(text, name, '')  # fails before the measurement, not after it
+    for scene, times in SCENES.items():
+        sequences[scene] = programs.simulate(f'{scene}{times * given.scans}', scene=scene, scans=times * given.scans)
+    source = (f'Measured on {datetime.date.today()}, commit {given.commit or commit()}, {given.scans} scans of each simulated '
+              f"drive, in rooms {SCENES['rooms'] * given.scans}:\n\n")
+    for name in names:
+        table = '\n' + source + tables[name]() + '\n'
+        with open(given.document) as file:
+            text = file.read()
+        with open(given.document, 'w') as file:
+            file.write(replaced(text, name, table))
+        print(f'    {given.document}: {name}', flush=True)
 
 
 if __name__ == '__main__':

@@ -81,18 +81,36 @@ class Figures(unittest.TestCase):
             self.assertEqual(figures['drive'], figures['again'])
             self.assertGreater(figures['drive']['sa'], 0.5)
 
-    def test_the_table_of_quality_replaces_that_between_its_markers(self):
-        preset = os.path.join(SOURCE, 'config', 'presets', 'robot.yaml')
-        rows = quality.measured(self.programs, {'drive': self.drive}, (0.2, 0.4), ['--config', preset])
+    def test_the_tables_of_quality(self):
+        runs, sequences = quality.Runs(self.programs), {'drive': self.drive}
+        rows = quality.measured(runs, sequences, (0.2, 0.4))
         self.assertEqual([row[:2] for row in rows], [['drive', '0.2'], ['drive', '0.4']])
         for row in rows:
-            self.assertEqual(len(row), len(quality.HEADER))
-            self.assertGreater(float(row[quality.HEADER.index('SA')]), 95.0)
-        self.assertEqual(quality.replaced(f'a\n{quality.BEGIN}old\n{quality.END}b\n', 'new\n'),
-                         f'a\n{quality.BEGIN}new\n{quality.END}b\n')
-        for text in ('no markers', quality.END + quality.BEGIN, 2 * (quality.BEGIN + quality.END)):
+            self.assertEqual(len(row), 8)
+            self.assertGreater(float(row[2]), 95.0)  # SA
+        variants = [('right', {}, (quality.SA, quality.MIOU)), ('wrong', {'more': ['--label-noise', '0.3']}, (quality.MIOU,))]
+        header, _, row = quality.by_drive(runs, sequences, variants).splitlines()
+        self.assertEqual(header, '| drive | right: SA | mIoU | wrong: mIoU |')
+        right, wrong = (float(cell) for cell in row.split('|')[3:5])
+        self.assertGreater(right, wrong)
+        self.assertIn('`rules/together` 0.9', quality.table_of_settings(runs, {'street': self.drive}))
+        with unittest.mock.patch.object(self.programs, 'evaluate', side_effect=AssertionError('measured twice')):
+            self.assertEqual(quality.measured(runs, sequences, (0.2, 0.4)), rows)
+
+    def test_a_table_of_quality_replaces_that_between_its_marks(self):
+        begin, end = quality.marks('x')
+        others = ''.join(quality.marks('y'))
+        self.assertEqual(quality.replaced(f'{others}a\n{begin}old\n{end}b\n', 'x', 'new\n'), f'{others}a\n{begin}new\n{end}b\n')
+        for text in ('no marks', end + begin, 2 * (begin + end)):
             with self.assertRaises(SystemExit):
-                quality.replaced(text, 'new\n')
+                quality.replaced(text, 'x', 'new\n')
+
+    def test_the_document_has_marks_for_each_table_of_quality(self):
+        given = unittest.mock.Mock(scans=1, resolution=(0.3,))
+        with open(f'{SOURCE}/docs/quality.md') as file:
+            text = file.read()
+        for name in quality.tables_of(None, None, given, {}):
+            quality.replaced(text, name, '')
 
     def test_tradeoff_and_views(self):
         modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}
