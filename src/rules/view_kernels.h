@@ -30,7 +30,8 @@ struct BlockPlanes {
   EvidenceUnits most_vote;                ///< StateRules::mostVote
   std::array<Plane, kMaxClasses> planes;  ///< of classes, by rising id; the first `count`
   std::size_t count = 0;
-  const EvidenceUnits* free = nullptr;  ///< zeros if the block has no plane for `free`
+  const EvidenceUnits* free = nullptr;   ///< zeros if the block has no plane for `free`
+  EvidenceUnits most_free = kMostUnits;  ///< StateRules::mostFree
   bool has_free = false;
   const Overruled* overruled = nullptr;  ///< nullptr: none is
 };

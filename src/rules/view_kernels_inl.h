@@ -47,6 +47,11 @@ struct CompensatedSum {
   return kEvidenceUnit * ConvertTo<FloatVec>(units);
 }
 
+/// The evidence for `free` as far as it counts [units].
+[[gnu::always_inline]] inline IntVec freeOf(const BlockPlanes& planes, int v) {
+  return Min(Max(LoadU(planes.free + v), IntVec{}), Set(planes.most_free));
+}
+
 /// What one pass over the planes finds.
 struct Likeliest {
   IntVec best;    ///< evidence of the class with the most [units]
@@ -243,7 +248,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
   const Priors prior(*planes.map);
   int unknown = -1;  // first voxel of a vector without any evidence: all these vectors are alike
   for (int v = 0; v < kBlockVoxels; v += kLanes) {
-    const IntVec free = Max(LoadU(planes.free + v), IntVec{});
+    const IntVec free = freeOf(planes, v);
     Likeliest found = findLikeliest<kPosterior>(planes, v);
     const Mask is_known = (found.best | free) != 0;
     const Likeliest likeliest = found;
@@ -281,7 +286,7 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
   static_assert(kLayer % kLanes == 0, "vectors end with a layer");
   IntVec any = {};
   for (int v = kLayer * layers.begin; v < kLayer * layers.end; v += kLanes) {
-    const IntVec free = Max(LoadU(planes.free + v), IntVec{});
+    const IntVec free = freeOf(planes, v);
     Likeliest found = findLikeliest<true>(planes, v);
     IntVec asks = {};
     for (std::size_t p = 0; p < planes.count; ++p) {

@@ -52,8 +52,8 @@ class VoidSearch {
 
   std::vector<SeenVoxels> seen_;
   std::vector<Beside> beside_;
-  std::vector<VoxelMask> empty_;              ///< crossed or bridged
-  std::vector<VoxelMask> along_x_;            ///< seen, with both neighbours along x
+  std::vector<VoxelMask> empty_;    ///< crossed or bridged
+  std::vector<VoxelMask> along_x_;  ///< seen, with both neighbours along x
   std::vector<VoxelMask> voids_;
 };
 

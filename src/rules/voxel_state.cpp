@@ -37,7 +37,7 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
   for (std::size_t i = 0; i < classes.size(); ++i) {
     const EvidenceUnits units = std::max(block.plane(i)[offset], 0);
     if (classes[i] == kFreeClass) {
-      own.free = units;
+      own.free = std::min(units, rules.mostFree());
       continue;
     }
     own.of_classes += units;
@@ -120,6 +120,7 @@ BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Bloc
   planes.rules = &rules;
   planes.most_vote = rules.mostVote();
   planes.free = kNoEvidence;
+  planes.most_free = rules.mostFree();
   for (std::size_t p = 0; p < block.classes().size(); ++p) {
     const ClassId id = block.classes()[p];
     if (id == kFreeClass) {

@@ -332,6 +332,24 @@ TEST(VoxelState, WhatStandsOutweighsTheGain) {
   EXPECT_EQ(state(4.0f, 4.5f, 1.0), VoxelState::kFree) << "until it has been gone for as long";
 }
 
+TEST(VoxelState, WhereLooksDecideSpaceThatWasLongFreeCountsForSoMuch) {
+  const StateRules sum = StateRules().withHitOfScan(0.01), latest = sum.withLatest(true);
+  const auto stateOf = [](const StateRules& rules, float hits) {
+    const SemanticMap map = mapWith({{1, hits}, {kFreeClass, 3000.0f}}, 77);
+    const Block& block = *map.find({{0, 0, 0}});
+    BlockView whole;
+    readBlock(map, rules, {{0, 0, 0}}, block, BlockFields::kStates, whole);
+    const VoxelState state = viewVoxel(map, rules, {{0, 0, 0}}, block, 77).state;
+    EXPECT_EQ(whole.state[77], state);
+    return state;
+  };
+  EXPECT_EQ(stateOf(latest, 3.001f), VoxelState::kOccupied) << "hit in 300 scans";
+  EXPECT_EQ(stateOf(latest, 2.999f), VoxelState::kFree);
+  EXPECT_EQ(stateOf(sum, 3.001f), VoxelState::kFree);
+  EXPECT_EQ(stateOf(StateRules().withLatest(true), 3.001f), VoxelState::kFree)
+      << "no scan's evidence is known";
+}
+
 TEST(VoxelState, GainsWithoutEvidenceForFreeMakeNothingFree) {
   const SemanticMap map = mapWith({{1, 0.4f}}, 77);
   const StateRules rules = StateRules().withFreeGain(1, 1000.0);

@@ -77,6 +77,15 @@ class StateRules {
   bool latestDecides() const { return latest_decides_; }
   StateRules withLatest(bool decides) const;
 
+  /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
+  /// kMostFree scans. What has been hit in more stands until it is seen void, however long space was free
+  /// before it came.
+  EvidenceUnits mostFree() const {
+    if (!latest_decides_ || !(hit_of_scan_ > 0.0f)) return kMostUnits;
+    return unitsOf(kMostFree * std::min(static_cast<double>(hit_of_scan_), 1.0));
+  }
+  static constexpr int kMostFree = 300;
+
   /// Whether equal blocks, with equal blocks around, have the same states and labels by these
   /// rules and by the others.
   bool decidesAs(const StateRules& other) const;
