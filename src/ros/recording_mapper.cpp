@@ -25,8 +25,9 @@ std::string secondsText(const ros::Time& stamp) {
 }  // namespace
 
 RecordingMapper::RecordingMapper(SemanticMapper& mapper, const ServerConfig& config,
-                                 const std::vector<InputConfig>& inputs, Listener listener)
+                                 const std::vector<InputConfig>& inputs, Listener listener, KeptScans* kept)
     : mapper_(mapper),
+      kept_(kept),
       frame_(config.frame_id),
       on_time_jump_(config.on_time_jump),
       listener_(std::move(listener)),
@@ -86,8 +87,15 @@ void RecordingMapper::map(const WaitingCloud& waiting) {
   if (refused) drop(waiting.input, waiting.cloud->header, refused->reason, refused->why);
 }
 
+ScanStats RecordingMapper::addToMap(const PlacedScan& placed, const std::string& sensor_frame) {
+  if (!kept_) return mapper_.integrate(placed.scan);
+  kept_->update();
+  return kept_->integrate(placed.scan, placed.T_map_sensor, sensor_frame);
+}
+
 void RecordingMapper::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
-  const ScanStats stats = mapper_.integrate(placed.scan);
+  const std::string sensor_frame = readers_[waiting.input].sensorFrame(*waiting.cloud);
+  const ScanStats stats = addToMap(placed, sensor_frame);
   ledger_.integrated(waiting.cloud->header, stats, 0.0, ScanLedger::Clock::now());
   ledger_.unlistedLabels(placed.unlisted_labels);
   points_[waiting.input].add(stats.counts, placed.unlisted_labels);
@@ -97,11 +105,12 @@ void RecordingMapper::integrate(const WaitingCloud& waiting, const PlacedScan& p
   for (const std::string& sentence : sentences.warnings) listener_.warn(sentence);
   for (const std::string& sentence : sentences.notes) listener_.inform(sentence);
   points_[waiting.input].label_remedy = notes.labelRemedy();
-  poses_.watchJumps(frame_, readers_[waiting.input].sensorFrame(*waiting.cloud),
-                    ros::Time().fromNSec(placed.scan.stamp));
+  poses_.watchJumps(frame_, sensor_frame, ros::Time().fromNSec(placed.scan.stamp));
   for (const TfJump& jump : poses_.takeJumps()) {
     ledger_.tfJumped();
-    warnOnce(sentenceOf(jump) + "; map a recording with the corrected poses");
+    if (kept_) kept_->noteJump(jump.stamp.toNSec());
+    warnOnce(sentenceOf(jump) + (kept_ ? "; correct the map file with correct_map"
+                                       : "; map a recording with the corrected poses"));
   }
   const std::string far = farFromOriginWarning(placed.scan.origin, mapper_.config().resolution, frame_);
   if (!far.empty()) warnOnce(far);
@@ -131,6 +140,7 @@ void RecordingMapper::onTimeJump(const ros::Time& new_time) {
   const bool forget = on_time_jump_ == OnTimeJump::kReset;
   if (forget) {
     mapper_.reset();
+    if (kept_) kept_->reset();
     drive_ = {};
     listener_.forgotten();
   }

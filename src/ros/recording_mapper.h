@@ -10,6 +10,7 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/store/map_file.h"
+#include "journal/kept_scans.h"
 #include "ros/input_notes.h"
 #include "ros/map_cloud.h"
 #include "ros/point_account.h"
@@ -37,8 +38,9 @@ class RecordingMapper {
   static constexpr double kLongestWait = 10.0;
 
   /// @param mapper must outlive this. @param inputs with the topics as sentences name them.
+  /// @param kept the scans of the mapper, if they are to be kept; must outlive this.
   RecordingMapper(SemanticMapper& mapper, const ServerConfig& config, const std::vector<InputConfig>& inputs,
-                  Listener listener);
+                  Listener listener, KeptScans* kept = nullptr);
 
   // All messages are added in the order of their recording.
   void addTransforms(const tf2_msgs::TFMessage& message, bool is_static);
@@ -65,11 +67,13 @@ class RecordingMapper {
  private:
   void map(const WaitingCloud& waiting);
   void integrate(const WaitingCloud& waiting, const PlacedScan& placed);
+  ScanStats addToMap(const PlacedScan& placed, const std::string& sensor_frame);
   void drop(std::size_t input, const std_msgs::Header& header, DropReason reason, const std::string& why);
   void onTimeJump(const ros::Time& new_time);
   void warnOnce(const std::string& sentence);
 
   SemanticMapper& mapper_;
+  KeptScans* kept_;
   std::string frame_;
   OnTimeJump on_time_jump_;
   Listener listener_;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
+#include <memory>
 #include <set>
 #include <sstream>
 
@@ -15,6 +16,7 @@
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "export/ordered_json.h"
+#include "journal/kept_scans.h"
 #include "ros/recording_mapper.h"
 #include "ros/server_config.h"
 #include "tools/bag_files.h"
@@ -53,6 +55,7 @@ po::options_description options() {
       "allow-empty", po::bool_switch(), "write the map even if no cloud has a transform")(
       "print-topics", po::bool_switch(), "print the topics with clouds, and the number of clouds, and exit");
   tools::addMapOutput(options);
+  tools::addJournal(options);
   options.add(tools::mapperOptions());
   return options;
 }
@@ -78,6 +81,16 @@ std::pair<ros_interface::ServerConfig, MapperConfig> settings(const po::variable
   std::pair<ros_interface::ServerConfig, MapperConfig> both;
   ros_interface::setParameters(values, both.first, both.second);
   return both;
+}
+
+/// What keeps the scans of a mapper; nullptr if nothing asks for it.
+std::unique_ptr<KeptScans> keptScans(const po::variables_map& given,
+                                     const ros_interface::ServerConfig& server, SemanticMapper& mapper) {
+  MapCorrector::Settings settings;
+  settings.quantum =
+      given.count("journal") ? given["journal"].as<double>() : server.correction.journal_quantum;
+  if (given.count("journal") == 0 && !server.correction.journal) return nullptr;
+  return std::make_unique<KeptScans>(mapper, settings);
 }
 
 /// The inputs, with their topics as the bags name them.
@@ -209,13 +222,18 @@ std::string progressText(const Run& run) {
 }
 
 /// Writes the map, and the other files that are asked for. @param drive of the clouds, without scans if none
-/// was mapped. @param frame of the map, in tf.
+/// was mapped. @param kept the scans; may be nullptr. @param frame of the map, in tf.
 void write(const po::variables_map& given, const SemanticMapper& mapper, const Run& run,
-           const DriveRecord& drive, const std::string& frame, const MappingStatus& status) {
+           const DriveRecord& drive, const KeptScans* kept, const std::string& frame,
+           const MappingStatus& status) {
   std::vector<DriveRecord> drives;
   if (drive.scans > 0) drives.push_back(drive);
+  JournalOutput journal;
+  journal.kept = kept;
+  journal.drive = drive.id;
   tools::writeMap(given, mapper,
-                  given.count("frame-in-file") ? given["frame-in-file"].as<std::string>() : frame, drives);
+                  given.count("frame-in-file") ? given["frame-in-file"].as<std::string>() : frame, drives,
+                  std::move(journal));
   if (given.count("report")) {
     writeTextFile(given["report"].as<std::string>(), reportText(mapper, run.scans, status));
   }
@@ -261,7 +279,8 @@ int mapBag(const po::variables_map& given) {
   }
 
   Run run;
-  RecordingMapper recording(mapper, server, from, listenerOf(run));
+  const std::unique_ptr<KeptScans> kept = keptScans(given, server, mapper);
+  RecordingMapper recording(mapper, server, from, listenerOf(run), kept.get());
   tools::BagReading reading(bags, topics, recording);
   const tools::CloudRange range = rangeOf(given, reading);
   const tools::CloudRange done = reading.map(range, interruption, [&](std::size_t count) {
@@ -278,9 +297,11 @@ int mapBag(const po::variables_map& given) {
   DriveRecord drive = recording.drive();
   drive.id = given.count("drive") ? given["drive"].as<std::string>() : bags.names() + "/" + numbers(done);
   drive.name = bags.text();
-  write(given, mapper, run, drive, server.frame_id,
+  if (kept) kept->finish();
+  write(given, mapper, run, drive, kept.get(), server.frame_id,
         recording.ledger().status(ros_interface::ScanLedger::Clock::now(), 0));
   std::cout << counts << "\n" << tools::summaryText(mapper, run.scans);
+  if (kept) std::cout << tools::summaryText(*kept);
   if (done.last < range.last) throw tools::Stopped(stoppedText(given, done, range.last));
   if (fault.empty()) return 0;
   std::cerr << "map_bag: not all clouds could be mapped: " << fault << " (" << counts << ")\n";

@@ -10,7 +10,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "core/atomic_file.h"
-#include "tools/journal_output.h"
+#include "journal/journal_output.h"
 #include "tools/options.h"
 
 namespace bki_mapping::tools {
@@ -21,6 +21,14 @@ inline void addMapOutput(po::options_description& options) {
                         "file for the map: .bkm holds all of it, .ply or .pcd its voxels as points")(
       "include", textOption("STATES")->default_value("occupied"),
       "voxels in a .ply or .pcd file: occupied,free,occluded");
+}
+
+/// Adds --journal, of programs that write a map file.
+inline void addJournal(po::options_description& options) {
+  options.add_options()("journal", realOption("--journal", 1e-4, 1.0)->value_name("METRES"),
+                        "keep the scans in the map file, where correct_map can move them; their points are "
+                        "rounded to multiples of this in the sensor's frame, as with the parameter journal "
+                        "of a node");
 }
 
 /// Checks both before long work. @throws std::invalid_argument, or as checkWritable().

@@ -47,6 +47,7 @@ po::options_description options() {
       "print-config", po::bool_switch(), "print the effective parameters as YAML, and exit")(
       "print-classes", po::bool_switch(), "print the file of the class table, and exit");
   tools::addJournal(options);
+  tools::addTrajectoryUpdates(options);
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -160,7 +161,7 @@ int mapSequence(const po::variables_map& given) {
   drive.id = driveId(given, sequence, first, last);
   drive.name = sequence.folder();
   std::vector<DriveRecord> drives;
-  tools::JournalOutput kept;
+  JournalOutput kept;
   if (given.count("resume")) {
     const std::string path = given["resume"].as<std::string>();
     DriveRecord planned = drive;
@@ -169,8 +170,7 @@ int mapSequence(const po::variables_map& given) {
     planned.last_stamp = sequence.stamp(last - 1);
     drives = resume(mapper, path, planned, given["allow-overlap"].as<bool>());
     if (given.count("output")) warnOfParts(path);
-    if (tools::writesMapFile(given))
-      kept.continued = tools::withJournal(path, given["output"].as<std::string>());
+    if (tools::writesMapFile(given)) kept.continued = withJournal(path, given["output"].as<std::string>());
   }
 
   const auto journal = tools::JournalledMapping::begin(given, mapper);
@@ -201,9 +201,9 @@ int mapSequence(const po::variables_map& given) {
     throw tools::Stopped("stopped before the first scan; nothing was written");
   }
   if (stopped) drive.id = idOfPart(sequence, first, end, drives, drive.id);
-  if (journal) extendBounds(drive, journal->corrector().journal(), mapper.map());
+  if (journal) extendBounds(drive, journal->kept().corrector().journal(), mapper.map());
   if (tools::writesMapFile(given) && drive.scans > 0) drives.push_back(drive);
-  if (given.count("journal")) kept.corrector = &journal->corrector();
+  if (given.count("journal")) kept.kept = &journal->kept();
   kept.drive = drive.id;
   tools::writeMap(given, mapper, kFrame, drives, std::move(kept));
   std::size_t cleaned = mapped.size();

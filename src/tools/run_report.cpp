@@ -2,12 +2,14 @@
 
 #include <sys/resource.h>
 
+#include <cmath>
 #include <iomanip>
 #include <map>
 #include <sstream>
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/rules/voxel_state.h"
+#include "core/counted.h"
 #include "core/quantile.h"
 #include "export/ordered_json.h"
 
@@ -153,6 +155,12 @@ std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanRepo
     out << "  " << std::setw(20) << std::left << (known ? known->name : "?") << count << "\n";
   }
   return out.str();
+}
+
+std::string summaryText(const KeptScans& kept) {
+  const MapCorrector::Progress progress = kept.corrector().progress();
+  return counted(progress.scans, "scan") + " kept in " +
+         std::to_string(std::llround(1e-3 * static_cast<double>(progress.bytes))) + " kB\n";
 }
 
 }  // namespace bki_mapping::tools

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "journal/kept_scans.h"
 
 namespace bki_mapping::tools {
 
@@ -22,5 +23,7 @@ std::string reportJson(const SemanticMapper& mapper, const std::vector<ScanRepor
 
 /// A few lines for people: times, voxels by state and by class.
 std::string summaryText(const SemanticMapper& mapper, const std::vector<ScanReport>& scans);
+/// A line on scans that are kept.
+std::string summaryText(const KeptScans& kept);
 
 }  // namespace bki_mapping::tools

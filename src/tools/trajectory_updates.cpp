@@ -9,32 +9,20 @@
 
 #include "core/counted.h"
 #include "core/stopwatch.h"
+#include "tools/run_report.h"
 #include "tools/sequence_options.h"
 
 namespace bki_mapping::tools {
 
-void addJournal(po::options_description& options) {
+void addTrajectoryUpdates(po::options_description& options) {
   options.add_options()(
-      "journal", realOption("--journal", 1e-4, 1.0)->value_name("METRES"),
-      "round points to multiples of this in the sensor's frame, as a node with the parameter journal does")(
       "trajectory-updates", textOption("FILE"),
       "file with one correction per line: the number of a scan, and a file of poses; the scans up to that "
-      "one "
-      "then move there")("correction-tolerance",
-                         realOption("--correction-tolerance", 0.0)->value_name("METRES")->default_value(0.0),
-                         "scans stay while no point is farther than this from where an update puts it");
+      "one then move there")(
+      "correction-tolerance",
+      realOption("--correction-tolerance", 0.0)->value_name("METRES")->default_value(0.0),
+      "scans stay while no point is farther than this from where an update puts it");
 }
-
-JournalledMapping::JournalledMapping(SemanticMapper& mapper, const MapCorrector::Settings& settings)
-    : mapper_(mapper),
-      corrector_(mapper.config(), mapper.sharedClasses(), settings,
-                 {[&mapper](SemanticMap difference) {
-                    mapper.addMap(std::move(difference));
-                    return std::vector<GridIndex>();
-                  },
-                  [&mapper](const GridIndex& region, const LooksByBlock& looks) {
-                    return mapper.replaceLooks(region, looks);
-                  }}) {}
 
 std::unique_ptr<JournalledMapping> JournalledMapping::begin(const po::variables_map& given,
                                                             SemanticMapper& mapper) {
@@ -52,7 +40,7 @@ std::unique_ptr<JournalledMapping> JournalledMapping::begin(const po::variables_
   if (given.count("journal")) settings.quantum = given["journal"].as<double>();
   settings.tolerance = given["correction-tolerance"].as<double>();
   std::unique_ptr<JournalledMapping> mapping(new JournalledMapping(mapper, settings));
-  mapping->corrector_.noteForeign(mapper.map().regions());  // of the map that is continued
+  mapping->kept_.noteForeign(mapper.map().regions());  // of the map that is continued
   if (updates) {
     mapping->readUpdates(given["trajectory-updates"].as<std::string>());
     mapping->poses_ = sequenceOptionsOf(given);
@@ -88,39 +76,31 @@ void JournalledMapping::readUpdates(const std::string& path) {
 }
 
 ScanStats JournalledMapping::integrate(const Sequence& sequence, std::size_t i, const SequenceFrame& frame) {
-  // From the points as they were recorded: to and from the map's axes, some would be rounded to others.
   SequenceFrame in_sensor_frame = frame;
   in_sensor_frame.T_map_sensor.setIdentity();
-  RoundedScan rounded = corrector_.round(in_sensor_frame.scan(), in_sensor_frame.T_map_sensor);
-  rounded.T_map_sensor = roundedPose(frame.T_map_sensor);
-  ScanStats stats = mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
-  stats.counts += rounded.left_out;
-  corrector_.addScan(std::move(rounded.scan), 0, rounded.T_map_sensor, rounded.T_map_sensor,
-                     mapper_.touchedBlocks());
-  robot_ = frame.T_map_sensor.translation();
+  const ScanStats stats = kept_.integrateRecorded(in_sensor_frame.scan(), frame.T_map_sensor);
   mapped_.push_back(i);
   for (; next_ < updates_.size() && updates_[next_].scan <= sequence.number(i); ++next_) {
     poses_.map_poses = updates_[next_].poses;
     const Sequence corrected(sequence.folder(), poses_);
     std::vector<StampedMotion> keyframes;
     for (const std::size_t n : mapped_) keyframes.push_back({sequence.stamp(n), corrected.pose(n)});
-    corrector_.correct(keyframes, {Eigen::Isometry3d::Identity()});
+    kept_.corrector().correct(keyframes, {Eigen::Isometry3d::Identity()});
   }
-  corrector_.update(robot_);
+  kept_.update();
   return stats;
 }
 
 void JournalledMapping::finish() {
   Stopwatch watch;
-  corrector_.finish(robot_);
+  kept_.finish();
   waited_ms_ = watch.lap();
 }
 
 std::string JournalledMapping::summary() const {
-  const MapCorrector::Progress progress = corrector_.progress();
+  const MapCorrector::Progress progress = kept_.corrector().progress();
   std::ostringstream text;
-  text << counted(progress.scans, "scan") << " kept in "
-       << std::round(1e-3 * static_cast<double>(progress.bytes)) << " kB\n";
+  text << summaryText(kept_);
   if (progress.paths == 0) return text.str();
   text << counted(progress.paths, "correction") << " made " << counted(progress.moved, "move")
        << " of scans; the last took " << std::round(waited_ms_) << " ms after the last scan\n";

@@ -8,13 +8,13 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/sequence/sequence.h"
-#include "journal/map_corrector.h"
+#include "journal/kept_scans.h"
 #include "tools/options.h"
 
 namespace bki_mapping::tools {
 
-/// Adds --journal, --trajectory-updates and --correction-tolerance.
-void addJournal(po::options_description& options);
+/// Adds --trajectory-updates and --correction-tolerance.
+void addTrajectoryUpdates(po::options_description& options);
 
 /// Adds scans to a mapper, rounds and keeps them, and moves them when the list of updates says so.
 class JournalledMapping {
@@ -28,7 +28,7 @@ class JournalledMapping {
   ScanStats integrate(const Sequence& sequence, std::size_t i, const SequenceFrame& frame);
   /// Moves all scans that are still to be moved.
   void finish();
-  const MapCorrector& corrector() const { return corrector_; }
+  const KeptScans& kept() const { return kept_; }
   /// What the corrections did, in a few lines for people.
   std::string summary() const;
 
@@ -37,18 +37,17 @@ class JournalledMapping {
     std::size_t scan;   ///< number of the scan after which it comes
     std::string poses;  ///< file
   };
-  JournalledMapping(SemanticMapper& mapper, const MapCorrector::Settings& settings);
+  JournalledMapping(SemanticMapper& mapper, const MapCorrector::Settings& settings)
+      : kept_(mapper, settings) {}
   /// Reads the list. @param sequence for the reading of poses.
   void readUpdates(const std::string& path);
 
-  SemanticMapper& mapper_;
-  MapCorrector corrector_;
+  KeptScans kept_;
   SequenceOptions poses_;  ///< how files of poses are to be read
   std::vector<Update> updates_;
   std::size_t next_ = 0;             ///< update
   std::vector<std::size_t> mapped_;  ///< scans of the sequence
-  Eigen::Vector3d robot_ = Eigen::Vector3d::Zero();
-  double waited_ms_ = 0.0;  ///< by finish()
+  double waited_ms_ = 0.0;           ///< by finish()
 };
 
 }  // namespace bki_mapping::tools

@@ -113,6 +113,45 @@ class MapBag(unittest.TestCase):
             with open(self.path(name), 'rb') as ours, open(self.path('of_' + name), 'rb') as theirs:
                 self.assertTrue(ours.read() == theirs.read(), name)
 
+    def test_a_journal_lets_correct_map_move_its_clouds(self):
+        trajectory, moved = self.path('trajectory.txt'), self.path('moved.txt')
+        said = self.map(self.bag, '--config', 'robot', '--journal', '0.01', '--trajectory', trajectory)
+        self.assertRegex(said.stdout, rf'\n{SCANS} scans kept in \d+ kB\n')
+        before, map_file = self.tiles('map.bkm'), self.path('map.bkm')
+        self.assertEqual(rows(map_file, 'SELECT number, drive, sensor, stamp, jump FROM scan'),
+                         [(n, f'drive.bag/000000-{SCANS - 1:06d}', 'velodyne', cloud.header.stamp.to_nsec(), 0)
+                          for n, cloud in enumerate(self.clouds)])
+        with open(trajectory) as poses, open(moved, 'w') as file:
+            for line in poses:
+                seconds, x, y, *rest = line.split()
+                file.write(' '.join([seconds, x, str(float(y) + 0.5), *rest]) + '\n')
+        self.assertIn(f'{SCANS} of {SCANS} scans', self.call('correct_map', map_file, '--poses', moved).stdout)
+        self.assertNotEqual(self.tiles('map.bkm'), before)
+        self.call('correct_map', map_file, '--poses', trajectory)
+        self.assertTrue(self.tiles('map.bkm') == before, 'to and fro')
+        # The same by the parameters of a node.
+        with open(self.path('node.yaml'), 'w') as file:
+            file.write('journal: true\njournal_quantum: 0.01\n')
+        self.map(self.bag, '--config', self.path('node.yaml'))
+        default = self.tiles('map.bkm')
+        self.map(self.bag, '--journal', '0.01')
+        self.assertTrue(self.tiles('map.bkm') == default, 'by parameters')
+        self.refused('must be from 0.0001 to 1', self.bag, '--journal', '2')
+        self.refused('depend on the order', self.bag, '--journal', '0.01', '--set', 'free_space/extent=mapped')
+
+    def test_a_jump_of_tf_is_in_the_journal(self):
+        """Of two clouds; the second one comes after the map has moved below the odometry."""
+        bag = self.write('jump.bag', *(
+            message for n, shift in enumerate((0.0, 3.0), 1)
+            for message in (('/tf', transform(n - 0.2, shift, 'map', 'odom'), n - 0.2),
+                            ('/tf', transform(n - 0.2, 0.0, 'odom', 'velodyne'), n - 0.2),
+                            (TOPIC, self.cloud(n), n),
+                            ('/tf', transform(n + 0.1, shift, 'map', 'odom'), n + 0.1),
+                            ('/tf', transform(n + 0.1, 0.0, 'odom', 'velodyne'), n + 0.1))))
+        said = self.map(bag, '--journal', '0.01', '--config', 'robot').stderr
+        self.assertIn('; correct the map file with correct_map', said)
+        self.assertEqual([jump for _, jump in rows(self.path('map.bkm'), 'SELECT number, jump FROM scan')], [0, 1])
+
     def test_what_else_it_writes(self):
         report, trajectory = self.path('report.json'), self.path('trajectory.txt')
         late = self.cloud(self.clouds[-1].header.stamp.to_sec() + 1.0)

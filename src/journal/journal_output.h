@@ -7,18 +7,19 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/store/map_file.h"
-#include "journal/map_corrector.h"
+#include "journal/kept_scans.h"
 
-namespace bki_mapping::tools {
+namespace bki_mapping {
 
 /// What the journal of a new map file consists of.
 struct JournalOutput {
   /// The map that is continued, if its journal has scans, which the new file keeps. It is locked until then.
   std::optional<MapFile> continued;
-  const MapCorrector* corrector = nullptr;  ///< has the scans of the new drive; nullptr: the file has none
-  std::string drive;                        ///< id of that drive
+  /// The scans of the new drive, after finish(); nullptr: the file has none of them.
+  const KeptScans* kept = nullptr;
+  std::string drive;  ///< id of that drive
 
-  bool empty() const { return !continued && corrector == nullptr; }
+  bool empty() const { return !continued && kept == nullptr; }
 };
 
 /// The map that is continued, if its journal has scans. @param output file that will be written.
@@ -30,4 +31,4 @@ std::optional<MapFile> withJournal(const std::string& path, const std::string& o
 void saveWithJournal(const std::string& path, const SemanticMapper& mapper, const std::string& frame,
                      const std::vector<DriveRecord>& drives, JournalOutput journal);
 
-}  // namespace bki_mapping::tools
+}  // namespace bki_mapping

@@ -1,0 +1,54 @@
+#include "journal/kept_scans.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bki_mapping {
+
+KeptScans::KeptScans(SemanticMapper& mapper, const MapCorrector::Settings& settings)
+    : mapper_(mapper),
+      corrector_(mapper.config(), mapper.sharedClasses(), settings,
+                 {[&mapper](SemanticMap difference) {
+                    mapper.addMap(std::move(difference));
+                    return std::vector<GridIndex>();
+                  },
+                  [&mapper](const GridIndex& region, const LooksByBlock& looks) {
+                    return mapper.replaceLooks(region, looks);
+                  }}) {}
+
+ScanStats KeptScans::integrate(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
+                               const std::string& sensor) {
+  return add(corrector_.round(scan, T_map_sensor), sensor);
+}
+
+ScanStats KeptScans::integrateRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
+                                       const std::string& sensor) {
+  RoundedScan rounded = corrector_.round(scan, Eigen::Isometry3d::Identity());
+  rounded.T_map_sensor = roundedPose(T_map_sensor);
+  return add(std::move(rounded), sensor);
+}
+
+ScanStats KeptScans::add(RoundedScan rounded, const std::string& sensor) {
+  ScanStats stats = mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
+  stats.counts += rounded.left_out;
+  robot_ = rounded.T_map_sensor.translation();
+  const auto known = std::find(sensors_.begin(), sensors_.end(), sensor);
+  const auto number = static_cast<std::size_t>(known - sensors_.begin());
+  if (known == sensors_.end()) sensors_.push_back(sensor);
+  corrector_.addScan(std::move(rounded.scan), number, rounded.T_map_sensor, rounded.T_map_sensor,
+                     mapper_.touchedBlocks());
+  return stats;
+}
+
+void KeptScans::noteCleared(const Eigen::AlignedBox3d& box) {
+  cleared_.push_back(box);
+  corrector_.noteCleared(box);
+}
+
+void KeptScans::reset() {
+  corrector_.reset();
+  sensors_.clear();
+  cleared_.clear();
+}
+
+}  // namespace bki_mapping
