@@ -51,10 +51,11 @@ if(NOT pybind11_FOUND OR NOT Python3_FOUND)
   return()
 endif()
 pybind11_add_module(bki_mapping_python MODULE NO_EXTRAS
-  python/arrays.cpp python/city_bindings.cpp python/class_bindings.cpp python/distance_bindings.cpp python/map_bindings.cpp
+  python/arrays.cpp python/city_bindings.cpp python/class_bindings.cpp python/distance_bindings.cpp python/journal_bindings.cpp
+  python/map_bindings.cpp
   python/mapper_bindings.cpp python/module.cpp python/point_bindings.cpp python/query_bindings.cpp)
 #catkin_lint: ignore_once undefined_target
-target_link_libraries(bki_mapping_python PRIVATE bki_mapping_city bki_mapping_export)
+target_link_libraries(bki_mapping_python PRIVATE bki_mapping_city bki_mapping_export bki_mapping_journal)
 target_compile_options(bki_mapping_python PRIVATE -O1)  # the work is done in the libraries
 bki_mapping_warnings(bki_mapping_python)
 bki_mapping_join(bki_mapping_python)

@@ -228,6 +228,14 @@ Eigen::Vector3d tripleOf(py::handle object, const std::string& name) {
   return numbersOf<3>(object, name, "three numbers");
 }
 
+bool isPose(const Eigen::Matrix4d& matrix) {
+  constexpr double kTolerance = 1e-3;
+  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d square = linear.transpose() * linear;
+  return ((square - Eigen::Matrix3d::Identity()).array().abs() < kTolerance).all() &&
+         linear.determinant() > 0.0 && matrix.row(3) == Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0);
+}
+
 std::vector<Eigen::Isometry3d> posesOf(py::handle object, const std::string& name) {
   const std::string wanted = "an array of numbers of shape (N, 4, 4)";
   const py::array array = arrayOf(object, name, wanted);

@@ -123,6 +123,8 @@ Eigen::Vector2d pairOf(py::handle object, const std::string& name);
 Eigen::Vector3d tripleOf(py::handle object, const std::string& name);
 /// Three finite or infinite numbers, not NaN.
 Eigen::Vector3d vectorOf(py::handle object, const std::string& name);
+/// Whether a matrix is a rotation and a translation.
+bool isPose(const Eigen::Matrix4d& matrix);
 /// Poses of shape (N, 4, 4). Their rotations are not looked at.
 std::vector<Eigen::Isometry3d> posesOf(py::handle object, const std::string& name);
 /// A block's index, of three integers.

@@ -12,6 +12,7 @@
 #include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "core/frame_name.h"
+#include "journal/journal_output.h"
 #include "map_bindings.h"
 #include "settings/label_watch.h"
 #include "store/drive_overlap.h"
@@ -33,6 +34,7 @@ struct Mapper {
   std::mutex mutex;
   SemanticMapper mapper;
   std::string frame;
+  std::unique_ptr<KeptScans> kept;  ///< the scans that were integrated here; nullptr without a journal
   LabelWatch labels;
   DriveRecord drive;                ///< of the scans that were integrated here
   std::vector<DriveRecord> drives;  ///< those added from files and other maps
@@ -69,18 +71,28 @@ std::string newId() {
 }
 
 std::unique_ptr<Mapper> makeMapper(py::handle classes, py::handle resolution, py::handle config,
-                                   const std::string& frame, py::handle drive, const py::kwargs& parameters) {
+                                   const std::string& frame, py::handle drive, py::handle journal,
+                                   const py::kwargs& parameters) {
   const MapperConfig settings = configOf(config, resolution, parameters);
   const std::string id = drive.is_none() ? newId() : py::cast<std::string>(py::str(drive));
   if (id.empty()) throw std::invalid_argument("drive is empty; give an id that no other drive has, or none");
   auto mapper = std::make_unique<Mapper>(settings, classesOf(classes), frame, id);
+  if (!journal.is_none()) {
+    MapCorrector::Settings of_journal;
+    of_journal.quantum = numberOf(journal, "journal");
+    if (!(of_journal.quantum >= 1e-4 && of_journal.quantum <= 1.0)) {
+      throw std::invalid_argument("journal is " + numberText(of_journal.quantum) +
+                                  ", but must be from 0.0001 to 1");
+    }
+    mapper->kept = std::make_unique<KeptScans>(mapper->mapper, of_journal);
+  }
   warnOf(settings, mapper->mapper.classes());
   return mapper;
 }
 
 /// Where the sensor was.
 struct Pose {
-  Eigen::Vector3d origin;
+  Eigen::Isometry3d T_map_sensor;
   Eigen::Matrix3f rotation;
   bool turned;
 };
@@ -89,7 +101,10 @@ struct Pose {
 Pose poseOf(py::handle object) {
   const py::array array =
       arrayOf(object, "origin", "three numbers, or a pose: an array of numbers of shape (4, 4)");
-  if (array.ndim() != 2) return {vectorOf(object, "origin"), Eigen::Matrix3f::Identity(), false};
+  if (array.ndim() != 2) {
+    return {Eigen::Isometry3d(Eigen::Translation3d(vectorOf(object, "origin"))), Eigen::Matrix3f::Identity(),
+            false};
+  }
   const auto values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
   if (!values) PyErr_Clear();
   if (!values || array.shape(0) != 4 || array.shape(1) != 4) {
@@ -98,19 +113,14 @@ Pose poseOf(py::handle object) {
   }
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
-  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
-  constexpr double kTolerance = 1e-3;
-  const bool rotates =
-      ((linear.transpose() * linear - Eigen::Matrix3d::Identity()).array().abs() < kTolerance).all() &&
-      linear.determinant() > 0.0;
-  if (!rotates || matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
+  if (!isPose(matrix)) {
     throw std::invalid_argument(
         "the pose must be a rotation and a translation, from the sensor's to the map frame, with 0, 0, 0, 1 "
         "in the last row");
   }
   Eigen::Isometry3d T_map_sensor;
   T_map_sensor.matrix() = matrix;
-  return {T_map_sensor.translation(), roundedRotation(T_map_sensor), true};
+  return {T_map_sensor, roundedRotation(T_map_sensor), true};
 }
 
 /// Points in single precision, relative to the sensor, in the axes of the map frame.
@@ -118,7 +128,7 @@ std::vector<Eigen::Vector3f> relativePoints(const Points& points, const Pose& po
   std::vector<Eigen::Vector3f> relative(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (in_map) {
-      relative[i] = (points.at(i) - pose.origin).cast<float>();
+      relative[i] = (points.at(i) - pose.T_map_sensor.translation()).cast<float>();
     } else {
       const Eigen::Vector3f point = points.isFloat() ? points.floats()[i] : points.at(i).cast<float>();
       relative[i] = pose.turned ? pose.rotation * point : point;
@@ -133,22 +143,33 @@ bool areInMap(const std::string& points_in) {
   throw std::invalid_argument("points_in is '" + points_in + "', but must be sensor or map");
 }
 
+/// @param in_map whether the points of the scan are in the axes of the map also if scans are kept.
+ScanStats addToMap(Mapper& self, const ScanView& scan, const Eigen::Isometry3d& T_map_sensor, bool in_map) {
+  if (!self.kept) return self.mapper.integrate(scan);
+  self.kept->update();
+  return in_map ? self.kept->integrate(scan, T_map_sensor) : self.kept->integrateRecorded(scan, T_map_sensor);
+}
+
 ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::handle labels,
                         py::handle scan_stamp, py::handle points_in, py::handle labels_are_ids,
                         bool withdraws) {
   const std::uint64_t stamp = stampOf(scan_stamp);
   const bool in_map = areInMap(textOf(points_in, "points_in"));
-  const Pose pose = poseOf(origin);
+  Pose pose = poseOf(origin);
   const Points given(points, "points");
   const Labels classes(labels, "labels");
   ScanView scan;
-  scan.origin = pose.origin;
+  scan.origin = pose.T_map_sensor.translation();
   scan.labels = {classes.data(), classes.size()};
   scan.labels_are_ids = truthOf(labels_are_ids, "labels_are_ids");
   scan.stamp = stamp;
   std::string warning;
   const ScanStats added = alone(self, [&] {
+    if (withdraws && self.kept) {
+      throw std::invalid_argument("a mapper with a journal keeps its scans; withdraw them without one");
+    }
     std::vector<Eigen::Vector3f> relative;
+    if (self.kept) pose.turned = false;  // what is kept is rounded in the axes of the sensor
     if (in_map || pose.turned || !given.isFloat()) {
       relative = relativePoints(given, pose, in_map);
       scan.points = {relative.data(), relative.size()};
@@ -160,7 +181,7 @@ ScanStats addOrWithdraw(Mapper& self, py::handle origin, py::handle points, py::
       if (self.drive.scans > 0) --self.drive.scans;
       return stats;
     }
-    const ScanStats stats = self.mapper.integrate(scan);
+    const ScanStats stats = addToMap(self, scan, pose.T_map_sensor, in_map);
     self.drive.addScan(stamp, self.mapper.map().geometry(), self.mapper.touchedBlocks());
     warning = self.labels.report(self.mapper, scan, stats.counts);
     return stats;
@@ -178,14 +199,32 @@ ScanStats withdraw(Mapper& self, py::handle origin, py::handle points, py::handl
   return addOrWithdraw(self, origin, points, labels, stamp, points_in, labels_are_ids, true);
 }
 
+std::vector<DriveRecord> drivesOf(const Mapper& self) {
+  std::vector<DriveRecord> drives = self.drives;
+  if (self.drive.scans > 0) drives.push_back(self.drive);
+  return drives;
+}
+
 SharedMap snapshot(Mapper& self) {
   return alone(self, [&] {
-    std::vector<DriveRecord> drives = self.drives;
-    if (self.drive.scans > 0) drives.push_back(self.drive);
+    std::vector<DriveRecord> drives = drivesOf(self);
     MapSnapshot taken = self.mapper.snapshot();
     return std::make_shared<FixedMap>(
         RuledMap{{mapInfoOf(self.mapper, self.frame), std::move(drives), std::move(taken.map)}, taken.rules},
         self.mapper.config().threads);
+  });
+}
+
+void saveMapper(Mapper& self, const py::object& path) {
+  if (!self.kept) return static_cast<void>(py::cast(snapshot(self)).attr("save")(path));
+  const std::string file = pathOf(path, "path");
+  if (!isMapFileName(file)) throw std::invalid_argument("a map file's name must end in .bkm: " + file);
+  alone(self, [&] {
+    self.kept->finish();
+    JournalOutput journal;
+    journal.kept = self.kept.get();
+    journal.drive = self.drive.id;
+    saveWithJournal(file, self.mapper, self.frame, drivesOf(self), std::move(journal));
   });
 }
 
@@ -194,6 +233,7 @@ void addStored(Mapper& self, const StoredMap& added, bool allow_overlap) {
   checkNotAdded("the map", self.drives, added.drives, allow_overlap);
   if (self.drive.scans > 0) checkNotAdded("the map", {self.drive}, added.drives, allow_overlap);
   self.mapper.addMap(added.map);
+  if (self.kept) self.kept->noteForeign(added.map.regions());
   self.drives.insert(self.drives.end(), added.drives.begin(), added.drives.end());
 }
 
@@ -219,6 +259,7 @@ void reset(Mapper& self) {
   const std::string id = newId();
   alone(self, [&] {
     self.mapper.reset();
+    if (self.kept) self.kept->reset();
     self.drives.clear();
     self.drive = {};
     self.drive.id = id;
@@ -230,7 +271,9 @@ void reconfigure(Mapper& self, const py::kwargs& parameters) {
   const MapperConfig config = alone(self, [&] {
     MapperConfig changed = self.mapper.config();
     setParameters(changed, values);
+    if (self.kept) MapCorrector::checkCorrectable(changed);
     self.mapper.reconfigure(changed);
+    if (self.kept) self.kept->corrector().reconfigure(changed);
     return changed;
   });
   warnOf(config, self.mapper.classes());
@@ -239,7 +282,10 @@ void reconfigure(Mapper& self, const py::kwargs& parameters) {
 py::array_t<std::int32_t> clearBox(Mapper& self, py::handle low, py::handle high) {
   const Eigen::AlignedBox3d box(vectorOf(low, "low"), vectorOf(high, "high"));
   if (box.isEmpty()) throw std::invalid_argument("low must not be above high, on any axis");
-  return indexArray(alone(self, [&] { return self.mapper.clearBox(box); }));
+  return indexArray(alone(self, [&] {
+    if (self.kept) self.kept->noteCleared(box);
+    return self.mapper.clearBox(box);
+  }));
 }
 
 py::dict parameters(Mapper& self) {
@@ -302,6 +348,9 @@ constexpr char kMapperHelp[] =
     "parameters.\n"
     "frame: name of the map frame, which map files keep.\n"
     "drive: what map files call the scans; an id that no other drive has. None: a random one.\n"
+    "journal: keep the scans, so that save() writes them into the map file, where correct() moves them; "
+    "their "
+    "points are rounded to multiples of this length in the sensor's frame [m], such as 0.01. None: no.\n"
     "parameters: those of docs/parameters.md, overriding the configuration: **{'free_space/mode': 'line'}, "
     "or nested, free_space={'mode': 'line'}.\n\n"
     "Calls release the GIL, and those of several threads wait for each other. Raises ValueError for an "
@@ -330,7 +379,7 @@ void addMapper(py::module& m) {
   py::class_<Mapper>(m, "SemanticMapper", kMapperHelp)
       .def(py::init(&makeMapper), py::arg("classes") = "semantic_kitti", py::arg("resolution") = py::none(),
            py::arg("config") = py::none(), py::arg("frame") = "map", py::arg("drive") = py::none(),
-           "The arguments are explained with the class.")
+           py::arg("journal") = py::none(), "The arguments are explained with the class.")
       .def("integrate", &integrate, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
            kIntegrateHelp)
       .def("withdraw", &withdraw, py::arg("origin"), py::arg("points"), py::arg("labels"), stamp, in, ids,
@@ -352,10 +401,10 @@ void addMapper(py::module& m) {
            "allow_overlap: as for add.\n\nRaises MapFileError if the file cannot be "
            "read, or has another grid, class table or frame; ValueError if a drive is in both.")
       .def(
-          "save", [](Mapper& self, const py::object& path) { py::cast(snapshot(self)).attr("save")(path); },
-          py::arg("path"),
-          "Write a map file (.bkm), which holds all evidence without loss. Other threads may map "
-          "meanwhile.\n\nRaises ValueError for another ending, MapFileError if the file cannot be written.")
+          "save", &saveMapper, py::arg("path"),
+          "Write a map file (.bkm), which holds all evidence without loss, and with `journal` the scans that "
+          "were integrated here. Without it, other threads may map meanwhile.\n\nRaises ValueError for "
+          "another ending, MapFileError if the file cannot be written.")
       .def("reset", &reset, "Clear the map, and start a new drive.")
       .def("reconfigure", &reconfigure,
            "Change parameters that may change while mapping; the map stays. Raises ValueError for others.")

@@ -13,6 +13,7 @@
 #include "bki_mapping/store/mapper_file.h"
 #include "city_bindings.h"
 #include "class_bindings.h"
+#include "journal_bindings.h"
 #include "map_bindings.h"
 #include "mapper_bindings.h"
 #include "sequence/pose_agreement.h"
@@ -71,13 +72,6 @@ std::size_t positionIn(const Sequence& sequence, py::ssize_t i) {
                           std::to_string(i));
   }
   return static_cast<std::size_t>(i < 0 ? i + size : i);
-}
-
-std::optional<PosesIn> sensorOf(const std::optional<std::string>& name) {
-  if (!name) return std::nullopt;
-  if (*name == "camera") return PosesIn::kCamera;
-  if (*name == "lidar") return PosesIn::kLidar;
-  throw std::invalid_argument("poses_in is '" + *name + "', but must be 'camera' or 'lidar'");
 }
 
 /// The number of scans before the first one without a pose.
@@ -194,6 +188,7 @@ PYBIND11_MODULE(_core, m) {
   addMapper(m);
   addSequence(m);
   addCity(m);
+  addJournal(m);
   m.def("merge", &merge, py::arg("inputs"), py::arg("output"), py::arg("keep_drives") = false,
         py::arg("without") = std::vector<std::string>(), py::arg("allow_overlap") = false,
         "Merge map files into another one: the sum of the drives that are in any of them, each counted "

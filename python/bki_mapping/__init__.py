@@ -12,7 +12,7 @@ import importlib
 
 __all__ = ['EVIDENCE_UNIT', 'FREE', 'FREE_CLASS', 'OCCLUDED', 'OCCUPIED', 'RAY_NOTHING', 'RAY_OCCUPIED', 'RAY_UNKNOWN', 'UNKNOWN', 'Block',
            'City', 'ClassFilter', 'ClassTable', 'DistanceField', 'Drive', 'Frame', 'Map', 'MapFileError', 'ScanRefused', 'ScanStats', 'Section',
-           'SemanticClass', 'SemanticMapper', 'Sequence', 'load', 'merge', 'open_city']
+           'SemanticClass', 'SemanticMapper', 'Sequence', 'correct', 'forget_journal', 'load', 'merge', 'open_city']
 
 
 # Loaded when first used: nodes that import only messages need neither the library nor NumPy.

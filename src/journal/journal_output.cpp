@@ -36,6 +36,7 @@ std::set<ScanJournal::Number> scansAfterJumps(const ScanJournal& journal) {
 void addDrive(const JournalOutput& output, const ClassTable& classes, std::uint64_t first_number,
               int first_cleared, MapFile::Change& change) {
   const ScanJournal& journal = output.kept->corrector().journal();
+  for (const Eigen::AlignedBox3d& box : output.kept->cleared()) change.addClearedBox(box);
   const std::set<ScanJournal::Number> after_jumps = scansAfterJumps(journal);
   std::map<std::shared_ptr<const MapperConfig>, int> settings;
   StoredAs stored;
@@ -53,7 +54,6 @@ void addDrive(const JournalOutput& output, const ClassTable& classes, std::uint6
     change.addScan(recordOf(scan, stored), *scan.packed);
     ++stored.number;
   }
-  for (const Eigen::AlignedBox3d& box : output.kept->cleared()) change.addClearedBox(box);
 }
 
 }  // namespace

@@ -2,19 +2,14 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <stdexcept>
-#include <utility>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "bki_mapping/store/mapper_file.h"
-#include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/stopwatch.h"
-#include "journal/file_correction.h"
-#include "tools/map_copy.h"
+#include "journal/corrected_file.h"
+#include "journal/scan_poses.h"
 #include "tools/options.h"
-#include "tools/scan_poses.h"
 #include "tools/sequence_options.h"
 
 namespace {
@@ -47,89 +42,24 @@ LidarPoses posesOf(const po::variables_map& given) {
                         tools::posesIn(given));
 }
 
-/// The scans of the journal by their drives. @throws MapFileError if there are none.
-std::map<std::string, std::vector<ScanRecord>> scansByDrive(MapFile& file) {
-  if (!file.hasJournal()) {
-    throw MapFileError(file.path() +
-                       " has no journal of scans, since it has an older version of the format; map the scans "
-                       "again with a journal (map_sequence --journal)");
-  }
-  std::map<std::string, std::vector<ScanRecord>> scans;
-  for (ScanRecord& scan : file.scans()) scans[scan.drive].push_back(std::move(scan));
-  if (scans.empty()) {
-    throw MapFileError(
-        file.path() + " has no scans in its journal; map them again with a journal (map_sequence --journal)");
-  }
-  return scans;
-}
-
-using Drive = std::pair<const std::string, std::vector<ScanRecord>>;
-
-/// The drive that is to be corrected.
-const Drive& chosenDrive(const std::map<std::string, std::vector<ScanRecord>>& scans,
-                         const po::variables_map& given, const std::string& path) {
-  std::string names;
-  for (const auto& [drive, its_scans] : scans) names += (names.empty() ? "'" : ", '") + drive + "'";
-  if (!given.count("drive")) {
-    if (scans.size() == 1) return *scans.begin();
-    throw std::invalid_argument("the journal of " + path + " has scans of " + counted(scans.size(), "drive") +
-                                "; name one with --drive: " + names);
-  }
-  const std::string id = given["drive"].as<std::string>();
-  const auto found = scans.find(id);
-  if (found != scans.end()) return *found;
-  throw std::invalid_argument("the journal of " + path + " has no scans of drive '" + id +
-                              "'; it has those of " + names);
-}
-
-void checkParts(MapFile& file, const std::string& drive) {
-  for (const DriveRecord& record : file.drives()) {
-    if (record.id != drive || record.part == 0) continue;
-    throw MapFileError(file.path() + " also stores drive '" + drive +
-                       "' separately, where its scans cannot be moved; correct the map before it is merged");
-  }
-}
-
-/// Writes the corrected map, to the file itself or to another one.
-void writeResult(MapFile& file, const FileCorrection& correction, const std::string& drive,
-                 const std::string& output, bool in_place) {
-  if (in_place) {
-    MapFile::Change change = file.change();
-    correction.write(change, drive, false);
-    return change.commit();
-  }
-  NewMapFile copy(output, file.info());
-  tools::copyParts(file, 1, copy.content());
-  copyJournal(file, copy.content());
-  correction.write(copy.content(), drive, true);
-  copy.commit();
-}
-
 int correctMap(const po::variables_map& given) {
   const std::string path = tools::onlyMapFile(given);
-  const std::string output = given.count("output") ? given["output"].as<std::string>() : path;
-  if (!isMapFileName(output))
-    throw std::invalid_argument("the corrected map, " + output + ", must end in .bkm");
   const LidarPoses poses = posesOf(given);
-  std::error_code missing;
-  const bool in_place = output == path || std::filesystem::equivalent(path, output, missing);
-  if (!in_place) checkWritable(output);
+  CorrectionOrder order;
+  if (given.count("drive")) order.drive = given["drive"].as<std::string>();
+  order.tolerance = given["tolerance"].as<double>();
+  order.output = given.count("output") ? given["output"].as<std::string>() : path;
+  order.wanted = [&](const std::vector<ScanRecord>& scans) {
+    return wantedPoses(scans, poses, given["poses"].as<std::string>());
+  };
+  order.progress = [](std::size_t done, std::size_t all) { tools::showProgress(done, all, "scans moved"); };
   Stopwatch watch;
-  MapFile file(path, in_place ? MapFile::Access::kUpdate : MapFile::Access::kRead);
-  const auto scans = scansByDrive(file);
-  const Drive& drive = chosenDrive(scans, given, path);
-  checkParts(file, drive.first);
-  const std::vector<Eigen::Isometry3d> wanted =
-      tools::wantedPoses(drive.second, poses, given["poses"].as<std::string>());
-  FileCorrection correction(file, given["tolerance"].as<double>());
-  tools::warn(correction.move(drive.first, wanted, [](std::size_t done, std::size_t all) {
-    tools::showProgress(done, all, "scans moved");
-  }));
-  writeResult(file, correction, drive.first, output, in_place);
-  std::cout << output << ": " << correction.moved() << " of " << counted(drive.second.size(), "scan")
-            << " of drive '" << drive.first << "' moved, the farthest by "
-            << numberText(std::round(1e3 * correction.largestMove()) / 1e3) << " m; "
-            << counted(correction.changed().size(), "tile") << " changed, in "
+  const CorrectedFile corrected = correctMapFile(path, order);
+  tools::warn(corrected.warning);
+  std::cout << order.output << ": " << corrected.moved << " of " << counted(corrected.scans, "scan")
+            << " of drive '" << corrected.drive << "' moved, the farthest by "
+            << numberText(std::round(1e3 * corrected.largest_move) / 1e3) << " m; "
+            << counted(corrected.tiles, "tile") << " changed, in "
             << numberText(std::round(watch.lap() / 100.0) / 10.0) << " s\n";
   return 0;
 }

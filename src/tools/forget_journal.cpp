@@ -1,12 +1,8 @@
 // Drops the journal of a map file.
-#include <filesystem>
 #include <iostream>
-#include <stdexcept>
 
-#include "bki_mapping/store/mapper_file.h"
 #include "core/counted.h"
-#include "export/map_statistics.h"
-#include "tools/map_copy.h"
+#include "journal/corrected_file.h"
 #include "tools/options.h"
 
 namespace {
@@ -24,23 +20,9 @@ po::options_description options() {
 int forgetJournal(const po::variables_map& given) {
   const std::string path = tools::onlyMapFile(given);
   const std::string output = given.count("output") ? given["output"].as<std::string>() : path;
-  if (!isMapFileName(output))
-    throw std::invalid_argument("the map without a journal, " + output + ", must end in .bkm");
-  std::error_code missing;
-  const bool in_place = output == path || std::filesystem::equivalent(path, output, missing);
-  MapFile file(path, in_place ? MapFile::Access::kUpdate : MapFile::Access::kRead);
-  const JournalStatistics journal = readJournalStatistics(file);
-  if (in_place) {
-    MapFile::Change change = file.change();
-    change.eraseJournal();
-    change.commit();
-  } else {
-    NewMapFile copy(output, file.info());
-    tools::copyParts(file, 0, copy.content());
-    copy.commit();
-  }
-  std::cout << output << ": " << counted(journal.scans, "scan") << " of the journal forgotten, "
-            << counted(journal.bytes, "byte") << "\n";
+  const ForgottenScans forgotten = forgetJournalOfFile(path, output);
+  std::cout << output << ": " << counted(forgotten.scans, "scan") << " of the journal forgotten, "
+            << counted(forgotten.bytes, "byte") << "\n";
   return 0;
 }
 

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The Python module: it maps as the programs do, asks as C++ does, and answers wrong input in one sentence."""
+import contextlib
 import gc
 import math
 import os
+import sqlite3
 import subprocess
 import tempfile
 import threading
@@ -52,6 +54,128 @@ class WithFolder(unittest.TestCase):
 
     def path(self, name):
         return os.path.join(self.folder.name, name)
+
+
+class Journals(WithFolder):
+    """Scans that map files keep move to corrected poses."""
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.drive = os.path.join(folder.name, 'drive')
+        subprocess.run([os.path.join(BIN, 'simulate_drive'), '--output', cls.drive, '--scans', '4', '--beams', '16', '--columns', '300'],
+                       check=True, capture_output=True, timeout=60)
+        cls.frames = list(bki.Sequence(cls.drive))
+        cls.poses = np.array([frame.pose for frame in cls.frames])
+        cls.poses[:, :3, 3] = np.round(cls.poses[:, :3, 3] * 1024) / 1024  # survive rounding to micrometres
+        cls.drifted = cls.poses.copy()
+        cls.drifted[:, 1, 3] += 0.25 * np.arange(4)
+        cls.stamps = [frame.stamp for frame in cls.frames]
+
+    def saved(self, name, poses, **settings):
+        mapper = bki.SemanticMapper(config='robot', drive='drive/000000-000003', journal=0.01, **settings)
+        for pose, frame in zip(poses, self.frames):
+            mapper.integrate(pose, frame.points, frame.labels, stamp=frame.stamp)
+        mapper.save(self.path(name))
+        return self.path(name)
+
+    def journal_of(self, path):
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            return database.execute('SELECT number, drive, stamp, sensor, cleared, pose, odometry, content FROM scan '
+                                    'JOIN scan_content USING (number) ORDER BY number').fetchall()
+
+    def test_a_corrected_map_is_that_of_the_corrected_poses(self):
+        wanted_file, wrong_file = self.saved('wanted.bkm', self.poses), self.saved('wrong.bkm', self.drifted)
+        wanted, wrong = evidence_of(bki.load(wanted_file)), evidence_of(bki.load(wrong_file))
+        self.assertNotEqual(wanted, wrong)
+        corrected = self.path('corrected.bkm')
+        said = bki.correct(wrong_file, self.poses, output=corrected)
+        self.assertEqual((said['drive'], said['scans'], said['moved']), ('drive/000000-000003', 4, 3))
+        self.assertAlmostEqual(said['largest_move'], 0.75, places=6)
+        self.assertGreater(said['tiles'], 0)
+        self.assertEqual(evidence_of(bki.load(corrected)), wanted)
+        self.assertEqual(evidence_of(bki.load(wrong_file)), wrong)
+        # In place, by stamps, of which two suffice because the drift is even.
+        bki.correct(wrong_file, self.poses[[0, 3]], stamps=np.array(self.stamps)[[0, 3]])
+        self.assertEqual(evidence_of(bki.load(wrong_file)), wanted)
+        self.assertEqual(bki.correct(wrong_file, self.drifted, tolerance=0.6)['moved'], 1)
+        # By a file.
+        with open(self.path('poses.txt'), 'w') as file:
+            file.writelines(' '.join(map(repr, map(float, pose[:3].ravel()))) + '\n' for pose in self.poses)
+        bki.correct(wrong_file, self.path('poses.txt'), poses_in='lidar', drive='drive/000000-000003')
+        self.assertEqual(evidence_of(bki.load(wrong_file)), wanted)
+        forgotten = bki.forget_journal(wrong_file, output=corrected)
+        self.assertEqual(forgotten, {'scans': 4, 'bytes': sum(len(row[-1]) for row in self.journal_of(wrong_file))})
+        self.assertEqual(evidence_of(bki.load(corrected)), wanted)
+        self.assertEqual(bki.forget_journal(wrong_file)['scans'], 4)
+        self.assertEqual(self.journal_of(wrong_file), [])
+
+    def test_the_journal_is_that_of_map_sequence(self):
+        program = self.path('program.bkm')
+        subprocess.run([os.path.join(BIN, 'map_sequence'), '--sequence', self.drive, '--config', 'robot', '--journal', '0.01', '--output',
+                        program], check=True, capture_output=True, timeout=60)
+        ours = self.saved('ours.bkm', [frame.pose for frame in self.frames])
+        self.assertEqual(evidence_of(bki.load(ours)), evidence_of(bki.load(program)))
+        self.assertEqual(self.journal_of(ours), self.journal_of(program))
+        # Points in the map frame are rounded in that of the sensor, too.
+        mapper = bki.SemanticMapper(config='robot', drive='drive/000000-000003', journal=0.01)
+        for frame in self.frames:
+            points = frame.points.astype(float) @ frame.pose[:3, :3].T + frame.pose[:3, 3]
+            mapper.integrate(frame.pose, points, frame.labels, stamp=frame.stamp, points_in='map')
+        mapper.save(self.path('in_map.bkm'))
+        self.assertEqual([row[:7] for row in self.journal_of(self.path('in_map.bkm'))], [row[:7] for row in self.journal_of(ours)])
+
+    def test_what_else_happens_to_the_map(self):
+        mapper = bki.SemanticMapper(config='robot', journal=0.01)
+        first, second = self.frames[:2]
+        mapper.integrate(first.pose, first.points, first.labels, stamp=first.stamp)
+        mapper.clear_box((-np.inf,) * 3, (np.inf,) * 3)
+        mapper.reconfigure(**{'rules/stands_after': 3})
+        mapper.integrate(second.pose, second.points, second.labels, stamp=second.stamp)
+        mapper.save(self.path('cleared.bkm'))
+        self.assertEqual([row[4] for row in self.journal_of(self.path('cleared.bkm'))], [0, 1])
+        before = evidence_of(mapper.map)
+        bki.correct(self.path('cleared.bkm'), self.drifted[[1]], stamps=[first.stamp])
+        self.assertNotEqual(evidence_of(bki.load(self.path('cleared.bkm'))), before)
+        bki.correct(self.path('cleared.bkm'), np.array([first.pose, second.pose]))
+        self.assertEqual(evidence_of(bki.load(self.path('cleared.bkm'))), before)
+        mapper.save(self.path('again.bkm'))
+        self.assertEqual(self.journal_of(self.path('again.bkm')), self.journal_of(self.path('cleared.bkm')))
+        mapper.reset()
+        mapper.save(self.path('cleared.bkm'))
+        self.assertEqual(self.journal_of(self.path('cleared.bkm')), [])
+        with self.assertRaisesRegex(ValueError, '^a mapper with a journal keeps its scans; '):
+            mapper.withdraw(first.pose, first.points, first.labels, stamp=first.stamp)
+
+    def test_errors(self):
+        file = self.saved('map.bkm', self.poses)
+        plain = self.path('plain.bkm')
+        mapper_with_wall().save(plain)
+        for error, words, call in (
+                (ValueError, 'poses has 3 poses, but drive .* has 4 scans', lambda: bki.correct(file, self.poses[:3])),
+                (ValueError, 'there are 4 poses, but 1 stamps', lambda: bki.correct(file, self.poses, stamps=[1])),
+                (ValueError, 'there are 1 poses, but 2 stamps', lambda: bki.correct(file, self.poses[:1], stamps=[1, 2])),
+                (ValueError, 'no pose of poses has a stamp among', lambda: bki.correct(file, self.poses[:1], stamps=[1])),
+                (ValueError, r'poses\[0\] must be a rotation', lambda: bki.correct(file, [np.diag([1, 2, 1, 1])] * 4)),
+                (ValueError, r'poses must be .*\(N, 4, 4\)', lambda: bki.correct(file, self.poses[0])),
+                (ValueError, 'a file has its own', lambda: bki.correct(file, 'poses.txt', stamps=[1])),
+                (ValueError, 'an array has poses of the sensor', lambda: bki.correct(file, self.poses, poses_in='lidar')),
+                (ValueError, "poses_in is 'radar'", lambda: bki.correct(file, os.path.join(self.drive, 'poses.txt'), poses_in='radar')),
+                (ValueError, "has no scans of drive 'other'", lambda: bki.correct(file, self.poses, drive='other')),
+                (ValueError, 'drive is empty', lambda: bki.correct(file, self.poses, drive='')),
+                (ValueError, 'tolerance must be 0 or more', lambda: bki.correct(file, self.poses, tolerance=-1)),
+                (ValueError, 'must end in .bkm', lambda: bki.correct(file, self.poses, output=self.path('map.ply'))),
+                (ValueError, 'must end in .bkm', lambda: bki.forget_journal(file, output=self.path('map.ply'))),
+                (RuntimeError, 'missing.txt cannot be read', lambda: bki.correct(file, self.path('missing.txt'))),
+                (bki.MapFileError, 'has no scans in its journal', lambda: bki.correct(plain, self.poses)),
+                (bki.MapFileError, 'missing.bkm', lambda: bki.forget_journal(self.path('missing.bkm'))),
+                (ValueError, 'journal is 2, but must be from 0.0001 to 1', lambda: bki.SemanticMapper(journal=2)),
+                (TypeError, 'journal must be a number', lambda: bki.SemanticMapper(journal='yes')),
+                (ValueError, 'depend on the order of scans', lambda: bki.SemanticMapper(journal=0.01, free_space={'extent': 'mapped'}))):
+            with self.subTest(words=words), self.assertRaisesRegex(error, words) as caught:
+                call()
+            self.assertNotIn('\n', str(caught.exception))
+        self.assertEqual(len(self.journal_of(file)), 4)
 
 
 class Mapping(WithFolder):

@@ -1003,7 +1003,7 @@ class Tools(unittest.TestCase):
         self.assertEqual((figures['scans'], figures['drives']), (4, 2))
         self.assertEqual([row[0] for row in self.rows_of_journal(both)], [0, 1, 2, 3])
         ends = self.poses_file('ends.txt', true_poses[2:])
-        self.fails("has scans of 2 drives; name one with --drive: 'drive/000000-000001', 'drive/000002-000003'",
+        self.fails("has scans of 2 drives; name the one whose scans move (drive): 'drive/000000-000001', 'drive/000002-000003'",
                    'correct_map', both, '--poses', ends, '--poses-in', 'lidar')
         self.fails("has no scans of drive 'drive'; it has those of 'drive/000000-000001', 'drive/000002-000003'",
                    'correct_map', both, '--poses', ends, '--poses-in', 'lidar', '--drive', 'drive')

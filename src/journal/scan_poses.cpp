@@ -1,4 +1,4 @@
-#include "tools/scan_poses.h"
+#include "journal/scan_poses.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,12 +6,12 @@
 #include <iterator>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "core/counted.h"
-#include "journal/corrected_path.h"
 
-namespace bki_mapping::tools {
+namespace bki_mapping {
 namespace {
 
 /// A pose belongs to a scan if their stamps differ by no more: files hold rounded times [ns].
@@ -21,20 +21,25 @@ std::string secondsText(std::uint64_t stamp) {
   return numberText(std::round(static_cast<double>(stamp) * 1e-6) * 1e-3);
 }
 
-/// The stamp of a pose, or of the scan that it belongs to. @param stamps of the scans, sorted.
-std::uint64_t stampOf(double seconds, std::uint64_t zero, const std::vector<std::uint64_t>& stamps) {
-  const double nanoseconds = std::round(seconds * 1e9) + static_cast<double>(zero);
-  const auto stamp = static_cast<std::uint64_t>(std::clamp(nanoseconds, 0.0, 9e18));
+/// A stamp, or that of the scan that it belongs to. @param stamps of the scans, sorted.
+std::uint64_t ofScan(std::uint64_t stamp, const std::vector<std::uint64_t>& stamps) {
   const auto next = std::lower_bound(stamps.begin(), stamps.end(), stamp);
   if (next != stamps.end() && *next - stamp <= kSameTime) return *next;
   if (next != stamps.begin() && stamp - *std::prev(next) <= kSameTime) return *std::prev(next);
   return stamp;
 }
 
-/// Where scans belong by poses with stamps.
-std::vector<Eigen::Isometry3d> alongPath(const std::vector<ScanRecord>& scans, const LidarPoses& poses,
-                                         const std::string& path) {
-  std::vector<StampedMotion> recorded, keyframes;
+/// Zero of the clock of scans. Scans of a sequence have no name of a sensor, and stamps after kFirstStamp.
+std::uint64_t zeroOf(const std::vector<ScanRecord>& scans) {
+  return scans.front().sensor.empty() ? Sequence::kFirstStamp : 0;
+}
+
+}  // namespace
+
+std::vector<Eigen::Isometry3d> wantedPoses(const std::vector<ScanRecord>& scans,
+                                           std::vector<StampedMotion> keyframes, const std::string& name,
+                                           std::uint64_t zero) {
+  std::vector<StampedMotion> recorded;
   std::vector<std::uint64_t> stamps;
   std::set<std::uint64_t> jumps;
   for (const ScanRecord& scan : scans) {
@@ -50,14 +55,10 @@ std::vector<Eigen::Isometry3d> alongPath(const std::vector<ScanRecord>& scans, c
   std::sort(stamps.begin(), stamps.end());
   std::stable_sort(recorded.begin(), recorded.end(),
                    [](const StampedMotion& a, const StampedMotion& b) { return a.stamp < b.stamp; });
-  // Scans of a sequence have no name of a sensor, and stamps after kFirstStamp.
-  const std::uint64_t zero = scans.front().sensor.empty() ? Sequence::kFirstStamp : 0;
-  for (std::size_t n = 0; n < poses.poses.size(); ++n) {
-    keyframes.push_back({stampOf(poses.seconds[n], zero, stamps), poses.poses[n]});
-  }
+  for (StampedMotion& keyframe : keyframes) keyframe.stamp = ofScan(keyframe.stamp, stamps);
   const CorrectedPath corrected(keyframes, recorded, jumps);
   if (corrected.empty()) {
-    throw std::invalid_argument("no pose of " + path + " has a stamp among those of the scans, from " +
+    throw std::invalid_argument("no pose of " + name + " has a stamp among those of the scans, from " +
                                 secondsText(stamps.front() - std::min(zero, stamps.front())) + " to " +
                                 secondsText(stamps.back() - std::min(zero, stamps.back())) +
                                 " s; give poses with stamps of the same clock");
@@ -69,15 +70,21 @@ std::vector<Eigen::Isometry3d> alongPath(const std::vector<ScanRecord>& scans, c
   return wanted;
 }
 
-}  // namespace
-
 std::vector<Eigen::Isometry3d> wantedPoses(const std::vector<ScanRecord>& scans, const LidarPoses& poses,
                                            const std::string& path) {
-  if (!poses.seconds.empty()) return alongPath(scans, poses, path);
+  if (!poses.seconds.empty()) {
+    const std::uint64_t zero = zeroOf(scans);
+    std::vector<StampedMotion> keyframes;
+    for (std::size_t n = 0; n < poses.poses.size(); ++n) {
+      const double stamp = std::round(poses.seconds[n] * 1e9) + static_cast<double>(zero);
+      keyframes.push_back({static_cast<std::uint64_t>(std::clamp(stamp, 0.0, 9e18)), poses.poses[n]});
+    }
+    return wantedPoses(scans, std::move(keyframes), path, zero);
+  }
   if (poses.poses.size() == scans.size()) return poses.poses;
   throw std::invalid_argument(path + " has " + counted(poses.poses.size(), "pose") + ", but drive '" +
                               scans.front().drive + "' has " + counted(scans.size(), "scan") +
                               " in the journal; give a pose for each, or poses with stamps");
 }
 
-}  // namespace bki_mapping::tools
+}  // namespace bki_mapping
