@@ -17,6 +17,7 @@
 #include "evaluation/pose_noise.h"
 #include "evaluation/presence_evaluation.h"
 #include "evaluation/quality_report.h"
+#include "journal/sensor_scan.h"
 #include "settings/label_watch.h"
 #include "simulation/drive_file.h"
 #include "simulation/truth_cloud.h"
@@ -54,6 +55,8 @@ po::options_description options() {
       "name of a folder for the labels that are mapped, to be read by --predictions")(
       "pose-noise", po::value<std::string>()->value_name("M,DEG"),
       "standard deviations of errors added to each pose: along [m] and about [degrees] each axis")(
+      "journal", tools::realOption("--journal", 1e-4, 1.0)->value_name("METRES"),
+      "round points to multiples of this in the sensor's frame, as a journal does")(
       "pose-drift", po::value<std::string>()->value_name("M,DEG"),
       "the same for errors of each step from pose to pose, which add up")(
       "cloud", po::bool_switch(),
@@ -306,6 +309,14 @@ std::vector<Judgement> judgements(const po::variables_map& given, const MapperCo
   return all;
 }
 
+/// A scan as a journal keeps it.
+Scan asKept(const Scan& scan, const SequenceFrame& frame, const po::variables_map& given,
+            const SemanticMapper& mapper) {
+  const RoundedScan rounded =
+      toSensorScan(scan, frame.T_map_sensor, given["journal"].as<double>(), mapper.config().sensor_model);
+  return place(rounded.scan, rounded.T_map_sensor);
+}
+
 int evaluate(const po::variables_map& given) {
   const tools::Interruption interruption;
   SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
@@ -372,7 +383,8 @@ int evaluate(const po::variables_map& given) {
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
     ScanTimer timer;
-    const ScanStats stats = mapper.integrate(input);
+    const ScanStats stats =
+        mapper.integrate(given.count("journal") ? asKept(input, frame, given, mapper) : input);
     times.add({stats.totalMs(), timer.elapsed().processor});
     ++done;
     if (evaluation.traces) {

@@ -377,6 +377,10 @@ class Tools(unittest.TestCase):
         self.assertGreater(drifting['sa'], shaken['sa'])
         self.assertNotIn('truth', drifting)
         self.assertEqual(self.evaluation(more=('--pose-drift', '0,0'))['sa'], clean['sa'])
+        # Also where the points of a journal are mapped: as coarse as voxels they lie in others.
+        self.assertAlmostEqual(self.evaluation(more=('--journal', '0.0001'))['sa'], clean['sa'], delta=0.002)
+        self.assertLess(self.evaluation(more=('--journal', '0.3'))['sa'], clean['sa'] - 0.005)
+        self.fails('--journal is 0, but must be from 0.0001 to 1', 'evaluate_map', '--sequence', self.drive, '--journal', '0')
 
     def test_simulated_scenes(self):
         moving = {}
