@@ -15,7 +15,8 @@ std::vector<NamedParameter<CorrectionConfig>> correctionParameters() {
           "journal_quantum", &C::journal_quantum, NumberRange::atLeast(0.0001).upTo(1.0), "m",
           Changes::kAtStart,
           "Points of kept scans are rounded to multiples of this in the sensor's frame, before they "
-          "are mapped. Raise it to save memory, up to a tenth of resolution."),
+          "are mapped. Raise it to save memory; with a resolution below 0.2 m, lower it to a hundredth of "
+          "resolution."),
       realParameter(
           "journal_limit", &C::journal_limit, NumberRange::atLeast(0.0), "MB", Changes::kAtStart,
           "Largest memory of kept scans. Beyond it the oldest ones are read from map_file when they "
