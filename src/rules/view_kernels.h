@@ -31,7 +31,7 @@ struct BlockPlanes {
   std::array<Plane, kMaxClasses> planes;  ///< of classes, by rising id; the first `count`
   std::size_t count = 0;
   const EvidenceUnits* free = nullptr;   ///< zeros if the block has no plane for `free`
-  EvidenceUnits most_free = kMostUnits;  ///< StateRules::mostFree
+  EvidenceUnits most_free = kMostUnits;  ///< that counts for the state: mostFreeOf
   bool has_free = false;
   const Overruled* overruled = nullptr;  ///< nullptr: none is
 };

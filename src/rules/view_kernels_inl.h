@@ -47,11 +47,6 @@ struct CompensatedSum {
   return kEvidenceUnit * ConvertTo<FloatVec>(units);
 }
 
-/// The evidence for `free` as far as it counts [units].
-[[gnu::always_inline]] inline IntVec freeOf(const BlockPlanes& planes, int v) {
-  return Min(Max(LoadU(planes.free + v), IntVec{}), Set(planes.most_free));
-}
-
 /// What one pass over the planes finds.
 struct Likeliest {
   IntVec best;    ///< evidence of the class with the most [units]
@@ -195,12 +190,13 @@ struct Priors {
 };
 
 /// Equations 10 and 13 of a vector of voxels. @param found what decides the state: the likeliest class, or
-/// what remains. @param restored, cleared the voxels whose own evidence is overruled.
+/// what remains. @param counted the evidence for `free` as far as it counts for the state. @param restored,
+/// cleared the voxels whose own evidence is overruled.
 template <bool kEntropy>
 [[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
                                                   const Likeliest& likeliest, const Likeliest& found,
-                                                  IntVec free, Mask is_occupied, Mask restored, Mask cleared,
-                                                  int v, BlockView& view) {
+                                                  IntVec free, IntVec counted, Mask is_occupied,
+                                                  Mask restored, Mask cleared, int v, BlockView& view) {
   ExactSum total = found.classes;
   total.add(free);
   const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
@@ -212,7 +208,7 @@ template <bool kEntropy>
   const Mask has_left = cleared & ~is_occupied;  // otherwise a fixed class remains
   const FloatVec best = evidenceOf(found.best), alpha = prior.once + best,
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
-                 weighted_free = weight * unless(restored, evidenceOf(free)),
+                 weighted_free = weight * unless(restored, evidenceOf(counted)),
                  something = prior.something + unless(has_left, best) +
                              static_cast<float>(kInFreeSpace) * weighted_free,
                  nothing = prior.nothing + static_cast<float>(kBesideSurfaces) * something + weighted_free;
@@ -248,7 +244,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
   const Priors prior(*planes.map);
   int unknown = -1;  // first voxel of a vector without any evidence: all these vectors are alike
   for (int v = 0; v < kBlockVoxels; v += kLanes) {
-    const IntVec free = freeOf(planes, v);
+    const IntVec free = Max(LoadU(planes.free + v), IntVec{}), counted = Min(free, Set(planes.most_free));
     Likeliest found = findLikeliest<kPosterior>(planes, v);
     const Mask is_known = (found.best | free) != 0;
     const Likeliest likeliest = found;
@@ -259,7 +255,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     const Mask disputed = (is_occupied & (free > 0)) | (overruling != 0);
     if (kPosterior || AnyTrue(disputed)) {
       findGains(planes, found);
-      is_occupied &= occupied(found, free);
+      is_occupied &= occupied(found, counted);
       restored = (overruling == kKept) & (found.best > 0) & ~is_occupied;
       cleared = (overruling == kCleared) & is_occupied;
       is_occupied = (is_occupied | restored) & ~cleared;
@@ -277,7 +273,8 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       continue;
     }
     if (!AnyTrue(is_known)) unknown = v;
-    storePosterior<kEntropy>(planes, prior, likeliest, found, free, is_occupied, restored, cleared, v, view);
+    storePosterior<kEntropy>(planes, prior, likeliest, found, free, counted, is_occupied, restored, cleared,
+                             v, view);
   }
 }
 
@@ -286,7 +283,7 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
   static_assert(kLayer % kLanes == 0, "vectors end with a layer");
   IntVec any = {};
   for (int v = kLayer * layers.begin; v < kLayer * layers.end; v += kLanes) {
-    const IntVec free = freeOf(planes, v);
+    const IntVec free = Min(Max(LoadU(planes.free + v), IntVec{}), Set(planes.most_free));
     Likeliest found = findLikeliest<true>(planes, v);
     IntVec asks = {};
     for (std::size_t p = 0; p < planes.count; ++p) {

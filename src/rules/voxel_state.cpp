@@ -23,12 +23,18 @@ double entropyTerm(double alpha, double others) {
 /// What decides the state of a voxel by itself.
 struct OwnEvidence {
   EvidenceUnits best = 0, free = 0;                ///< evidence of the likeliest class, and for `free`
+  EvidenceUnits counted = 0;                       ///< of that for `free`, what counts for the state
   EvidenceUnits fixed_best = 0;                    ///< of the likeliest of the classes that cannot move
   ClassId label = kFreeClass, fixed = kFreeClass;  ///< these classes
   double of_classes = 0.0;                         ///< the sum over all classes [units]
   float gain = 1.0f;                               ///< of the likeliest class
   bool holds = false;                              ///< (11)
 };
+
+/// StateRules::mostFree, where the block has looks that can clear what it keeps.
+EvidenceUnits mostFreeOf(const StateRules& rules, const Block& block) {
+  return block.looks().empty() ? kMostUnits : rules.mostFree();
+}
 
 OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset) {
   // Units are whole numbers, of which doubles hold the sum over all classes exactly.
@@ -37,7 +43,7 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
   for (std::size_t i = 0; i < classes.size(); ++i) {
     const EvidenceUnits units = std::max(block.plane(i)[offset], 0);
     if (classes[i] == kFreeClass) {
-      own.free = std::min(units, rules.mostFree());
+      own.free = units;
       continue;
     }
     own.of_classes += units;
@@ -51,7 +57,8 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
     }
   }
   own.gain = rules.freeGain(own.label, kEvidenceUnit * static_cast<float>(own.best));
-  own.holds = isOccupied(own.best, own.gain, own.free);
+  own.counted = std::min(own.free, mostFreeOf(rules, block));
+  own.holds = isOccupied(own.best, own.gain, own.counted);
   return own;
 }
 
@@ -120,7 +127,7 @@ BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Bloc
   planes.rules = &rules;
   planes.most_vote = rules.mostVote();
   planes.free = kNoEvidence;
-  planes.most_free = rules.mostFree();
+  planes.most_free = mostFreeOf(rules, block);
   for (std::size_t p = 0; p < block.classes().size(); ++p) {
     const ClassId id = block.classes()[p];
     if (id == kFreeClass) {
@@ -173,7 +180,7 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
   bool holds = own.holds, restored = false, has_left = false;
   if (rules.neighbourhoodRatio() > 0.0f && own.best > 0 && rules.asksNeighbourhood(own.label)) {
     const VoteSums sums = votesAround(map, rules, GridGeometry::voxelOf(index, offset));
-    const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
+    const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.counted;
     holds = own.holds ? areKept(rules, sums)
                       : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
     restored = holds && !own.holds;
@@ -215,8 +222,8 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
   view.evidence = static_cast<float>(of_classes + free);
   view.probability = static_cast<float>(alpha / sum);
   view.variance = static_cast<float>(alpha / sum * (others / sum) / (sum + 1.0));
-  view.occupancy = static_cast<float>(
-      occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain), restored ? 0.0 : free));
+  view.occupancy = static_cast<float>(occupancyOf(prior, has_left ? 0.0 : best, static_cast<double>(own.gain),
+                                                  restored ? 0.0 : kUnit * own.counted));
   view.class_probability = static_cast<float>(1.0 / squaredRatios(map, block, offset, prior + best));
   return view;
 }

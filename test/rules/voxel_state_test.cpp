@@ -334,20 +334,48 @@ TEST(VoxelState, WhatStandsOutweighsTheGain) {
 
 TEST(VoxelState, WhereLooksDecideSpaceThatWasLongFreeCountsForSoMuch) {
   const StateRules sum = StateRules().withHitOfScan(0.01), latest = sum.withLatest(true);
-  const auto stateOf = [](const StateRules& rules, float hits) {
-    const SemanticMap map = mapWith({{1, hits}, {kFreeClass, 3000.0f}}, 77);
+  const auto stateOf = [](const StateRules& rules, float hits, bool has_looks = true) {
+    SemanticMap map = mapWith({{1, hits}, {kFreeClass, 3000.0f}}, 77);
+    Look::Voxels beside;
+    beside.set(78);
+    if (has_looks) map.getOrAllocate({{0, 0, 0}}).looks().add(Look(100, beside, {}, {}));
     const Block& block = *map.find({{0, 0, 0}});
     BlockView whole;
     readBlock(map, rules, {{0, 0, 0}}, block, BlockFields::kStates, whole);
-    const VoxelState state = viewVoxel(map, rules, {{0, 0, 0}}, block, 77).state;
+    const VoxelView view = viewVoxel(map, rules, {{0, 0, 0}}, block, 77);
+    EXPECT_NEAR(view.evidence, 3000.0 + static_cast<double>(hits), 1e-3)
+        << "the posterior is that of the sum";
+    const VoxelState state = view.state;
     EXPECT_EQ(whole.state[77], state);
     return state;
   };
   EXPECT_EQ(stateOf(latest, 3.001f), VoxelState::kOccupied) << "hit in 300 scans";
   EXPECT_EQ(stateOf(latest, 2.999f), VoxelState::kFree);
+  EXPECT_EQ(stateOf(latest, 3.001f, false), VoxelState::kFree) << "no looks could clear it";
   EXPECT_EQ(stateOf(sum, 3.001f), VoxelState::kFree);
   EXPECT_EQ(stateOf(StateRules().withLatest(true), 3.001f), VoxelState::kFree)
       << "no scan's evidence is known";
+}
+
+TEST(VoxelState, WhatRemainsIsAskedOfAllTheEvidenceForFree) {
+  // A truck of which some scans said building has left.
+  SemanticMap map = mapWith({{1, 1.2f}, {2, 0.4f}, {kFreeClass, 300.0f}}, 77);
+  Look::Voxels voxel;
+  voxel.set(77);
+  Looks& looks = map.getOrAllocate({{0, 0, 0}}).looks();
+  looks.add(Look(100, {}, {}, voxel));
+  for (std::uint64_t tick = 101; tick < 110; ++tick) looks.add(Look(tick, {}, voxel, {}));
+  const StateRules rules = StateRules()
+                               .withHitOfScan(0.01)
+                               .withLatest(true)
+                               .withFreeGain(1, 20.0, 0.05)
+                               .withFreeGain(2, 0.0)
+                               .withRemaining(0.1, ClassSet().set(2));
+  const Block& block = *map.find({{0, 0, 0}});
+  EXPECT_EQ(viewVoxel(map, rules, {{0, 0, 0}}, block, 77).state, VoxelState::kFree);
+  BlockView whole;
+  readBlock(map, rules, {{0, 0, 0}}, block, BlockFields::kStates, whole);
+  EXPECT_EQ(whole.state[77], VoxelState::kFree);
 }
 
 TEST(VoxelState, GainsWithoutEvidenceForFreeMakeNothingFree) {
