@@ -11,6 +11,8 @@ namespace {
 constexpr float kShellRatio = 1.2f;
 /// Where the first shell begins [lengths of the kernel].
 constexpr float kFirstShell = 1.5f;
+/// Nor does it begin nearer, however short the kernel [voxels].
+constexpr float kNearest = 0.5f;
 /// Above this angle, bins of the coarse grid are small [rad].
 constexpr double kWide = 0.08;
 constexpr double kRightAngle = 1.57079632679489661923;
@@ -93,7 +95,8 @@ void LongestBeams::placeShells(float reach, float farthest) {
   shells_.clear();
   shell_at_.clear();
   std::size_t memory = 0;
-  for (float begin = kFirstShell * reach; begin < farthest && shells_.size() < kNone; begin *= kShellRatio) {
+  for (float begin = std::max(kFirstShell * reach, kNearest); begin < farthest && shells_.size() < kNone;
+       begin *= kShellRatio) {
     // Squares of distances are rounded down to find the shell.
     const double nearest = static_cast<double>(begin),
                  angle = std::asin(static_cast<double>(reach) / nearest) + kRoom;

@@ -59,8 +59,9 @@ void NearSensor::set(const BeamField& field, const LineSetups& lines, BeamWeight
 void NearSensor::reserve(Workspace& own) const {
   if (!std::isfinite(enough_)) return;
   const std::size_t beams = field_->beams().ends.size();
-  own.some.reserve(roundedUp(static_cast<std::uint32_t>(beams)));
-  own.some_ranges.reserve(BeamTable::kMostRanges);
+  const std::size_t some = roundedUp(static_cast<std::uint32_t>(beams));
+  own.some.reserve(some);
+  own.some_ranges.reserve(std::max(BeamTable::kMostRanges, some));  // the R-tree may give each beam a range
 }
 
 Eigen::Vector3d NearSensor::cornerOf(const BlockIndex& index) const {

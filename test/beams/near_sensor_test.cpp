@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
@@ -181,20 +183,62 @@ TEST(NearSensor, NothingIsNearWithoutALimit) {
   EXPECT_EQ(own.blocks, 0u);
 }
 
-/// The whole way into the map, with the rules of the preset robot.
-TEST(NearSensor, AMapOfADenseScanEqualsBruteForce) {
+Scan denseScan() {
   Scan scan;
   scan.origin = {0.21, -0.34, 0.05};
   scan.stamp = 7;
   scan.points = beamsInBox(15000, Directions::kLidar);
   for (std::size_t n = 0; n < scan.points.size(); ++n)
     scan.labels.push_back(10u * (scan.points[n].z() < -1.4f ? 1u : 2u));
+  return scan;
+}
+
+MapperConfig robot() {
   MapperConfig config;
   config.free_space.mode = "line";
   config.downsample_resolution = 0.0;
   config.rules.enabled = true;
   config.sensor_model.height = 1.6;
   config.threads = 2;
+  return config;
+}
+
+TEST(NearSensor, NeitherThreadsNorWithdrawnScansChangeABit) {
+  const Scan scan = denseScan();
+  Scan turned = scan;
+  turned.origin += Eigen::Vector3d(0.4, 0.1, 0.0);
+  turned.stamp = 1'000'000'000;
+  std::unique_ptr<SemanticMapper> first;
+  for (const int threads : {1, 2, 5}) {
+    MapperConfig config = robot();
+    config.threads = threads;
+    config.rules.latest = false;  // looks cannot be withdrawn
+    auto mapper = std::make_unique<SemanticMapper>(config, reference::tableWithDynamicClass());
+    if (threads == 2) mapper->integrate(turned);
+    mapper->integrate(scan);
+    if (threads == 2) mapper->withdraw(turned);
+    if (!first) {
+      first = std::move(mapper);
+      continue;
+    }
+    std::size_t planes = 0;
+    ASSERT_EQ(mapper->map().size(), first->map().size());
+    for (const auto& entry : first->map().entries()) {
+      const Block* const block = mapper->map().find(entry.index);
+      ASSERT_TRUE(block);
+      ASSERT_EQ(block->classes(), entry.block->classes());
+      for (std::size_t p = 0; p < block->classes().size(); ++p, ++planes) {
+        EXPECT_TRUE(std::equal(block->plane(p), block->plane(p) + kBlockVoxels, entry.block->plane(p)));
+      }
+    }
+    EXPECT_GT(planes, 100u);
+  }
+}
+
+/// The whole way into the map, with the rules of the preset robot.
+TEST(NearSensor, AMapOfADenseScanEqualsBruteForce) {
+  const Scan scan = denseScan();
+  const MapperConfig config = robot();
   const auto classes = reference::tableWithDynamicClass();
   SemanticMapper mapper(config, classes);
   mapper.integrate(scan);
