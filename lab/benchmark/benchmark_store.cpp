@@ -72,7 +72,7 @@ void driveAlong(const po::variables_map& given) {
   std::vector<double> times, moves;
   for (std::size_t step = 0; step < steps; ++step) {
     Scan scan = drive.frame(placeOf(step, places)).scan();
-    scan.stamp = step;
+    scan.stamp = 100'000'000 * (step + 1);
     Stopwatch watch;
     mapper.integrate(scan);
     times.push_back(watch.lap());
