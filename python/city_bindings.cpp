@@ -1,5 +1,3 @@
-#include "city_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -13,9 +11,8 @@
 #include <vector>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/city/tiled_map.h"
-#include "class_bindings.h"
-#include "map_bindings.h"
 
 namespace bki_mapping::python {
 namespace {

@@ -1,5 +1,3 @@
-#include "class_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/settings/yaml.h"
 
 namespace bki_mapping::python {

@@ -1,13 +1,11 @@
-#include "distance_bindings.h"
-
 #include <algorithm>
 #include <limits>
 #include <mutex>
 #include <string>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/query/distance_field.h"
-#include "class_bindings.h"
 
 namespace bki_mapping::python {
 namespace {

@@ -1,5 +1,3 @@
-#include "journal_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <filesystem>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "journal/corrected_file.h"
 #include "journal/scan_poses.h"
 

@@ -1,5 +1,3 @@
-#include "map_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -10,13 +8,12 @@
 #include <utility>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/export/map_export.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/store/mapper_file.h"
-#include "class_bindings.h"
 #include "export/export_file.h"
-#include "query_bindings.h"
 
 namespace bki_mapping::python {
 namespace {

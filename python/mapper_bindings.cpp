@@ -1,5 +1,3 @@
-#include "mapper_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <mutex>
@@ -7,13 +5,13 @@
 #include <utility>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/settings/yaml.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "core/frame_name.h"
 #include "journal/journal_output.h"
-#include "map_bindings.h"
 #include "settings/label_watch.h"
 #include "store/drive_overlap.h"
 

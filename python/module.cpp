@@ -5,17 +5,13 @@
 #include <optional>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/core/scan.h"
 #include "bki_mapping/query/queries.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/sequence/sequence.h"
 #include "bki_mapping/store/map_merge.h"
 #include "bki_mapping/store/mapper_file.h"
-#include "city_bindings.h"
-#include "class_bindings.h"
-#include "journal_bindings.h"
-#include "map_bindings.h"
-#include "mapper_bindings.h"
 #include "sequence/pose_agreement.h"
 
 namespace bki_mapping::python {

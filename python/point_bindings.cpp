@@ -1,5 +1,3 @@
-#include "point_bindings.h"
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/query/queries.h"
 
 namespace bki_mapping::python {

@@ -1,5 +1,3 @@
-#include "query_bindings.h"
-
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -12,10 +10,8 @@
 #include <vector>
 
 #include "arrays.h"
+#include "bindings.h"
 #include "bki_mapping/query/queries.h"
-#include "class_bindings.h"
-#include "distance_bindings.h"
-#include "point_bindings.h"
 
 namespace bki_mapping::python {
 namespace {
