@@ -34,13 +34,10 @@ foreach(room sequence city export)
 endforeach()
 
 bki_mapping_room(tools SOURCES
-    interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp scan_points.cpp sequence_options.cpp trajectory_updates.cpp version.cpp
+    interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp scan_points.cpp sequence_options.cpp trajectory_updates.cpp
   LINK bki_mapping_city bki_mapping_journal bki_mapping_query bki_mapping_sequence Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_join(bki_mapping_tools)
-# Of one file: precompiled headers serve only targets with all the definitions of theirs.
-set_source_files_properties(src/tools/version.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_VERSION="${BKI_MAPPING_VERSION}"
-  SKIP_PRECOMPILE_HEADERS ON)
 target_compile_options(bki_mapping_tools PRIVATE $<$<CONFIG:Release>:-O1>)  # the work is done in the other libraries
 bki_mapping_light(bki_mapping_tools)
 bki_mapping_precompile(bki_mapping_tools

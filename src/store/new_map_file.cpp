@@ -15,9 +15,6 @@
 namespace bki_mapping {
 namespace {
 
-/// The text that the library writes into MapInfo::program.
-constexpr char kProgram[] = "bki_mapping " BKI_MAPPING_VERSION;
-
 /// Keeps others from opening a file that is about to be replaced. A journal that a killed process left is
 /// applied first; otherwise SQLite would apply it to the new file.
 std::optional<Database> lockReplaced(const std::string& path) {
@@ -48,6 +45,10 @@ void removeLeftovers(const std::string& path) {
 
 }  // namespace
 
+const char* programName() {
+  return "bki_mapping " BKI_MAPPING_VERSION;
+}
+
 struct NewMapFile::State {
   State(const std::string& file_path, const MapInfo& info, bool is_locked)
       : path(file_path), replaced(is_locked ? std::nullopt : lockReplaced(path)), atomic(path) {
@@ -75,7 +76,7 @@ struct NewMapFile::State {
 
 NewMapFile::NewMapFile(const std::string& path, const MapInfo& given, const MapFile* replaced) {
   MapInfo info = given;
-  info.program = kProgram;
+  info.program = programName();
   checkInfo(info);
   try {
     state_ = std::make_unique<State>(path, info, replaced != nullptr);

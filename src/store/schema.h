@@ -1,4 +1,4 @@
-/// @file The tables of a map file, and the version of its format.
+/// @file The tables of a map file, the version of its format, and the program that writes it.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,9 @@ constexpr std::int64_t kFormatVersion = 4;
 constexpr std::int64_t kFirstVersionWithLooks = 3;
 /// Before it, files have no journal (bki_mapping/store/scan_record.h).
 constexpr std::int64_t kFirstVersionWithJournal = 4;
+
+/// What writes map files, with its version as in package.xml: "bki_mapping 0.2.0".
+const char* programName();
 
 /// Marks an empty database as a map file, and creates the tables.
 void createSchema(Database& database);

@@ -11,8 +11,8 @@
 #include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
+#include "store/schema.h"
 #include "tools/interruption.h"
-#include "tools/version.h"
 
 namespace bki_mapping::tools {
 namespace {
@@ -65,7 +65,7 @@ std::unique_ptr<po::variables_map> parse(int argc, char** argv, const std::strin
       return nullptr;
     }
     if (given->count("version")) {
-      std::cout << "bki_mapping " << version() << "\n";
+      std::cout << programName() << "\n";
       return nullptr;
     }
     po::notify(*given);
