@@ -34,7 +34,7 @@ foreach(room sequence city export)
 endforeach()
 
 bki_mapping_room(tools SOURCES
-    interruption.cpp options.cpp point_file.cpp point_query.cpp run_report.cpp scan_points.cpp sequence_options.cpp trajectory_updates.cpp
+    interruption.cpp options.cpp point_query.cpp run_report.cpp scan_points.cpp sequence_options.cpp trajectory_updates.cpp
   LINK bki_mapping_city bki_mapping_journal bki_mapping_query bki_mapping_sequence Boost::program_options)
 target_link_libraries(bki_mapping_tools PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_join(bki_mapping_tools)

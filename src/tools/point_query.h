@@ -1,4 +1,4 @@
-/// @file What a city or a map file says at points.
+/// @file What a city or a map file says at points, which come as text: "X Y Z" on a command line, or a file.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,6 +7,7 @@
 #include <iosfwd>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,14 @@
 #include "bki_mapping/query/queries.h"
 
 namespace bki_mapping::tools {
+
+/// Three finite numbers, separated by commas or spaces. @return nothing if the text is anything else.
+std::optional<Eigen::Vector3d> parsePoint(std::string text);
+
+/// Appends the points of a file, one a line; "-": of standard input. Empty lines, lines that begin with #,
+/// and a first line of names are left out. @throws std::invalid_argument if the file cannot be read, a line
+/// is not a point, or `points` would have more than ten million.
+void readPointFile(const std::string& path, std::vector<Eigen::Vector3d>& points);
 
 /// Asks a map at points. They are sorted by the tile that holds them, so that the points of a tile are
 /// answered from one reading.

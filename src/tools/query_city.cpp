@@ -13,7 +13,6 @@
 #include "export/map_picture.h"
 #include "export/map_statistics.h"
 #include "tools/options.h"
-#include "tools/point_file.h"
 #include "tools/point_query.h"
 
 namespace {
