@@ -87,9 +87,9 @@ bki_mapping_kernels(beams raster/line_kernels kernel/kernel_table.h kernel/spars
 # Class tables and parameters from YAML.
 find_package(yaml-cpp REQUIRED)
 bki_mapping_room(settings SOURCES
-    class_table_yaml.cpp config_yaml.cpp label_watch.cpp named_file.cpp share_path.cpp yaml_file.cpp
+    class_table_yaml.cpp config_yaml.cpp label_watch.cpp named_file.cpp yaml_file.cpp
   LINK bki_mapping_mapping)
-set_source_files_properties(src/settings/share_path.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+set_source_files_properties(src/settings/named_file.cpp PROPERTIES COMPILE_DEFINITIONS BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 target_link_libraries(bki_mapping_settings PRIVATE yaml-cpp ${CMAKE_DL_LIBS})
 bki_mapping_join(bki_mapping_settings)
 bki_mapping_light(bki_mapping_settings)

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "settings/share_path.h"
+#include "settings/named_file.h"
 
 namespace bki_mapping::tools {
 namespace {

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "settings/share_path.h"
+#include "settings/named_file.h"
 
 namespace bki_mapping {
 namespace {

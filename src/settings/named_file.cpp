@@ -1,11 +1,12 @@
 #include "settings/named_file.h"
 
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "settings/share_path.h"
 
 namespace bki_mapping {
 namespace {
@@ -42,6 +43,20 @@ std::vector<std::string> namedFiles(const std::string& folder) {
   }
   std::sort(names.begin(), names.end());
   return names;
+}
+
+std::string sharePath() {
+  Dl_info library{};
+  if (dladdr(reinterpret_cast<void*>(&sharePath), &library) != 0 && library.dli_fname != nullptr) {
+    std::error_code ignored;
+    const fs::path lib = fs::canonical(library.dli_fname, ignored).parent_path();
+    for (const fs::path& prefix :
+         {lib.parent_path(), lib.parent_path().parent_path()}) {  // lib or lib/<architecture>
+      const fs::path share = prefix / "share" / "bki_mapping";
+      if (fs::exists(share / "config" / "classes", ignored)) return share.string();
+    }
+  }
+  return BKI_MAPPING_SOURCE_DIR;
 }
 
 }  // namespace bki_mapping

@@ -1,10 +1,15 @@
-/// @file Files that users give by path, or by name where the package brings them.
+/// @file Files of the package, in a build tree and in an installation, and files that users give by path or
+/// by the name of one of these.
 #pragma once
 
 #include <string>
 #include <vector>
 
 namespace bki_mapping {
+
+/// The folder with config/, launch/ and so on: share/bki_mapping next to the library's folder if installed,
+/// otherwise the source tree that the library was built from.
+std::string sharePath();
 
 /// The path of a file. A file that exists goes before the package's file of the same name.
 /// @param what kind of file, for the sentence of the exception.
