@@ -18,7 +18,7 @@ bki_mapping_room(city SOURCES city_index.cpp region_files.cpp tiled_map.cpp LINK
 target_link_libraries(bki_mapping_city PRIVATE nlohmann_json::nlohmann_json)
 bki_mapping_room(export SOURCES
     cleaned_points.cpp display_colors.cpp export_file.cpp grid_export.cpp html_export.cpp html_page.cpp map_export.cpp
-    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp statistics_json.cpp voxel_drives.cpp voxel_points.cpp
+    map_picture.cpp map_statistics.cpp mesh_export.cpp octomap_export.cpp open_faces.cpp voxel_drives.cpp voxel_points.cpp
   LINK bki_mapping_query bki_mapping_sequence bki_mapping_store)
 target_link_libraries(bki_mapping_export PRIVATE nlohmann_json::nlohmann_json PNG::PNG yaml-cpp ZLIB::ZLIB
   ${OCTOMAP_LIBRARIES})

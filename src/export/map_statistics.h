@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "bki_mapping/core/types.h"
 #include "bki_mapping/rules/voxel_state.h"
@@ -46,5 +48,10 @@ MapStatistics readStatistics(MapFile& file, const StateRules& rules, const Block
 /// The same of a map in memory; `tiles` counts its regions.
 MapStatistics statisticsOf(const SemanticMap& map, const StateRules& rules,
                            const BlockVisit& visit = nullptr);
+
+/// What is in a map file, as JSON: one object, indented, as docs/map_file.md describes it.
+/// @param drives in the order of the result. @throws MapFileError.
+std::string statisticsJson(MapFile& file, const MapStatistics& found, const std::vector<DriveRecord>& drives,
+                           const JournalStatistics& journal);
 
 }  // namespace bki_mapping

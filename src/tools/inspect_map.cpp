@@ -15,7 +15,6 @@
 #include "core/counted.h"
 #include "export/map_picture.h"
 #include "export/map_statistics.h"
-#include "export/statistics_json.h"
 #include "tools/options.h"
 
 namespace {
