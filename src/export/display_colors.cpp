@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "export/voxel_color.h"
-
 namespace bki_mapping {
 namespace {
 

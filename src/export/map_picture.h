@@ -9,7 +9,7 @@
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/rules/voxel_state.h"
-#include "export/voxel_color.h"
+#include "export/display_colors.h"
 
 namespace bki_mapping {
 

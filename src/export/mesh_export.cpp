@@ -9,9 +9,9 @@
 
 #include "core/atomic_file.h"
 #include "core/float_origin.h"
+#include "export/display_colors.h"
 #include "export/open_faces.h"
 #include "export/ordered_json.h"
-#include "export/voxel_color.h"
 #include "export/voxel_points.h"
 
 namespace bki_mapping {

@@ -4,7 +4,7 @@
 #include <new>
 #include <numeric>
 
-#include "export/voxel_color.h"
+#include "export/display_colors.h"
 
 namespace bki_mapping {
 namespace {

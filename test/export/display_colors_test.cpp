@@ -8,7 +8,6 @@
 #include <set>
 
 #include "bki_mapping/settings/yaml.h"
-#include "export/voxel_color.h"
 
 namespace bki_mapping {
 namespace {

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "bki_mapping/rules/voxel_state.h"
+#include "export/display_colors.h"
 #include "export/open_faces.h"
-#include "export/voxel_color.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
 

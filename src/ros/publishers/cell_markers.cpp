@@ -8,7 +8,7 @@
 
 #include "bki_mapping/rules/voxel_state.h"
 #include "core/float_origin.h"
-#include "export/voxel_color.h"
+#include "export/display_colors.h"
 #include "ros/map_publisher.h"
 #include "streamed_markers.h"
 
