@@ -7,7 +7,7 @@
 
 #include "core/stopwatch.h"
 #include "journal/scan_codec.h"
-#include "parallel/thread_priority.h"
+#include "parallel/thread_pool.h"
 
 namespace bki_mapping {
 namespace {

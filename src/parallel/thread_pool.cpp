@@ -1,5 +1,7 @@
 #include "parallel/thread_pool.h"
 
+#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -110,6 +112,12 @@ void ThreadPool::run(std::size_t jobs, std::size_t parts, Call call, void* calla
     work(0);
   }
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void yieldToOtherThreads() {
+  constexpr int kNiceness = 19;  // the most
+  // On Linux, niceness is a property of the thread, although POSIX speaks of the process.
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);
 }
 
 }  // namespace bki_mapping

@@ -93,4 +93,8 @@ class ThreadPool {
   pid_t process_;  ///< that has the helpers
 };
 
+/// Gives other threads of the process priority over the calling one: publishing and corrections may wait, a
+/// scan may not.
+void yieldToOtherThreads();
+
 }  // namespace bki_mapping

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "parallel/group_by.h"
 #include "parallel/index_numbering.h"
 #include "parallel/ordered_queue.h"
-#include "parallel/runs_by_index.h"
 #include "parallel/thread_pool.h"
 #include "points/cell_merger.h"
 #include "points/point_kernels.h"

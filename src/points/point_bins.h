@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "kernel/sparse_kernel.h"
+#include "parallel/group_by.h"
 #include "parallel/index_numbering.h"
 #include "parallel/ordered_queue.h"
-#include "parallel/runs_by_index.h"
 #include "parallel/thread_pool.h"
 #include "points/local_point.h"
 #include "points/merged_points.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "parallel/thread_priority.h"
+#include "parallel/thread_pool.h"
 #include "rules/neighbourhood.h"
 
 namespace bki_mapping::ros_interface {
