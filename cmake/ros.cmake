@@ -23,9 +23,7 @@ bki_mapping_room(ros SOURCES
     mapping_diagnostics.cpp
     mapping_server.cpp
     mapping_services.cpp
-    new_drive.cpp
     no_returns.cpp
-    periodic_save.cpp
     point_account.cpp
     point_field.cpp
     point_times.cpp

@@ -3,18 +3,44 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <utility>
 
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "ros/map_file_settings.h"
-#include "ros/new_drive.h"
 #include "store/drive_overlap.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
+
+/// An id that no other drive of any robot has: a random UUID from the kernel.
+std::string newId() {
+  std::string id;
+  std::ifstream("/proc/sys/kernel/random/uuid") >> id;
+  if (id.empty()) throw std::runtime_error("/proc/sys/kernel/random/uuid gives no id for the drive");
+  return id;
+}
+
+std::string utcText() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[sizeof "2000-01-01T00:00:00Z"];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+/// A drive without scans. @param name for people; the time is added to it.
+DriveRecord newDrive(const std::string& name) {
+  DriveRecord drive;
+  drive.id = newId();
+  drive.name = name + " " + utcText();
+  return drive;
+}
 
 /// Fraction of memory_limit up to which tiles of a city are loaded; the rest is for scans.
 constexpr double kMostOfMemory = 0.8;
@@ -244,6 +270,23 @@ KeptMap::Saving KeptMap::saveTo(const std::string& path) {
   if (drive_.scans > 0) saving.drives.push_back(drive_);
   if (keeper_) saving.done = samePath(path, keeper_->path()) ? keeper_->save() : keeper_->saveTo(path);
   return saving;
+}
+
+void PeriodicSave::update(MapKeeper& keeper, double period, Clock::time_point now, bool due) {
+  if (saving_.valid() && saving_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    saving_.get();
+    saved_ = saving_since_;
+  }
+  if (!due && (!unsaved_ || period <= 0.0 || now - begun_ < std::chrono::duration<double>(period))) return;
+  saveNow(keeper, now);
+}
+
+void PeriodicSave::saveNow(MapKeeper& keeper, Clock::time_point now) {
+  if (saving_.valid()) return;
+  begun_ = now;
+  saving_since_ = ros::WallTime::now();
+  saving_ = keeper.save();
+  unsaved_ = false;
 }
 
 }  // namespace bki_mapping::ros_interface

@@ -1,6 +1,9 @@
 /// @file The map of the server over time: in memory, in a map file, or read only, and the drives in it.
 #pragma once
 
+#include <ros/time.h>
+
+#include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -12,10 +15,30 @@
 #include "journal/journal_writer.h"
 #include "journal/map_corrector.h"
 #include "ros/city_tiles.h"
-#include "ros/periodic_save.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
+
+/// Begins a save when one is due and something has changed, one at a time. Never waits for the disk.
+class PeriodicSave {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Notes that the map has evidence that is not saved.
+  void noteChange() { unsaved_ = true; }
+  /// @param period [s]; 0: never. @param due whether to save before it has passed.
+  void update(MapKeeper& keeper, double period, Clock::time_point now, bool due = false);
+  /// Begins a save, unless one is under way.
+  void saveNow(MapKeeper& keeper, Clock::time_point now);
+  /// Wall time up to which everything is saved; 0: nothing was saved yet.
+  ros::WallTime saved() const { return saved_; }
+
+ private:
+  bool unsaved_ = false;
+  std::future<void> saving_;
+  ros::WallTime saving_since_, saved_;
+  Clock::time_point begun_{};
+};
 
 /// Keeps the map of a mapper in the window, and in the map file if there is one. If the map file is a city,
 /// loads what is near the sensor from it, and keeps the map in a file of the mapper's own, or only in memory;
