@@ -13,7 +13,7 @@ bki_mapping_room(ros SOURCES
     input_config.cpp
     input_notes.cpp
     kept_map.cpp
-    label_field.cpp label_reader.cpp
+    label_reader.cpp
     live_settings.cpp
     reconfigure_server.cpp
     load_advice.cpp

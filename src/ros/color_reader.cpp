@@ -1,4 +1,4 @@
-#include "ros/color_reader.h"
+#include "ros/label_reader.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,5 @@
 #include "ros/label_reader.h"
 
-#include "ros/color_reader.h"
-#include "ros/label_field.h"
-#include "ros/score_reader.h"
-
 namespace bki_mapping::ros_interface {
 namespace {
 
@@ -43,6 +39,24 @@ std::unique_ptr<LabelReader> makeLabelReader(const sensor_msgs::PointCloud2& clo
       if (input.label_field.empty()) return std::make_unique<NoLabels>();
       return std::make_unique<NumberReader>(cloud, input.label_field, classes, label_values);
   }
+}
+
+LabelField::Label LabelField::read(const std::uint8_t* point, UnlistedLabels& unknown) {
+  const std::optional<std::int64_t> number = field_.rounded(point);
+  if (!any_read_ || number != number_) {
+    any_read_ = true;
+    number_ = number;
+    label_.label = number && field_.exact(*number) ? labelOf(*number) : kNoLabel;
+    label_.id = classes_.classOf(label_.label, values_);
+  }
+  if (label_.id) return label_;
+  if (number) {
+    unknown.add(*number);
+    if (!field_.exact(*number)) unknown.noteRounding();
+  } else {
+    unknown.addMissing();
+  }
+  return label_;
 }
 
 }  // namespace bki_mapping::ros_interface

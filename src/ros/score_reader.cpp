@@ -1,10 +1,8 @@
-#include "ros/score_reader.h"
+#include "ros/label_reader.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-
-#include "ros/label_field.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
