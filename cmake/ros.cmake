@@ -8,7 +8,7 @@ bki_mapping_room(ros SOURCES
     cloud_frame.cpp
     clock_offset.cpp
     color_reader.cpp
-    corrected_poses.cpp correction_config.cpp
+    corrected_poses.cpp
     distance_section_config.cpp
     input_config.cpp
     input_notes.cpp

@@ -11,13 +11,22 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/query/column_map.h"
-#include "ros/correction_config.h"
 #include "ros/distance_section_config.h"
 #include "ros/input_config.h"
 #include "ros/scan_queue.h"
 #include "ros/time_watch.h"
 
 namespace bki_mapping::ros_interface {
+
+/// The journal of scans, and corrected poses.
+struct CorrectionConfig {
+  bool journal = false;            ///< whether scans are kept, so that they can move
+  double journal_quantum = 0.01;   ///< to which points are rounded in the sensor's frame [m]
+  double journal_limit = 4000.0;   ///< of the memory of kept scans [MB]; 0: none
+  double tolerance = -1.0;         ///< by which points may be off [m]; < 0: a tenth of the resolution
+  std::string corrected_frame_id;  ///< whose poses corrected_path has; "": the sensor's
+  std::string odometry_frame_id;   ///< in which poses do not jump; "": not known
+};
 
 enum class ColorMode { kSemantics, kProbability, kVariance, kHeight };
 
