@@ -3,7 +3,6 @@ set(BKI_MAPPING_CATKIN_COMPONENTS
   diagnostic_updater dynamic_reconfigure geometry_msgs map_msgs message_generation nav_msgs nodelet pluginlib rosbag roscpp
   rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros topic_tools visualization_msgs)
 find_package(catkin REQUIRED COMPONENTS ${BKI_MAPPING_CATKIN_COMPONENTS})
-find_package(pcl_conversions REQUIRED)  # headers only: its libraries are all of VTK
 
 add_message_files(DIRECTORY msg)
 add_service_files(DIRECTORY srv)

@@ -1,5 +1,5 @@
 # The ROS shell: nodelet, node and the programs that speak ROS.
-include_directories(SYSTEM ${catkin_INCLUDE_DIRS} ${pcl_conversions_INCLUDE_DIRS})
+include_directories(SYSTEM ${catkin_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
     beam_grid.cpp
     city_loader.cpp
@@ -40,8 +40,7 @@ bki_mapping_room(ros SOURCES
     score_reader.cpp
     server_config.cpp
     tf_jumps.cpp
-    voxel_pcl.cpp
-  LINK bki_mapping_city bki_mapping_export bki_mapping_journal pcl_common ${catkin_LIBRARIES})
+  LINK bki_mapping_city bki_mapping_export bki_mapping_journal ${catkin_LIBRARIES})
 set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)

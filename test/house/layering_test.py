@@ -43,7 +43,7 @@ LIBRARIES = {
     'evaluation': ('nlohmann/', 'octomap/', 'pcl/'),
     'python': ('pybind11/',),
     'simulation': ('yaml-cpp/',),
-    'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'pcl/', 'pcl_conversions/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
+    'ros': ('diagnostic_updater/', 'dynamic_reconfigure/', 'ros/', 'nodelet/', 'pluginlib/', 'tf2_ros/', 'bki_mapping/'),
     'costmap/semantic_layer.cpp': ('costmap_2d/', 'dynamic_reconfigure/', 'pluginlib/', 'ros/', 'tf2/', 'tf2_ros/'),
     'tools': ('boost/program_options', 'nlohmann/', 'ros/', 'rosbag/', 'bki_mapping/'),
     'lab/tools/yardstick.cpp': ('pcl/',),

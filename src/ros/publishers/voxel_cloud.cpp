@@ -1,8 +1,127 @@
-#include "streamed_cloud.h"
+#include <bki_mapping/VoxelCloudUpdate.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "export/voxel_points.h"
+#include "ros/cloud_frame.h"
+#include "ros/server_snapshot.h"
+#include "streamed_message.h"
 #include "updates.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
+
+/// The field `data` of a PointCloud2 of voxels.
+class CloudData {
+ public:
+  CloudData() = default;  ///< no points
+  /// Counts the points. @param snapshot must outlive this. @param origin of the coordinates [m].
+  CloudData(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+            const Eigen::Vector3d& origin)
+      : content_(std::make_shared<Content>(snapshot, selection, std::move(blocks))), origin_(origin) {}
+
+  std::size_t points() const { return content_ ? content_->points.count() : 0; }
+  std::uint32_t bytes() const { return messageBytes(points(), sizeof(VoxelPoint)); }
+  std::uint32_t count() const { return bytes(); }  ///< elements of the array `data`
+  void write(std::uint8_t* to) const {
+    if (content_) content_->points.write(reinterpret_cast<VoxelPoint*>(to), origin_);
+  }
+
+ private:
+  struct Content {
+    Content(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks)
+        : pool(snapshot.threadsFor(blocks.size())),
+          points(snapshot.map, snapshot.rules, snapshot.classes, selection, std::move(blocks), pool) {}
+
+    ThreadPool pool;
+    VoxelPoints points;
+  };
+
+  std::shared_ptr<const Content> content_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+/// A cloud of `count` VoxelPoints, without their data. @throws std::length_error if a cloud cannot hold so
+/// many.
+sensor_msgs::PointCloud2 cloudOfSize(std::size_t count) {
+  if (count > std::numeric_limits<std::uint32_t>::max() / sizeof(VoxelPoint)) {
+    throw std::length_error(std::to_string(count) + " voxels are more than a point cloud can hold");
+  }
+  sensor_msgs::PointCloud2 cloud;
+  for (const VoxelField& field : kVoxelFields) {
+    cloud.fields.emplace_back();
+    cloud.fields.back().name = field.name;
+    cloud.fields.back().offset = field.offset;
+    cloud.fields.back().datatype = field.type;
+    cloud.fields.back().count = 1;
+  }
+  cloud.point_step = sizeof(VoxelPoint);
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(count);
+  cloud.row_step = cloud.point_step * cloud.width;
+  cloud.is_dense = true;
+  return cloud;
+}
+
+/// A cloud of voxels.
+struct CloudFields {
+  using Message = sensor_msgs::PointCloud2;
+
+  CloudFields() = default;
+  /// @param snapshot must outlive this. @param in the frame of the cloud.
+  CloudFields(const ServerSnapshot& snapshot, const VoxelSelection& selection, VoxelPoints::Blocks blocks,
+              const CloudFrame& in)
+      : data(snapshot, selection, std::move(blocks), in.origin()) {
+    frame = cloudOfSize(data.points());
+    frame.header = snapshot.header;
+    frame.header.frame_id = in.name(snapshot.header.frame_id);
+  }
+
+  template <typename Visit>
+  void forEachMember(const Visit& visit) const {
+    visit(frame.header);
+    visit(frame.height);
+    visit(frame.width);
+    visit(frame.fields);
+    visit(frame.is_bigendian);
+    visit(frame.point_step);
+    visit(frame.row_step);
+    visit(data);
+    visit(frame.is_dense);
+  }
+
+  sensor_msgs::PointCloud2 frame;  ///< all but the data
+  StreamedArray<CloudData> data;
+};
+using StreamedCloud = StreamedMessage<CloudFields>;
+
+struct CloudUpdateFields {
+  using Message = VoxelCloudUpdate;
+
+  template <typename Visit>
+  void forEachMember(const Visit& visit) const {
+    visit(header);
+    visit(sequence);
+    visit(whole);
+    visit(resolution);
+    visit(blocks);
+    visit(cloud);
+  }
+
+  std_msgs::Header header;
+  std::uint64_t sequence = 0;
+  std::uint8_t whole = false;
+  float resolution = 0.0f;
+  std::vector<BlockCoordinates> blocks;
+  StreamedCloud cloud;
+};
+using StreamedCloudUpdate = StreamedMessage<CloudUpdateFields>;
 
 /// All known voxels.
 VoxelSelection known() {
