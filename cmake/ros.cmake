@@ -15,7 +15,6 @@ bki_mapping_room(ros SOURCES
     kept_map.cpp
     label_reader.cpp
     live_settings.cpp
-    reconfigure_server.cpp
     load_advice.cpp
     map_cloud.cpp
     map_file_settings.cpp

@@ -3,16 +3,41 @@
 
 #include <bki_mapping/MappingConfig.h>
 #include <dynamic_reconfigure/Config.h>
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <ros/node_handle.h>
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
-#include "ros/reconfigure_server.h"
 #include "ros/server_config.h"
 
 namespace bki_mapping::ros_interface {
+
+/// Serves dynamic_reconfigure's clients in the namespace `~reconfigure`, also with the values on the
+/// parameter server. dynamic_reconfigure::Server would clamp values to the limits that clients show, and
+/// leave out unknown names, before its owner sees them.
+class ReconfigureServer {
+ public:
+  /// Makes a change, or does not. @return the configuration in force afterwards.
+  using Change = std::function<MappingConfig(const dynamic_reconfigure::Config& asked)>;
+
+  /// @param config in force at the start.
+  ReconfigureServer(ros::NodeHandle private_node, const MappingConfig& config, Change change);
+
+ private:
+  void publish(const MappingConfig& config);
+  bool onSet(dynamic_reconfigure::Reconfigure::Request& request,
+             dynamic_reconfigure::Reconfigure::Response& response);
+
+  ros::NodeHandle values_;  ///< where the parameter server has them
+  Change change_;
+  std::mutex mutex_;  ///< one change at a time
+  ros::Publisher descriptions_, updates_;
+  ros::ServiceServer service_;
+};
 
 /// Parameters that clients see although they cannot change while mapping; a change of one is refused.
 inline const std::vector<std::string>& shownAtStart() {
