@@ -6,7 +6,6 @@
 #include "bki_mapping/core/named_parameter.h"
 #include "core/percent.h"
 #include "ros/load_advice.h"
-#include "ros/point_account.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

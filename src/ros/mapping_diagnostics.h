@@ -7,7 +7,7 @@
 #include <string>
 
 #include "bki_mapping/mapping/mapper_config.h"
-#include "ros/health.h"
+#include "ros/point_account.h"
 #include "ros/scan_ledger.h"
 
 namespace bki_mapping::ros_interface {

@@ -1,13 +1,13 @@
 // Runs the mapping server as a node.
 #include <ros/ros.h>
 
+#include <csignal>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "ros/start_server.h"
-#include "ros/termination.h"
 
 namespace {
 
@@ -32,7 +32,8 @@ int main(int argc, char** argv) {
     return 1;
   }
   ros::init(argc, argv, "mapping");
-  bki_mapping::ros_interface::endOnTerminate();
+  // SIGTERM ends it as SIGINT does: ros::ok() becomes false, and destructors run.
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   const ros::NodeHandle node,
       private_node("~");  // while a handle exists, ROS keeps the log open for the error below
   try {

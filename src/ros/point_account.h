@@ -9,10 +9,15 @@
 
 #include "core/unlisted_labels.h"
 #include "mapping/scan_preprocessor.h"
-#include "ros/health.h"
 #include "ros/input_config.h"
 
 namespace bki_mapping::ros_interface {
+
+/// The health reported on /diagnostics: a level of diagnostic_msgs/DiagnosticStatus, and its message.
+struct Health {
+  std::uint8_t level = 0;
+  std::string message;
+};
 
 /// A reason for which points are left out, and its counters.
 struct PointKind {

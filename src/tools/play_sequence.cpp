@@ -5,13 +5,13 @@
 #include <rosgraph_msgs/Clock.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <set>
 #include <stdexcept>
 
-#include "ros/termination.h"
 #include "tools/sequence_messages.h"
 #include "tools/sequence_options.h"
 
@@ -181,7 +181,8 @@ int main(int argc, char** argv) {
     if (!given) return 0;
     if (given->count("check")) return check(*given);
     ros::init(argc, argv, "play_sequence");
-    ros_interface::endOnTerminate();
+    // SIGTERM ends it as SIGINT does: ros::ok() becomes false, and destructors run.
+    std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
     takeFolderOfParameter(*given);
     return play(*given);
   });

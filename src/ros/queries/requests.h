@@ -5,6 +5,7 @@
 #include <geometry_msgs/Vector3.h>
 
 #include <Eigen/Core>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,11 @@ Message fromVector(const Eigen::Vector3d& vector) {
 }
 
 /// @param what a batch consists of, such as "points". @throws std::invalid_argument if it has too many.
-void checkBatch(std::size_t count, std::size_t most, const char* what);
+inline void checkBatch(std::size_t count, std::size_t most, const char* what) {
+  if (count <= most) return;
+  throw std::invalid_argument("the call has " + std::to_string(count) + " " + what + "; split it, " +
+                              std::to_string(most) + " are the most");
+}
 
 /// @param values one for each of `count` things, or one for all. @param field their name in the request.
 /// @throws std::invalid_argument if there are neither.
@@ -54,6 +59,10 @@ const auto& valueFor(const Values& values, std::size_t n) {
 
 /// The classes that a request means: those named, all but those, or, without names, all.
 /// @throws std::invalid_argument that lists the names that the table lacks.
-ClassFilter classesOf(const ClassTable& table, const std::vector<std::string>& names, bool all_but);
+inline ClassFilter classesOf(const ClassTable& table, const std::vector<std::string>& names, bool all_but) {
+  checkBatch(names.size(), kMaxClasses, "names of classes");
+  const ClassFilter named = ClassFilter::of(table, names);
+  return names.empty() || all_but ? ClassFilter::allBut(named) : named;
+}
 
 }  // namespace bki_mapping::ros_interface
