@@ -7,7 +7,6 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/settings/yaml.h"
-#include "cases.h"
 #include "core/atomic_file.h"
 #include "core/quantile.h"
 #include "core/stopwatch.h"

@@ -1,7 +1,9 @@
 /// @file How often predictions with a probability are correct: expected calibration error (ECE).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace bki_mapping {
@@ -16,11 +18,23 @@ class Reliability {
   };
 
   /// Adds `count` predictions of equal probability. @param right how many of them are correct.
-  void add(double probability, std::size_t count, std::size_t right);
+  void add(double probability, std::size_t count, std::size_t right) {
+    Bin& bin = bins_[static_cast<std::size_t>(10.0 * std::min(probability, 0.999999))];
+    bin.count += count;
+    bin.right += right;
+    bin.probability += probability * static_cast<double>(count);
+  }
   const std::array<Bin, 10>& bins() const { return bins_; }
   /// Expected calibration error: the mean, over all predictions, of |accuracy - mean probability| in their
   /// bin. NaN without predictions.
-  double error() const;
+  double error() const {
+    double error = 0.0, count = 0.0;
+    for (const Bin& bin : bins_) {
+      error += std::abs(static_cast<double>(bin.right) - bin.probability);
+      count += static_cast<double>(bin.count);
+    }
+    return error / count;
+  }
 
  private:
   std::array<Bin, 10> bins_;

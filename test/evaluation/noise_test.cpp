@@ -5,8 +5,7 @@
 #include <map>
 #include <set>
 
-#include "evaluation/label_noise.h"
-#include "evaluation/pose_noise.h"
+#include "evaluation/noise.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {
