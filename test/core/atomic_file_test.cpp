@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/atomic_file.h"
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -35,12 +36,7 @@ class FilesAndLinks : public testing::Test {
     return static_cast<int>(status.st_mode & 0777);
   }
   static std::string faultOf(const std::string& path) {
-    try {
-      writeTextFile(path, "new");
-    } catch (const std::runtime_error& fault) {
-      return fault.what();
-    }
-    return "";
+    return refusalOf<std::runtime_error>([&] { writeTextFile(path, "new"); });
   }
   void expectRefused(const std::string& path, const std::string& words) {
     const std::size_t before = entries();
@@ -220,12 +216,8 @@ TEST_F(FilesAndLinks, AFullDiskIsSaidWithTheFreeSpace) {
   std::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{1000, before.rlim_max};  // simulates a full disk
   setrlimit(RLIMIT_FSIZE, &small);
-  std::string fault;
-  try {
-    writeTextFile(path, std::string(5000, 'x'));
-  } catch (const std::runtime_error& error) {
-    fault = error.what();
-  }
+  const std::string fault =
+      refusalOf<std::runtime_error>([&] { writeTextFile(path, std::string(5000, 'x')); });
   setrlimit(RLIMIT_FSIZE, &before);
   EXPECT_NE(fault.find(path + " cannot be written: File too large"), std::string::npos) << fault;
   EXPECT_NE(fault.find("MB free"), std::string::npos) << fault;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bki_mapping/store/mapper_file.h"
+#include "refusal_of.h"
 #include "sequence/trajectory_file.h"
 #include "store/map_maker.h"
 #include "store/summand.h"
@@ -326,21 +327,10 @@ TEST_F(HtmlExport, TellsDrivesApart) {
   for (std::size_t d = 1; d < 5; ++d) EXPECT_GT(found_drives[d], 0u) << d;
 }
 
-/// The sentence with which a call fails.
-template <typename Error>
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST_F(HtmlExport, RefusesWhatNoBrowserCanShow) {
   const std::string path = folder_ / "map.html";
   const auto refused = [&](const SemanticMap& map) {
-    return refusal<std::invalid_argument>(
+    return refusalOf<std::invalid_argument>(
         [&] { exportHtml(path, map, kRules, *infoOf().classes, options_); });
   };
   EXPECT_EQ(refused(infoOf().emptyMap()), "there is no voxel to show; check --box and --include");
@@ -365,8 +355,8 @@ TEST_F(HtmlExport, RefusesWhatNoBrowserCanShow) {
 TEST_F(HtmlExport, SaysWhatToInstall) {
   options_.three_js = folder_ / "none.js";
   const std::string sentence = "three.js is not in " + options_.three_js;
-  EXPECT_EQ(refusal<std::runtime_error>([&] { checkHtml(options_); }), sentence);
-  EXPECT_EQ(refusal<std::runtime_error>([&] { exported(someMap(), *infoOf().classes); }), sentence);
+  EXPECT_EQ(refusalOf<std::runtime_error>([&] { checkHtml(options_); }), sentence);
+  EXPECT_EQ(refusalOf<std::runtime_error>([&] { exported(someMap(), *infoOf().classes); }), sentence);
   EXPECT_EQ(folder_.fileCount(), 1u);
 }
 
@@ -382,7 +372,7 @@ TEST(TrajectoryFile, HasThePlacesOfPoses) {
   EXPECT_EQ(trajectory.points[0], Eigen::Vector3d(1.0, -2.0, 3.0));
   EXPECT_EQ(trajectory.points[1], Eigen::Vector3d(4.0, 5.0, 6.0));
   const auto sentence = [&](const std::string& text) {
-    return refusal<std::runtime_error>([&] { read(text); });
+    return refusalOf<std::runtime_error>([&] { read(text); });
   };
   const std::string path = folder / "poses.txt";
   for (const char* matrix : {"0 -1 0 1 1 0 0 -2 0 0 1 3", "0 -1 0 1 1 0 0 -2 0 0 1 3 0 0 0 1"}) {
@@ -398,7 +388,7 @@ TEST(TrajectoryFile, HasThePlacesOfPoses) {
   EXPECT_EQ(sentence("1 2 3 4\n1 0 0 0 0 1 0 0 0 0 1 0\n"),
             path + " line 2 has 12 numbers, but needs 4, as the lines before it");
   EXPECT_EQ(sentence("# nothing\n"), "the trajectory " + path + " has no pose");
-  EXPECT_EQ(refusal<std::runtime_error>([&] { readTrajectory(folder / "none"); }),
+  EXPECT_EQ(refusalOf<std::runtime_error>([&] { readTrajectory(folder / "none"); }),
             (folder / "none") + " cannot be read; give a file of poses, or the folder of a sequence");
 }
 

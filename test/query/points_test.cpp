@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "query/query_map.h"
+#include "refusal_of.h"
 
 namespace bki_mapping {
 namespace {
@@ -121,12 +122,8 @@ TEST(ReadPoints, NamesThePointThatIsNotFinite) {
   points[39000].y() = std::numeric_limits<double>::infinity();
   points[123].z() = std::numeric_limits<double>::quiet_NaN();
   Answers answers(points.size());
-  try {
-    readPoints(states, points, answers.values());
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "point 123 of 40000 has a coordinate that is not finite; remove such points");
-  }
+  EXPECT_EQ(refusalOf([&] { readPoints(states, points, answers.values()); }),
+            "point 123 of 40000 has a coordinate that is not finite; remove such points");
 }
 
 TEST(StateMap, RefusesImpossibleThreads) {

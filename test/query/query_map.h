@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bki_mapping/rules/voxel_state.h"
+#include "refusal_of.h"
 
 namespace bki_mapping {
 
@@ -19,12 +20,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Expects that a call is refused with this sentence.
 template <typename Call>
 void expectRefused(const std::string& sentence, Call&& call) {
-  try {
-    call();
-    FAIL() << sentence;
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), sentence);
-  }
+  EXPECT_EQ(refusalOf(call), sentence);
 }
 
 /// How a random map is made.

@@ -12,6 +12,7 @@
 
 #include "query/query_map.h"
 #include "query/ray_walk.h"
+#include "refusal_of.h"
 
 namespace bki_mapping {
 namespace {
@@ -296,12 +297,7 @@ void expectRayRefused(const Ray& ray, const std::string& sentence) {
   const StateMap states(map, queryRules());
   const std::vector<Ray> rays = {{{0, 0, 0}, {1, 0, 0}, 1.0}, ray};
   std::vector<RayHit> hits(2);
-  try {
-    castRays(states, rays, {}, hits);
-    FAIL() << sentence;
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), "ray 1 " + sentence);
-  }
+  EXPECT_EQ(refusalOf([&] { castRays(states, rays, {}, hits); }), "ray 1 " + sentence);
   EXPECT_THROW(castRay(states, ray), std::invalid_argument);
 }
 

@@ -13,6 +13,7 @@
 
 #include "query/query_map.h"
 #include "query/slow_frontiers.h"
+#include "refusal_of.h"
 
 namespace bki_mapping {
 namespace {
@@ -380,15 +381,10 @@ TEST(Frontiers, OfABoxAreThoseOfItsVoxels) {
 TEST(Frontiers, RefuseBoxesThatAreNone) {
   const SemanticMap map = queryMap(39);
   const StateMap states(map, queryRules(), 1);
-  const auto sentence = [&](const Eigen::Vector3d& min, const Eigen::Vector3d& max) -> std::string {
+  const auto sentence = [&](const Eigen::Vector3d& min, const Eigen::Vector3d& max) {
     FrontierRules rules;
     rules.box.emplace(min, max);
-    try {
-      frontiers(states, rules);
-    } catch (const std::invalid_argument& fault) {
-      return fault.what();
-    }
-    return "";
+    return refusalOf([&] { frontiers(states, rules); });
   };
   EXPECT_EQ(sentence({0, 2, 0}, {1, 1, 1}), "the box is inside out; give a min below its max");
   EXPECT_EQ(sentence({0, kNan, 0}, {1, 1, 1}),

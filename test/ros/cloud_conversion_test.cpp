@@ -8,6 +8,7 @@
 
 #include "bki_mapping/settings/yaml.h"
 #include "cloud_maker.h"
+#include "refusal_of.h"
 #include "ros/cloud_conversion.h"
 #include "ros/pose_conversion.h"
 
@@ -32,12 +33,7 @@ CloudContent read(const sensor_msgs::PointCloud2& cloud, const std::string& fiel
 }
 
 std::string faultOf(const sensor_msgs::PointCloud2& cloud, const std::string& field = "label") {
-  try {
-    read(cloud, field);
-  } catch (const std::invalid_argument& fault) {
-    return fault.what();
-  }
-  return "";
+  return refusalOf([&] { read(cloud, field); });
 }
 
 TEST(Cloud, IsReadAsItWasMade) {

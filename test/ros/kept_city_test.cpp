@@ -9,6 +9,7 @@
 
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/mapper_file.h"
+#include "refusal_of.h"
 #include "ros/kept_map.h"
 #include "ros/map_file_settings.h"
 #include "store/file_content.h"
@@ -290,13 +291,8 @@ TEST_F(KeptCity, MemoryLimitEndsLoadingWithASentence) {
 }
 
 TEST_F(KeptCity, SettingsThatContradictEachOtherAreRefused) {
-  const auto refusal = [](const ServerConfig& config) -> std::string {
-    try {
-      checkMapFileSettings(config);
-    } catch (const std::invalid_argument& fault) {
-      return fault.what();
-    }
-    return "";
+  const auto refusal = [](const ServerConfig& config) {
+    return refusalOf([&] { checkMapFileSettings(config); });
   };
   ServerConfig config = config_;
   EXPECT_EQ(refusal(config), "");

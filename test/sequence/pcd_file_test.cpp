@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -25,15 +26,10 @@ class PcdFile : public testing::Test {
   }
   template <typename Read>
   void expectFault(const std::string& words, Read&& read) {
-    try {
-      read(path_);
-      FAIL() << "nothing was wrong, but should be: " << words;
-    } catch (const std::runtime_error& fault) {
-      const std::string text = fault.what();
-      EXPECT_NE(text.find(words), std::string::npos) << text;
-      EXPECT_EQ(text.find(path_), 0u) << text;
-      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-    }
+    const std::string text = refusalOf<std::runtime_error>([&] { read(path_); });
+    EXPECT_NE(text.find(words), std::string::npos) << "'" << text << "' should be: " << words;
+    EXPECT_EQ(text.find(path_), 0u) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
   }
   void expectFault(const std::string& words) { expectFault(words, readPcdPoints); }
 

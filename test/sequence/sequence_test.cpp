@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "bki_mapping/sequence/sequence.h"
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -35,13 +36,11 @@ class SequenceFolder : public testing::Test {
     std::ofstream(folder_ / ("drive/" + file), std::ios::binary) << text;
   }
   void expectFault(const std::string& words) {
-    try {
+    const std::string text = refusalOf<std::runtime_error>([&] {
       const Sequence sequence(folder_ / "drive");
       for (std::size_t i = 0; i < sequence.size(); ++i) sequence.read(i);
-      FAIL() << "nothing was wrong, but should be: " << words;
-    } catch (const std::runtime_error& fault) {
-      EXPECT_NE(std::string(fault.what()).find(words), std::string::npos) << fault.what();
-    }
+    });
+    EXPECT_NE(text.find(words), std::string::npos) << "'" << text << "' should be: " << words;
   }
 
   TemporaryFolder folder_;

@@ -2,30 +2,21 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <functional>
 #include <map>
 
 #include "bki_mapping/settings/yaml.h"
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
 namespace {
-
-std::string messageOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::invalid_argument& fault) {
-    return fault.what();
-  }
-  return "";
-}
 
 /// The message of the exception when a table with this text is loaded.
 std::string faultOf(const std::string& text) {
   const TemporaryFolder folder;
   const std::string file = folder / "file.yaml";
   std::ofstream(file) << text;
-  return messageOf([&] { loadClassTable(file); });
+  return refusalOf([&] { loadClassTable(file); });
 }
 
 #define EXPECT_NAMES(message, words) EXPECT_NE((message).find(words), std::string::npos) << (message)
@@ -227,14 +218,14 @@ TEST(ClassTable, AnyCountUpTo254) {
   EXPECT_EQ(ClassTable("many", classes).size(), 254u);
   classes.emplace_back();
   classes.back().id = 254;
-  EXPECT_NAMES(messageOf([&] { ClassTable("too many", classes); }), "more than 254");
+  EXPECT_NAMES(refusalOf([&] { ClassTable("too many", classes); }), "more than 254");
 }
 
 TEST(ClassTable, NamesEveryFault) {
   const std::string head = "classes:\n  - {id: 1, name: a, color: [1, 2, 3]}\n";
   EXPECT_EQ(faultOf(head), "");
-  EXPECT_NAMES(messageOf([] { loadClassTable("semantic_kiti"); }), "did you mean 'semantic_kitti'?");
-  EXPECT_NAMES(messageOf([] { loadClassTable("/no/such/file.yaml"); }), "/no/such/file.yaml");
+  EXPECT_NAMES(refusalOf([] { loadClassTable("semantic_kiti"); }), "did you mean 'semantic_kitti'?");
+  EXPECT_NAMES(refusalOf([] { loadClassTable("/no/such/file.yaml"); }), "/no/such/file.yaml");
   EXPECT_NAMES(faultOf(head + "  - {id: 1, name: b, color: [1, 2, 3], raw: [9]}\n"), "id 1 is given twice");
   EXPECT_NAMES(faultOf(head + "  - {id: 2, name: a, color: [1, 2, 3], raw: [9]}\n"),
                "name 'a' is given twice");

@@ -7,6 +7,7 @@
 
 #include "bki_mapping/settings/yaml.h"
 #include "core/stopwatch.h"
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -17,12 +18,7 @@ class YamlFile : public testing::Test {
   void write(const std::string& text) { std::ofstream(path_, std::ios::binary) << text; }
   std::string faultOf(const std::string& text) {
     write(text);
-    try {
-      loadYamlFile(path_);
-    } catch (const YAML::Exception& fault) {
-      return fault.what();
-    }
-    return "";
+    return refusalOf<YAML::Exception>([&] { loadYamlFile(path_); });
   }
   void expectFault(const std::string& text, const std::string& words) {
     Stopwatch watch;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "refusal_of.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -25,14 +26,7 @@ TEST(TruthCloud, HoldsZerosAndOnes) {
                         << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count << "\nDATA ascii\n"
                         << rows;
   };
-  const auto fault = [&]() -> std::string {
-    try {
-      readTruthCloud(path);
-      return "";
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-  };
+  const auto fault = [&] { return refusalOf<std::runtime_error>([&] { readTruthCloud(path); }); };
   write("label", "1 2 3 1\nnan 0 0 0\n", 2);
   EXPECT_EQ(readTruthCloud(path).moving, std::vector<std::uint8_t>{1});
   EXPECT_EQ(readTruthCloud(path).not_finite, 1u);

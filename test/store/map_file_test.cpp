@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "reference/content.h"
+#include "refusal_of.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
 
@@ -176,13 +177,8 @@ TEST(MapFile, RefusesOtherFiles) {
 }
 
 TEST(MapInfo, SaysWhyMapsCannotBeAdded) {
-  const auto fault = [](const MapInfo& a, const MapInfo& b) -> std::string {
-    try {
-      checkSameGrid("A", a, "B", b);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+  const auto fault = [](const MapInfo& a, const MapInfo& b) {
+    return refusalOf([&] { checkSameGrid("A", a, "B", b); });
   };
   EXPECT_EQ(fault(infoOf(), infoOf()), "");
   EXPECT_EQ(fault(infoOf(0.25), infoOf(0.5)),

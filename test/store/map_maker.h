@@ -1,13 +1,13 @@
 /// @file Maps for tests of map files.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "bki_mapping/store/map_file.h"
+#include "refusal_of.h"
 
 namespace bki_mapping {
 
@@ -92,13 +92,9 @@ inline DriveRecord driveOf(const std::string& id, int part = 0) {
 }
 
 /// The MapFileError that a call throws; "" if it throws none.
-inline std::string sentenceOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const MapFileError& error) {
-    return error.what();
-  }
-  return "";
+template <typename Call>
+std::string sentenceOf(Call&& call) {
+  return refusalOf<MapFileError>(call);
 }
 
 }  // namespace bki_mapping
