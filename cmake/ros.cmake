@@ -2,7 +2,6 @@
 include_directories(SYSTEM ${catkin_INCLUDE_DIRS})
 bki_mapping_room(ros SOURCES
     beam_grid.cpp
-    city_loader.cpp
     city_tiles.cpp
     cloud_conversion.cpp
     cloud_frame.cpp

@@ -4,7 +4,7 @@
 
 #include "bki_mapping/city/tiled_map.h"
 #include "bki_mapping/store/mapper_file.h"
-#include "ros/city_loader.h"
+#include "ros/city_tiles.h"
 
 namespace bki_mapping::ros_interface {
 namespace {
