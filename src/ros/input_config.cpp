@@ -1,7 +1,7 @@
 #include "ros/input_config.h"
 
+#include "core/frame_name.h"
 #include "core/sensor_model_parameters.h"
-#include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {
 

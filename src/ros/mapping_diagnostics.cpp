@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "core/percent.h"
+#include "core/counted.h"
 #include "ros/load_advice.h"
 
 namespace bki_mapping::ros_interface {

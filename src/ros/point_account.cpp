@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "bki_mapping/core/named_parameter.h"
-#include "core/percent.h"
+#include "core/counted.h"
 #include "ros/point_field.h"
 
 namespace bki_mapping::ros_interface {

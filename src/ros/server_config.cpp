@@ -8,8 +8,8 @@
 
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/settings/yaml.h"
+#include "core/frame_name.h"
 #include "mapping/former_parameters.h"
-#include "ros/frame_parameter.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/settings/yaml.h"
-#include "core/percent.h"
+#include "core/counted.h"
 
 namespace bki_mapping {
 namespace {
