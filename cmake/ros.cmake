@@ -73,7 +73,7 @@ target_link_libraries(mapping_node PRIVATE bki_mapping_ros)
 bki_mapping_warnings(mapping_node)
 bki_mapping_uses_ros(mapping_node)
 
-add_executable(map_bag src/tools/map_bag.cpp src/tools/bag_files.cpp src/tools/bag_reading.cpp)
+add_executable(map_bag src/tools/map_bag.cpp src/tools/bag_reading.cpp)
 bki_mapping_tool(map_bag bki_mapping_ros bki_mapping_export nlohmann_json::nlohmann_json)
 add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)

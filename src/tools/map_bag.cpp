@@ -19,7 +19,6 @@
 #include "journal/kept_scans.h"
 #include "ros/recording_mapper.h"
 #include "ros/server_config.h"
-#include "tools/bag_files.h"
 #include "tools/bag_reading.h"
 #include "tools/interruption.h"
 #include "tools/map_output.h"
