@@ -1,6 +1,10 @@
 /// @file The interface of a free-space mode: from beams to evidence for `free`.
 #pragma once
 
+#include <memory>
+#include <string>
+#include <vector>
+
 #include "beams/beam_field.h"
 #include "bki_mapping/free_space/free_space_config.h"
 #include "update/evidence.h"
@@ -31,5 +35,11 @@ class FreeSpaceModel {
   /// Whether that evidence depends on the blocks that the map has, and so on the order of scans.
   virtual bool dependsOnMap() const { return false; }
 };
+
+/// Names of all modes, sorted.
+std::vector<std::string> freeSpaceModes();
+
+/// Constructs the mode setup.config.mode. @throws std::invalid_argument if it is unknown.
+std::unique_ptr<FreeSpaceModel> makeFreeSpaceModel(const FreeSpaceSetup& setup);
 
 }  // namespace bki_mapping

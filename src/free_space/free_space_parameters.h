@@ -5,7 +5,7 @@
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/free_space/free_space_config.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 
 namespace bki_mapping {
 

@@ -1,4 +1,4 @@
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 
 #include <map>
 #include <stdexcept>

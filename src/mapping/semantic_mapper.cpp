@@ -15,7 +15,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "core/stopwatch.h"
 #include "free_space/beam_samples.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "mapping/scan_preprocessor.h"
 #include "mapping/sensor_height.h"
 #include "points/point_evidence.h"

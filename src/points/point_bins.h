@@ -9,7 +9,6 @@
 #include "parallel/index_numbering.h"
 #include "parallel/ordered_queue.h"
 #include "parallel/thread_pool.h"
-#include "points/local_point.h"
 #include "points/merged_points.h"
 #include "points/point_kernels.h"
 #include "update/evidence.h"

@@ -6,7 +6,7 @@
 
 #include "bki_mapping/map/block.h"
 #include "kernel/vec_kernel_inl.h"
-#include "points/local_point.h"
+#include "points/point_kernels.h"
 #include "points/tile_kernels_inl.h"
 
 namespace bki_mapping {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "journal/random_motion.h"
 #include "reference/content.h"
 #include "reference/scenes.h"

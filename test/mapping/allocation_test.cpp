@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "reference/content.h"
 #include "reference/scenes.h"
 

@@ -9,7 +9,7 @@
 #include "bki_mapping/mapping/mapper_config.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "reference/scenes.h"
 
 namespace bki_mapping {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "other_value.h"
 #include "reference/reference.h"
 #include "reference/scenes.h"

@@ -11,7 +11,7 @@
 #include "bki_mapping/mapping/semantic_mapper.h"
 #include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/settings/yaml.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "other_value.h"
 #include "reference/scenes.h"
 #include "refusal_of.h"

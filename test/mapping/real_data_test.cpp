@@ -10,7 +10,7 @@
 #include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/sequence/sequence.h"
 #include "bki_mapping/settings/yaml.h"
-#include "free_space/registry.h"
+#include "free_space/free_space_model.h"
 #include "reference/reference.h"
 
 namespace bki_mapping {

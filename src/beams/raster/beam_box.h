@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "beams/beams.h"
-#include "beams/raster/beam_slicing.h"
+#include "beams/raster/line_setup.h"
 #include "map/block_group.h"
 
 namespace bki_mapping {
