@@ -12,43 +12,19 @@
 namespace bki_mapping {
 namespace {
 
-using Export = void (*)(const std::string&, const SemanticMap&, const StateRules&, const ClassTable&,
-                        const ExportOptions&);
+enum class Format { kPoints, kTree, kColumns, kFaces, kPage };
 
-void exportPoints(const std::string& path, const SemanticMap& map, const StateRules& rules,
-                  const ClassTable& classes, const ExportOptions& options) {
-  exportMap(path, map, rules, classes, options.states);
-}
-void exportTree(const std::string& path, const SemanticMap& map, const StateRules& rules,
-                const ClassTable& classes, const ExportOptions&) {
-  exportOctoMap(path, map, rules, classes);
-}
-void exportColumns(const std::string& path, const SemanticMap& map, const StateRules& rules,
-                   const ClassTable& classes, const ExportOptions& options) {
-  exportGrid(path, map, rules, classes, options.columns);
-}
-
-void exportFaces(const std::string& path, const SemanticMap& map, const StateRules& rules,
-                 const ClassTable& classes, const ExportOptions&) {
-  exportMesh(path, map, rules, classes);
-}
-
-void exportPage(const std::string& path, const SemanticMap& map, const StateRules& rules,
-                const ClassTable& classes, const ExportOptions& options) {
-  exportHtml(path, map, rules, classes, options.html);
-}
-
-Export exportOf(const std::string& path, bool mesh) {
+Format formatOf(const std::string& path, bool mesh) {
   if (mesh) {
     checkMeshName(path);
-    return exportFaces;
+    return Format::kFaces;
   }
   const std::string ending = std::filesystem::path(path).extension().string();
-  if (ending == ".ply" || ending == ".pcd") return exportPoints;
-  if (ending == ".ot" || ending == ".bt") return exportTree;
-  if (ending == ".yaml") return exportColumns;
-  if (ending == ".glb") return exportFaces;
-  if (ending == ".html") return exportPage;
+  if (ending == ".ply" || ending == ".pcd") return Format::kPoints;
+  if (ending == ".ot" || ending == ".bt") return Format::kTree;
+  if (ending == ".yaml") return Format::kColumns;
+  if (ending == ".glb") return Format::kFaces;
+  if (ending == ".html") return Format::kPage;
   throw std::invalid_argument("the exported file, " + path +
                               ", must end in .ply, .pcd, .ot, .bt, .yaml, .glb or .html");
 }
@@ -56,15 +32,26 @@ Export exportOf(const std::string& path, bool mesh) {
 }  // namespace
 
 void checkExport(const std::string& path, const ExportOptions& options) {
-  const Export chosen = exportOf(path, options.mesh);
+  const Format format = formatOf(path, options.mesh);
   checkWritable(path);
-  if (chosen == exportColumns) checkWritable(gridImagePath(path));
-  if (chosen == exportPage) checkHtml(options.html);
+  if (format == Format::kColumns) checkWritable(gridImagePath(path));
+  if (format == Format::kPage) checkHtml(options.html);
 }
 
 void exportFile(const std::string& path, const SemanticMap& map, const StateRules& rules,
                 const ClassTable& classes, const ExportOptions& options) {
-  exportOf(path, options.mesh)(path, map, rules, classes, options);
+  switch (formatOf(path, options.mesh)) {
+    case Format::kPoints:
+      return exportMap(path, map, rules, classes, options.states);
+    case Format::kTree:
+      return exportOctoMap(path, map, rules, classes);
+    case Format::kColumns:
+      return exportGrid(path, map, rules, classes, options.columns);
+    case Format::kFaces:
+      return exportMesh(path, map, rules, classes);
+    case Format::kPage:
+      return exportHtml(path, map, rules, classes, options.html);
+  }
 }
 
 HeightReference parseHeightReference(const std::string& word) {
