@@ -1,19 +1,16 @@
 #!/usr/bin/env python3
 """map_bag: the map of a bag is that of the sequence in it, and what cannot be read or mapped is said in a sentence. There is no
 master."""
-import contextlib
 import json
 import os
 import re
 import shutil
 import signal
-import sqlite3
-import subprocess
 import sys
-import tempfile
 import unittest
 
-from signals_test import BIN, TIMEOUT, Program
+from programs import ProgramTest, call, read_bytes, read_json, rows, tiles_of
+from signals_test import Program
 
 try:
     import rosbag
@@ -30,11 +27,6 @@ TOPIC = '/velodyne_points'
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in ('ROS_MASTER_URI', 'ROS_IP', 'ROS_HOSTNAME')}
 
 
-def rows(path, query):
-    with contextlib.closing(sqlite3.connect(path)) as database:
-        return sorted(database.execute(query))
-
-
 def transform(stamp, x=0.0, parent='map', child='velodyne'):
     made = TransformStamped()
     made.header.frame_id, made.child_frame_id, made.header.stamp = parent, child, rospy.Time.from_sec(stamp)
@@ -42,11 +34,10 @@ def transform(stamp, x=0.0, parent='map', child='velodyne'):
     return TFMessage([made])
 
 
-class MapBag(unittest.TestCase):
+class MapBag(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp()
-        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        super().setUpClass()
         cls.drive, cls.bag = cls.path('drive'), cls.path('drive.bag')
         cls.call('simulate_drive', '--output', cls.drive, '--scans', SCANS, '--beams', 16, '--columns', 300)
         cls.call('sequence_to_bag', '--sequence', cls.drive, '--output', cls.bag)
@@ -56,19 +47,14 @@ class MapBag(unittest.TestCase):
             cls.clouds = [cloud for _, cloud, _ in bag.read_messages([TOPIC])]
 
     @classmethod
-    def path(cls, name):
-        return os.path.join(cls.folder, name)
-
-    @classmethod
     def call(cls, program, *arguments, status=0):
-        result = subprocess.run([os.path.join(BIN, program), *map(str, arguments)], stdout=subprocess.PIPE,
-                                stderr=subprocess.PIPE, universal_newlines=True, timeout=TIMEOUT, env=ENVIRONMENT, check=False)
+        result = call(program, *arguments, env=ENVIRONMENT)
         assert result.returncode == status, (result.returncode, result.stdout, result.stderr)
         return result
 
     @classmethod
     def tiles(cls, name):
-        found = rows(cls.path(name), 'SELECT z, y, x, content FROM tile WHERE part = 0')
+        found = tiles_of(cls.path(name))
         assert found
         return found
 
@@ -110,8 +96,7 @@ class MapBag(unittest.TestCase):
             include = ('--include', 'occupied,free', '--output')
             self.call('map_bag', self.bag, '--cloud-topic', TOPIC[1:], *include, self.path(name))
             self.call('map_sequence', '--sequence', self.drive, *include, self.path('of_' + name))
-            with open(self.path(name), 'rb') as ours, open(self.path('of_' + name), 'rb') as theirs:
-                self.assertTrue(ours.read() == theirs.read(), name)
+            self.assertTrue(read_bytes(self.path(name)) == read_bytes(self.path('of_' + name)), name)
 
     def test_a_journal_lets_correct_map_move_its_clouds(self):
         trajectory, moved = self.path('trajectory.txt'), self.path('moved.txt')
@@ -160,8 +145,7 @@ class MapBag(unittest.TestCase):
         with rosbag.Bag(bag, 'a') as file:
             file.write(TOPIC, late, late.header.stamp)
         self.map(bag, '--report', report, '--trajectory', trajectory)
-        with open(report) as file:
-            written = json.load(file)
+        written = read_json(report)
         self.assertEqual(written['clouds'], {'read': SCANS + 1, 'mapped': SCANS, 'dropped': {'transform late': 1}})
         self.assertEqual([scan['name'] for scan in written['scans']],
                          [str(cloud.header.stamp.to_nsec()) for cloud in self.clouds])
@@ -338,8 +322,7 @@ class MapBag(unittest.TestCase):
         self.assertIn('Mapped 1 of 1 clouds', self.map(self.write('bare.bag', *poses, (TOPIC, self.cloud(100.0), 100.0))).stdout)
 
     def test_no_file_replaces_a_bag(self):
-        with open(self.bag, 'rb') as file:
-            before = file.read()
+        before = read_bytes(self.bag)
         for option in ('--report', '--trajectory'):
             self.refused(f'{option} {self.bag} would replace the bag', self.bag, option, self.bag)
         with open(self.bag, 'rb') as file:
@@ -353,8 +336,7 @@ class MapBag(unittest.TestCase):
                      self.bag, topic='/points')
         self.refused('has no clouds on cloud_in; there are some on', self.bag, topic=None)
         self.refused('has no clouds (sensor_msgs/PointCloud2); record some', self.write('empty.bag'))
-        with open(self.bag, 'rb') as file:
-            content = file.read()
+        content = read_bytes(self.bag)
         cut = self.path('cut.bag')
         for length in (0, 5, 5000, len(content) // 2, len(content) - 10):
             with open(cut, 'wb') as file:

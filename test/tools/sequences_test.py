@@ -1,21 +1,12 @@
 #!/usr/bin/env python3
 """Sequences as people have them: without labels, with poses of other sensors and in other formats, or with few of them."""
-import contextlib
-import json
 import os
 import shutil
-import sqlite3
-import subprocess
-import tempfile
 import unittest
 
-BIN = os.environ['BKI_MAPPING_BIN']
+from programs import ProgramTest, call, read_bytes, read_json, rows
+
 TR = [[0, -1, 0, 0.1], [0, 0, -1, 0.2], [1, 0, 0, 0.3]]  # from a lidar (x ahead, z up) to a camera (z ahead, y down)
-
-
-def call(program, *arguments):
-    return subprocess.run([os.path.join(BIN, program), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                          universal_newlines=True, timeout=300)
 
 
 def product(a, b):
@@ -31,15 +22,11 @@ def text_of(transform):
     return ' '.join(repr(number) for row in transform for number in row)
 
 
-class Sequences(unittest.TestCase):
+class Sequences(ProgramTest):
     def setUp(self):
-        self.folder = tempfile.mkdtemp()
-        self.addCleanup(shutil.rmtree, self.folder)
+        self.setUpClass()  # a folder for each test
         self.drive, self.out = self.path('drive'), self.path('out.bkm')
         self.make('--scans', '4', '--speed', '20')
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
 
     def make(self, *more):
         shutil.rmtree(self.drive, ignore_errors=True)
@@ -54,22 +41,10 @@ class Sequences(unittest.TestCase):
             file.writelines(line + '\n' for line in lines)
         return path
 
-    def succeeds(self, program, *arguments):
-        result = call(program, *arguments)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return result
-
-    def fails(self, words, program, *arguments):
-        result = call(program, *arguments)
-        self.assertEqual(result.returncode, 1, result.stdout)
-        self.assertIn(words, result.stderr)
-        self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
-
     def mapped(self, *options):
         """The tiles of the map, and what was said."""
         said = self.succeeds('map_sequence', '--sequence', self.drive, '--output', self.out, *options).stderr
-        with contextlib.closing(sqlite3.connect(self.out)) as database:
-            return sorted(database.execute('SELECT z, y, x, content FROM tile WHERE part = 0')), said
+        return rows(self.out, 'SELECT z, y, x, content FROM tile WHERE part = 0'), said
 
     def test_without_labels(self):
         labelled, _ = self.mapped('--classes', 'occupancy')
@@ -83,8 +58,7 @@ class Sequences(unittest.TestCase):
         self.assertTrue(self.mapped('--labels', 'none')[0], 'hits of no known class')
         figures = self.path('figures.json')
         self.succeeds('evaluate_map', *sequence, '--classes', 'occupancy', '--json', figures)
-        with open(figures) as file:
-            self.assertIsNone(json.load(file)['sa'])
+        self.assertIsNone(read_json(figures)['sa'])
         self.fails('--cloud needs labels', 'evaluate_map', *sequence, '--classes', 'occupancy', '--cloud')
 
     def test_scans_that_are_not_asked_for_need_no_pose(self):
@@ -141,8 +115,7 @@ class Sequences(unittest.TestCase):
                         self.assertAlmostEqual(float(number), float(expected), places=9)
         scans = []
         for folder in folders:
-            with open(os.path.join(folder, 'labels', '000003.label'), 'rb') as file:
-                scans.append(file.read())
+            scans.append(read_bytes(os.path.join(folder, 'labels', '000003.label')))
         self.assertGreater(len(scans[0]), 4 * 1000)
         self.drive = folders[0]
         self.assertEqual(self.mapped('--poses', of_camera), self.mapped('--poses', os.path.join(folders[0], 'poses.txt')))
@@ -153,8 +126,7 @@ class Sequences(unittest.TestCase):
         self.assertNotEqual(self.mapped('--poses', odometry)[0], by_truth)
         figures = self.path('figures.json')
         self.succeeds('evaluate_map', '--sequence', folders[0], '--json', figures)
-        with open(figures) as file:
-            truth = json.load(file)['truth']
+        truth = read_json(figures)['truth']
         self.assertGreater(truth['free_precision'], 0.5, 'the truth is in the frame of the map')
         self.assertGreater(truth['occupied_recall'], 0.5)
 

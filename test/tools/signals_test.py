@@ -1,21 +1,17 @@
 #!/usr/bin/env python3
 """Signals to programs that map: the first ends them at a good place, the second at once."""
-import contextlib
 import errno
-import json
 import os
 import pty
 import re
 import select
 import shutil
 import signal
-import sqlite3
 import subprocess
-import tempfile
 import unittest
 
-BIN = os.environ['BKI_MAPPING_BIN']
-TIMEOUT = 120  # s
+from programs import BIN, TIMEOUT, ProgramTest, read_bytes, read_json, rows, tiles_of
+
 SCANS = 3000  # the progress of so many is more than a terminal buffers, so that a program waits until its output is read
 
 
@@ -59,12 +55,12 @@ class Program:
         return self.process.returncode, self.said.replace('\r', '\n').strip().splitlines()[-1]
 
 
-class Signals(unittest.TestCase):
+class Signals(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp()
+        super().setUpClass()
         cls.drive, cls.long = cls.path('drive'), cls.path('long')
-        cls.call('simulate_drive', '--output', cls.drive, '--scans', '2', '--beams', '16', '--columns', '200')
+        cls.succeeds('simulate_drive', '--output', cls.drive, '--scans', '2', '--beams', '16', '--columns', '200')
         for kind, ending in (('velodyne', 'bin'), ('labels', 'label')):
             os.makedirs(os.path.join(cls.long, kind))
             for n in range(SCANS):
@@ -72,28 +68,6 @@ class Signals(unittest.TestCase):
         shutil.copy(os.path.join(cls.drive, 'calib.txt'), cls.long)
         with open(os.path.join(cls.long, 'poses.txt'), 'w') as file:
             file.writelines(f'1 0 0 {0.01 * n} 0 1 0 0 0 0 1 0\n' for n in range(SCANS))
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    @classmethod
-    def path(cls, name):
-        return os.path.join(cls.folder, name)
-
-    @classmethod
-    def call(cls, program, *arguments):
-        result = subprocess.run([os.path.join(BIN, program), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                universal_newlines=True, timeout=TIMEOUT)
-        assert result.returncode == 0, result.stderr
-        return result
-
-    def rows(self, path, query):
-        with contextlib.closing(sqlite3.connect(path)) as database:
-            return sorted(database.execute(query))
-
-    def tiles(self, path):
-        return self.rows(path, 'SELECT z, y, x, content FROM tile WHERE part = 0')
 
     def test_mapping_ends_after_the_scan_at_hand(self):
         out, report, points, part = (self.path(name) for name in ('out.bkm', 'report.json', 'points.pcd', 'part.bkm'))
@@ -110,15 +84,13 @@ class Signals(unittest.TestCase):
             self.assertEqual((scan + 1, following), (count, count))
             self.assertGreaterEqual(count, 2)
             self.assertIn('another signal ends the program at once', program.said)
-            self.assertEqual(self.rows(out, 'SELECT id, scans FROM drive'), [(f'long/000000-{scan:06d}', count)])
-            with open(report) as file:
-                self.assertEqual(len(json.load(file)['scans']), count)
-            with open(points, 'rb') as file:
-                self.assertRegex(file.read(400), rb'\nPOINTS 0*[1-9]')
-            self.call('map_sequence', '--sequence', self.long, '--scans', str(count), '--output', part)
-            self.assertEqual(self.tiles(out), self.tiles(part), 'the map is that of the scans so far')
-        self.call('map_sequence', '--sequence', self.long, '--first', str(following), '--scans', '2', '--resume', out, '--output', out)
-        self.assertEqual(sum(scans for _, scans in self.rows(out, 'SELECT id, scans FROM drive')), count + 2)
+            self.assertEqual(rows(out, 'SELECT id, scans FROM drive'), [(f'long/000000-{scan:06d}', count)])
+            self.assertEqual(len(read_json(report)['scans']), count)
+            self.assertRegex(read_bytes(points)[:400], rb'\nPOINTS 0*[1-9]')
+            self.succeeds('map_sequence', '--sequence', self.long, '--scans', str(count), '--output', part)
+            self.assertEqual(tiles_of(out), tiles_of(part), 'the map is that of the scans so far')
+        self.succeeds('map_sequence', '--sequence', self.long, '--first', str(following), '--scans', '2', '--resume', out, '--output', out)
+        self.assertEqual(sum(scans for _, scans in rows(out, 'SELECT id, scans FROM drive')), count + 2)
 
     def test_a_part_of_a_named_drive_has_its_own_name(self):
         out = self.path('named.bkm')
@@ -131,7 +103,7 @@ class Signals(unittest.TestCase):
             said = re.search(r'stopped after scan (\d+), .* say --first (\d+) --resume \S+ --drive (\S+)$', last)
             self.assertTrue(said, last)
             self.assertEqual(said.group(3), f'monday/{int(said.group(2)):06d}-{SCANS - 1:06d}')
-            self.assertEqual(self.rows(out, 'SELECT id FROM drive'), [(f'monday/000000-{said.group(1)}',)])
+            self.assertEqual(rows(out, 'SELECT id FROM drive'), [(f'monday/000000-{said.group(1)}',)])
 
     def test_evaluation_ends_after_the_scan_at_hand(self):
         figures, whole = self.path('figures.json'), self.path('whole.json')
@@ -142,9 +114,8 @@ class Signals(unittest.TestCase):
         self.assertEqual(status, 130)
         said = re.fullmatch(rf'evaluate_map: stopped after scan (\d+); all figures are of the first (\d+) of {SCANS} scans', last)
         self.assertTrue(said, last)
-        self.call('evaluate_map', '--sequence', self.long, '--scans', said.group(2), '--json', whole)
-        with open(figures) as file, open(whole) as other:
-            stopped, complete = json.load(file), json.load(other)
+        self.succeeds('evaluate_map', '--sequence', self.long, '--scans', said.group(2), '--json', whole)
+        stopped, complete = read_json(figures), read_json(whole)
         for each in (stopped, complete):
             for time in ('median_ms', 'processor_ms', 'yardstick_ms', 'yardstick_processor_ms'):
                 each.pop(time)
@@ -153,10 +124,10 @@ class Signals(unittest.TestCase):
     def test_a_merge_ends_and_leaves_the_file_as_it_was(self):
         maps = [self.path(f'{n}.bkm') for n in range(2)]
         fine = self.path('fine')
-        self.call('simulate_drive', '--output', fine, '--scans', '2', '--beams', '32', '--columns', '600')
+        self.succeeds('simulate_drive', '--output', fine, '--scans', '2', '--beams', '32', '--columns', '600')
         for n, path in enumerate(maps):
-            self.call('map_sequence', '--sequence', fine, '--first', str(n), '--scans', '1', '--set', 'free_space/mode=none',
-                      '--set', 'resolution=0.015', '--set', 'kernel/length=0.015', '--output', path)
+            self.succeeds('map_sequence', '--sequence', fine, '--first', str(n), '--scans', '1', '--set', 'free_space/mode=none',
+                          '--set', 'resolution=0.015', '--set', 'kernel/length=0.015', '--output', path)
         output = self.path('merged.bkm')
         with open(output, 'w') as file:
             file.write('good')
@@ -168,8 +139,7 @@ class Signals(unittest.TestCase):
         status, last = program.end()
         self.assertEqual(status, 130)
         self.assertRegex(last, rf'merge_maps: stopped after \d+ of {all_tiles} tiles; {re.escape(output)} is as it was')
-        with open(output) as file:
-            self.assertEqual(file.read(), 'good')
+        self.assertEqual(read_bytes(output), b'good')
         self.assertEqual(sorted(os.listdir(self.folder)), before)
 
     def waiting(self, *more):
@@ -184,8 +154,8 @@ class Signals(unittest.TestCase):
 
     def test_the_second_signal_ends_at_once(self):
         output = self.path('good.bkm')
-        self.call('map_sequence', '--sequence', self.drive, '--output', output)
-        before = self.tiles(output)
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', output)
+        before = tiles_of(output)
         for first, second in ((signal.SIGINT, signal.SIGINT), (signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGINT)):
             with self.subTest(first=first, second=second):
                 program, calibration = self.waiting('--output', output)
@@ -196,7 +166,7 @@ class Signals(unittest.TestCase):
                 self.assertEqual(program.end()[0], -second)
                 calibration.close()
                 self.doCleanups()
-        self.assertEqual(self.tiles(output), before)
+        self.assertEqual(tiles_of(output), before)
 
     def test_without_a_scan_nothing_is_written(self):
         output = self.path('nothing.bkm')

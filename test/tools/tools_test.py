@@ -13,16 +13,10 @@ import sqlite3
 import stat
 import struct
 import subprocess
-import tempfile
 import unittest
 import zlib
 
-BIN = os.environ['BKI_MAPPING_BIN']
-
-
-def call(program, *arguments, **environment):
-    return subprocess.run([os.path.join(BIN, program), *arguments], capture_output=True, text=True, timeout=120,
-                          env={**os.environ, **environment})
+from programs import ProgramTest, call, read_bytes, read_json, tiles_of
 
 
 def row_checksum(columns):
@@ -74,26 +68,12 @@ def unpacked(content):
     return list(zip(*axes)), numbers(12)
 
 
-class Tools(unittest.TestCase):
+class Tools(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp()
+        super().setUpClass()
         cls.drive = os.path.join(cls.folder, 'drive')
-        made = call('simulate_drive', '--output', cls.drive, '--scans', '4', '--beams', '16', '--columns', '400')
-        assert made.returncode == 0, made.stderr
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def fails(self, words, program, *arguments, **environment):
-        result = call(program, *arguments, **environment)
-        self.assertEqual(result.returncode, 1, result.stdout)
-        self.assertIn(words, result.stderr)
-        self.assertEqual(result.stderr.count('\n'), 1, 'one sentence: ' + result.stderr)
+        cls.succeeds('simulate_drive', '--output', cls.drive, '--scans', '4', '--beams', '16', '--columns', '400')
 
     def rows_of_document(self):
         """The rows of docs/files.md by the name in their first column."""
@@ -119,8 +99,7 @@ class Tools(unittest.TestCase):
                 self.assertIn(f'[{option}', rows[f'scripts/{script}'])
 
     def test_what_scans_and_settings_may_take_is_said(self):
-        coarse = call('map_sequence', '--sequence', self.drive, '--set', 'resolution=1', '--set', 'kernel/length=0.3')
-        self.assertEqual(coarse.returncode, 0, coarse.stderr)
+        coarse = self.succeeds('map_sequence', '--sequence', self.drive, '--set', 'resolution=1', '--set', 'kernel/length=0.3')
         self.assertIn("warning: kernel/length 0.3 m is below half a voxel's diagonal, 0.866 m", coarse.stderr)
         fine = call('map_sequence', '--sequence', self.drive, '--set', 'resolution=0.005')
         self.assertEqual(fine.returncode, 1)
@@ -142,8 +121,7 @@ class Tools(unittest.TestCase):
                 ('instances', plain, 'the table has the lower 16 bits of all labels seen; set its label_mask to 0xFFFF'),
                 ('labels', 'carla', 'class table semantic_kitti has all labels seen; set classes to it')):
             for program in ('map_sequence', 'evaluate_map'):
-                result = call(program, '--sequence', self.drive, '--labels', labels, '--classes', classes)
-                self.assertEqual(result.returncode, 0, result.stderr)
+                result = self.succeeds(program, '--sequence', self.drive, '--labels', labels, '--classes', classes)
                 self.assertRegex(result.stderr, r'^warning: \d+ % of the points of a scan have labels that class table')
                 self.assertIn('; ' + remedy + '\n', result.stderr)
                 self.assertLessEqual(result.stderr.count('\n'), 4, result.stderr)
@@ -168,8 +146,7 @@ class Tools(unittest.TestCase):
         self.assertEqual(trusted.returncode, 1)
         self.assertIn('scan 000002: the scan would touch', trusted.stderr)
         self.assertIn('1 of 4 scans was refused', trusted.stderr)
-        with open(self.path('far.json')) as file:
-            self.assertEqual(len(json.load(file)['scans']), 3, 'the others are mapped')
+        self.assertEqual(len(read_json(self.path('far.json'))['scans']), 3, 'the others are mapped')
 
     def test_help(self):
         for program in ('map_sequence', 'simulate_drive'):
@@ -181,11 +158,9 @@ class Tools(unittest.TestCase):
             self.assertRegex(result.stdout, r'^bki_mapping \d+\.\d+\.\d+\n$')
 
     def test_map_and_report(self):
-        result = call('map_sequence', '--sequence', self.drive, '--output', self.path('map.ply'), '--report',
+        self.succeeds('map_sequence', '--sequence', self.drive, '--output', self.path('map.ply'), '--report',
                       self.path('report.json'), '--include', 'occupied,free', '--threads', '2', '--first', '1')
-        self.assertEqual(result.returncode, 0, result.stderr)
-        with open(self.path('report.json')) as file:
-            report = json.load(file)
+        report = read_json(self.path('report.json'))
         self.assertEqual([scan['name'] for scan in report['scans']], ['000001', '000002', '000003'])
         self.assertEqual(report['parameters']['threads'], '2')
         for scan in report['scans']:
@@ -203,21 +178,18 @@ class Tools(unittest.TestCase):
 
     def evaluation(self, *settings, more=()):
         arguments = [word for setting in settings for word in ('--set', setting)]
-        result = call('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
-                      *arguments, *more)
-        self.assertEqual(result.returncode, 0, result.stderr)
+        result = self.succeeds('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
+                               *arguments, *more)
         self.table = result.stdout
-        with open(self.path('figures.json')) as file:
-            return json.load(file)
+        return read_json(self.path('figures.json'))
 
     def test_the_environment_names_the_fastest_instruction_set(self):
         map_file = self.path('generic.bkm')
         command = ('map_sequence', '--sequence', self.drive, '--output', map_file)
-        made = call(*command, BKI_MAPPING_INSTRUCTION_SET='generic')
-        self.assertEqual(made.returncode, 0, made.stderr)
+        self.succeeds(*command, env={**os.environ, 'BKI_MAPPING_INSTRUCTION_SET': 'generic'})
         os.remove(map_file)
         self.fails("BKI_MAPPING_INSTRUCTION_SET is 'abacus', which this processor does not have; unset it, or set it to one of: generic",
-                   *command, BKI_MAPPING_INSTRUCTION_SET='abacus')
+                   *command, env={**os.environ, 'BKI_MAPPING_INSTRUCTION_SET': 'abacus'})
         self.assertFalse(os.path.exists(map_file))
 
     def test_evaluation(self):
@@ -281,13 +253,11 @@ class Tools(unittest.TestCase):
         result = call('evaluate_map', '--sequence', drive, '--late', '1', '--cloud', '--json', self.path('figures.json'), *more)
         self.assertEqual((result.returncode, result.stderr), (0, ''))
         self.assertIn('as the DynamicMap benchmark counts', result.stdout)
-        with open(self.path('figures.json')) as file:
-            return json.load(file)
+        return read_json(self.path('figures.json'))
 
     def test_clouds_are_compared_as_the_dynamicmap_benchmark_does(self):
         export = self.path('export')
-        made = call('simulate_drive', '--output', export, '--scans', '4', '--beams', '16', '--columns', '400', '--layout', 'dynamic_map')
-        self.assertEqual(made.returncode, 0, made.stderr)
+        self.succeeds('simulate_drive', '--output', export, '--scans', '4', '--beams', '16', '--columns', '400', '--layout', 'dynamic_map')
         self.assertEqual(sorted(os.listdir(export)), ['gt_cloud.pcd', 'labels', 'pcd', 'simulation.yaml', 'times.txt'])
         of_points, of_cloud = self.cloud_figures(self.drive), self.cloud_figures(export)
         for name in ('static_points', 'moving_points'):
@@ -310,8 +280,7 @@ class Tools(unittest.TestCase):
         self.fails('gt_cloud.pcd, a cloud of all scans', 'evaluate_map', '--sequence', export, '--cloud')
         self.fails('class ids do not say what moves', 'evaluate_map', '--sequence', self.drive, '--cloud', '--set', 'label_values=id')
         scan = os.path.join(export, 'pcd', '000002.pcd')
-        with open(scan, 'rb') as file:
-            text = file.read()
+        text = read_bytes(scan)
         with open(scan, 'wb') as file:
             file.write(text.replace(b'VIEWPOINT', b'# VIEWPOINT'))
         self.fails('has no line VIEWPOINT', 'evaluate_map', '--sequence', export)
@@ -386,13 +355,10 @@ class Tools(unittest.TestCase):
         moving = {}
         for scene in ('street', 'traffic', 'crowd', 'queue', 'rooms'):
             folder = self.path(scene)
-            result = call('simulate_drive', '--output', folder, '--scene', scene, '--scans', '2', '--lidar', 'vlp16',
+            self.succeeds('simulate_drive', '--output', folder, '--scene', scene, '--scans', '2', '--lidar', 'vlp16',
                           '--columns', '300')
-            self.assertEqual(result.returncode, 0, result.stderr)
-            result = call('evaluate_map', '--sequence', folder, '--late', '1', '--json', self.path('figures.json'))
-            self.assertEqual(result.returncode, 0, result.stderr)
-            with open(self.path('figures.json')) as file:
-                figures = json.load(file)
+            self.succeeds('evaluate_map', '--sequence', folder, '--late', '1', '--json', self.path('figures.json'))
+            figures = read_json(self.path('figures.json'))
             moving[scene] = figures['moving_points']
             self.assertIn('truth', figures)
             by_label = {entry['label']: entry for entry in figures['sa_by_label']}
@@ -488,10 +454,8 @@ class Tools(unittest.TestCase):
     def test_errors_are_drawn(self):
         picture = self.path('errors.png')
         self.fails('must end in .png', 'evaluate_map', '--sequence', self.drive, '--errors', self.path('errors.jpg'))
-        result = call('evaluate_map', '--sequence', self.drive, '--errors', picture, '--octomap', 'default', '--octomap', 'max_range=5')
-        self.assertEqual(result.returncode, 0, result.stderr)
-        with open(picture, 'rb') as file:
-            self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+        self.succeeds('evaluate_map', '--sequence', self.drive, '--errors', picture, '--octomap', 'default', '--octomap', 'max_range=5')
+        self.assertEqual(read_bytes(picture)[:8], b'\x89PNG\r\n\x1a\n')
         with open(self.path('errors.csv'), newline='') as file:
             kinds = [row['what'] for row in csv.DictReader(file)]
         self.assertGreater(kinds.count('kept'), kinds.count('lost'))
@@ -508,9 +472,8 @@ class Tools(unittest.TestCase):
         folder = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'config', 'presets')
         figures = {}
         for name in sorted(os.listdir(folder)):
-            result = call('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
+            self.succeeds('evaluate_map', '--sequence', self.drive, '--late', '1', '--json', self.path('figures.json'),
                           '--config', os.path.join(folder, name))
-            self.assertEqual(result.returncode, 0, result.stderr)
             with open(self.path('figures.json')) as file:
                 figures[name[:-len('.yaml')]] = json.load(file)
         self.assertEqual(set(figures), {'baseline_even', 'paper_line', 'paper_linear', 'paper_none', 'robot'})
@@ -553,8 +516,7 @@ class Tools(unittest.TestCase):
         for given in ([], ['--poses', moved]):
             call('map_sequence', '--sequence', self.drive, '--output', self.path('moved.bkm'), *given)
             call('inspect_map', self.path('moved.bkm'), '--json', self.path('moved.json'))
-            with open(self.path('moved.json')) as file:
-                bounds.append(json.load(file)['bounds'])
+            bounds.append(read_json(self.path('moved.json'))['bounds'])
         self.assertAlmostEqual(bounds[1]['min'][0] - bounds[0]['min'][0], 19.2, delta=0.31)
         self.assertAlmostEqual(bounds[1]['max'][1], bounds[0]['max'][1], delta=0.31)
         self.fails('missing.txt', 'map_sequence', '--sequence', self.drive, '--poses', self.path('missing.txt'))
@@ -566,9 +528,8 @@ class Tools(unittest.TestCase):
         result = call('benchmark_sequence', '--sequence', self.drive, '--repeats', '0')
         self.assertNotEqual(result.returncode, 0)
         self.assertIn('--repeats', result.stderr)
-        result = call('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--repeats', '2',
+        self.succeeds('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--repeats', '2',
                       '--csv', self.path('times.csv'))
-        self.assertEqual(result.returncode, 0, result.stderr)
         with open(self.path('times.csv'), newline='') as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(list(rows[0]),
@@ -590,8 +551,7 @@ class Tools(unittest.TestCase):
         script = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'lab', 'tools', 'plot_curves.py')
         subprocess.run(['/usr/bin/python3', script, folder], check=True, capture_output=True, timeout=120)
         for name in tables:
-            with open(os.path.join(folder, name + '.png'), 'rb') as file:
-                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+            self.assertEqual(read_bytes(os.path.join(folder, name + '.png'))[:8], b'\x89PNG\r\n\x1a\n')
 
     def test_threads_do_not_show(self):
         maps = []
@@ -599,8 +559,7 @@ class Tools(unittest.TestCase):
             path = self.path(f'threads{threads}.ply')
             self.assertEqual(call('map_sequence', '--sequence', self.drive, '--threads', threads, '--include',
                                   'occupied,free', '--output', path).returncode, 0)
-            with open(path, 'rb') as file:
-                maps.append(file.read())
+            maps.append(read_bytes(path))
         self.assertEqual(maps[0], maps[1])
         self.assertEqual(maps[0], maps[2])
 
@@ -645,17 +604,14 @@ class Tools(unittest.TestCase):
         maps = []
         for sequence, first in ((self.drive, '2'), (gap, '2'), (gap, '1')):
             path = self.path('part.ply')
-            result = call('map_sequence', '--sequence', sequence, '--first', first, '--scans', '2', '--output', path)
-            self.assertEqual(result.returncode, 0, result.stderr)
+            result = self.succeeds('map_sequence', '--sequence', sequence, '--first', first, '--scans', '2', '--output', path)
             self.assertEqual(result.stderr, said if sequence == gap else '')
-            with open(path, 'rb') as file:
-                maps.append(file.read())
+            maps.append(read_bytes(path))
         self.assertEqual(maps[0], maps[1], '--first is the number of a scan')
         self.assertEqual(maps[0], maps[2], 'the first scan there is from --first on')
         result = call('evaluate_map', '--sequence', gap, '--json', self.path('gap.json'))
         self.assertEqual((result.returncode, result.stderr), (0, said))
-        with open(self.path('gap.json')) as file:
-            self.assertGreater(json.load(file)['truth']['occupied_near'], 0.98)
+        self.assertGreater(read_json(self.path('gap.json'))['truth']['occupied_near'], 0.98)
         self.assertEqual(call('benchmark_sequence', '--sequence', gap, '--repeats', '1', '--warm-up', '0').stderr, said)
 
     def test_what_is_no_file_is_refused_before_the_work(self):
@@ -671,29 +627,17 @@ class Tools(unittest.TestCase):
 
     def map_of(self, name, first, scans):
         path = self.path(name)
-        made = call('map_sequence', '--sequence', self.drive, '--first', str(first), '--scans', str(scans), '--output', path)
-        self.assertEqual(made.returncode, 0, made.stderr)
+        self.succeeds('map_sequence', '--sequence', self.drive, '--first', str(first), '--scans', str(scans), '--output', path)
         return path
-
-    def tiles_of(self, path, part=0):
-        """The tiles of a part of a map file, packed."""
-        with contextlib.closing(sqlite3.connect(path)) as database:
-            return dict(((z, y, x), content) for z, y, x, content in database.execute(
-                'SELECT z, y, x, content FROM tile WHERE part = ?', (part,)))
-
-    def succeeds(self, program, *arguments):
-        result = call(program, *arguments)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return result
 
     def test_merging_equals_mapping_in_one_run(self):
         whole, kept, merged = self.map_of('whole.bkm', 0, 4), self.path('kept.bkm'), self.path('merged.bkm')
         front, back = self.map_of('front.bkm', 0, 2), self.map_of('back.bkm', 2, 2)
         result = self.succeeds('merge_maps', back, front, '--output', kept, '--keep-drives')
-        self.assertEqual(self.tiles_of(kept), self.tiles_of(whole))
+        self.assertEqual(tiles_of(kept), tiles_of(whole))
         self.assertRegex(result.stdout, r'kept.bkm: 2 drives, \d+ blocks in \d+ tiles\n$')
         result = self.succeeds('merge_maps', kept, back, '--output', merged, '--without', 'drive/000000-000001')
-        self.assertEqual(self.tiles_of(merged), self.tiles_of(back))
+        self.assertEqual(tiles_of(merged), tiles_of(back))
         self.assertIn("drive 'drive/000002-000003' is in more than one map, and counts once\n", result.stdout)
         more = self.succeeds('map_sequence', '--sequence', self.drive, '--drive', 'more', '--resume', kept, '--output', merged)
         self.assertIn('stores drives separately, and the continued map will not', more.stderr)
@@ -706,7 +650,7 @@ class Tools(unittest.TestCase):
             self.succeeds(*begin, '--scans', '4', '--output', whole)
             self.succeeds(*begin, '--scans', '2', '--output', front)
             self.succeeds(*begin, '--first', '2', '--scans', '2', '--resume', front, '--output', resumed)
-            self.assertEqual(self.tiles_of(resumed), self.tiles_of(whole), mode)
+            self.assertEqual(tiles_of(resumed), tiles_of(whole), mode)
         self.fails('the resolution of', *begin, '--resume', front, '--set', 'resolution=0.2')
         self.fails('the prior of', *begin, '--resume', front, '--set', 'prior=0.5')
         self.fails('class', *begin, '--resume', front, '--classes', 'toy')
@@ -714,19 +658,19 @@ class Tools(unittest.TestCase):
 
     def test_merging_some_tiles(self):
         a, some = self.map_of('a.bkm', 0, 2), self.path('some.bkm')
-        whole = self.tiles_of(a)
+        whole = tiles_of(a)
         x, y = min((tile[2], tile[1]) for tile in whole)
         self.succeeds('merge_maps', a, '--tiles', f'{x},{y},{x},{y + 1}', '--output', some)
         expected = {tile: content for tile, content in whole.items() if tile[2] == x and y <= tile[1] <= y + 1}
-        self.assertEqual(self.tiles_of(some), expected)
+        self.assertEqual(tiles_of(some), expected)
         self.assertLess(len(expected), len(whole))
 
     def test_moving_maps(self):
         a, there, back = self.map_of('a.bkm', 0, 1), self.path('there.bkm'), self.path('back.bkm')
         self.assertEqual(self.succeeds('merge_maps', a, '--transform', f'{a}=0.3,-1.2,3,90', '--output', there).stderr, '')
-        self.assertNotEqual(self.tiles_of(there), self.tiles_of(a))
+        self.assertNotEqual(tiles_of(there), tiles_of(a))
         self.succeeds('merge_maps', there, '--transform', f'{there}=1.2,0.3,-3,-90', '--output', back)
-        self.assertEqual(self.tiles_of(back), self.tiles_of(a))
+        self.assertEqual(tiles_of(back), tiles_of(a))
         self.assertIn('which is approximate', self.succeeds('merge_maps', a, '--transform', f'{a}=0,0,0,30', '--output',
                                                             there).stderr)
 
@@ -749,16 +693,16 @@ class Tools(unittest.TestCase):
 
     def test_clearing(self):
         a, cleared = self.map_of('a.bkm', 0, 1), self.path('cleared.bkm')
-        whole = self.tiles_of(a)
+        whole = tiles_of(a)
         self.assertRegex(self.succeeds('clear_map', a, '--box', '0 100 -100 100 -100 100', '--output', cleared).stdout,
                          r'cleared in \d\d+ blocks of \d+ tiles')
-        rest = self.tiles_of(cleared)
+        rest = tiles_of(cleared)
         self.assertEqual({index for index in rest if index[2] >= 0}, set(), 'tiles in front of the origin')
         self.assertTrue(rest)
         for index, content in rest.items():
             self.assertEqual(content, whole[index])
         self.succeeds('clear_map', a, '--box', '0 -inf -inf inf inf inf')
-        self.assertEqual(self.tiles_of(a), rest)
+        self.assertEqual(tiles_of(a), rest)
         self.fails('name one map file', 'clear_map', '--box', '0 0 0 1 1 1')
         self.fails('--box "X0 Y0 Z0 X1 Y1 Z1" is missing', 'clear_map', a)
         self.fails('--box has 5 numbers', 'clear_map', a, '--box', '0 0 0 1 1')
@@ -775,7 +719,7 @@ class Tools(unittest.TestCase):
             mapped, found = json.load(mapped), json.load(file)
         for field in ('voxels', 'voxels_by_class', 'blocks'):
             self.assertEqual(found[field], mapped[field], field)
-        self.assertEqual(found['tiles'], len(self.tiles_of(a)))
+        self.assertEqual(found['tiles'], len(tiles_of(a)))
         self.assertEqual(found['file_bytes'], os.path.getsize(a))
         self.assertEqual(found['resolution'], 0.3)
         self.assertEqual([(drive['id'], drive['scans'], drive['first_stamp_ns']) for drive in found['drives']],
@@ -783,12 +727,11 @@ class Tools(unittest.TestCase):
         self.assertIn(f'{found["voxels"]["occupied"]} occupied, {found["voxels"]["free"]} free', printed)
         self.assertIn('drive/000000-000003: 4 scans, from 1970-01-01 00:00:01 UTC', printed)
         for picture in (top, profile):
-            with open(picture, 'rb') as file:
-                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+            self.assertEqual(read_bytes(picture)[:8], b'\x89PNG\r\n\x1a\n')
         self.assertIn('\n  enabled: true\n', self.succeeds('inspect_map', a, '--parameters').stdout)
-        before = self.tiles_of(a)
+        before = tiles_of(a)
         self.fails('must end in .png', 'inspect_map', a, '--top', a)
-        self.assertEqual(self.tiles_of(a), before)
+        self.assertEqual(tiles_of(a), before)
         self.succeeds('inspect_map', a, '--top', top, '--max-z', '-1')
         self.fails('--max-z -1000 is below the map', 'inspect_map', a, '--top', top, '--max-z', '-1000')
         self.fails('give --top or --profile', 'inspect_map', a, '--max-z', '1')
@@ -797,8 +740,7 @@ class Tools(unittest.TestCase):
         empty = self.path('empty.bkm')
         self.succeeds('clear_map', a, '--box', '-inf -inf -inf inf inf inf', '--output', empty)
         self.assertIn('0 occupied', self.succeeds('inspect_map', empty, '--json', json_file, '--top', top).stdout)
-        with open(json_file) as file:
-            self.assertIsNone(json.load(file)['bounds'])
+        self.assertIsNone(read_json(json_file)['bounds'])
 
     def mapped(self, name, *settings):
         """The map file of the drive."""
@@ -806,8 +748,7 @@ class Tools(unittest.TestCase):
         return self.path(name)
 
     def content(self, name):
-        with open(self.path(name), 'rb') as file:
-            return file.read()
+        return read_bytes(self.path(name))
 
     def test_a_map_exports_as_its_drive_does(self):
         gain = ('--set', 'rules/enabled=true')
@@ -911,8 +852,7 @@ class Tools(unittest.TestCase):
             kept[mode], points = map(int, re.search(r'points.pcd: (\d+) of (\d+) points\n', result.stdout).groups())
             self.assertEqual(points, sum(os.path.getsize(os.path.join(self.drive, 'velodyne', name)) // 16
                                          for name in os.listdir(os.path.join(self.drive, 'velodyne'))))
-            with open(self.path('points.pcd'), 'rb') as file:
-                content = file.read()
+            content = read_bytes(self.path('points.pcd'))
             begin = content.index(b'DATA binary\n') + len(b'DATA binary\n')
             self.assertEqual(len(content) - begin, 21 * kept[mode])
         self.assertEqual(kept['none'], points)
@@ -962,39 +902,39 @@ class Tools(unittest.TestCase):
         true_poses, drifted_poses = self.true_and_drifted()
         truth, drifted = self.poses_file('truth.txt', true_poses), self.poses_file('drifted.txt', drifted_poses)
         wanted_file, wrong_file = self.kept('kept_true.bkm', truth), self.kept('kept_drifted.bkm', drifted)
-        wanted, wrong = self.tiles_of(wanted_file), self.tiles_of(wrong_file)
+        wanted, wrong = tiles_of(wanted_file), tiles_of(wrong_file)
         self.assertNotEqual(wanted, wrong)
         corrected = self.path('corrected.bkm')
         said = self.succeeds('correct_map', wrong_file, '--poses', truth, '--poses-in', 'lidar', '--output', corrected)
         self.assertEqual(said.stderr, '')
         self.assertRegex(said.stdout, r"corrected.bkm: 3 of 4 scans of drive 'drive/000000-000003' moved, the farthest by 0.75 m; "
                                       r'\d\d+ tiles changed, in [\d.]+ s\n$')
-        self.assertTrue(self.tiles_of(corrected) == wanted, 'the map is not that of the true poses')
-        self.assertTrue(self.tiles_of(wrong_file) == wrong, 'the file has changed in spite of --output')
+        self.assertTrue(tiles_of(corrected) == wanted, 'the map is not that of the true poses')
+        self.assertTrue(tiles_of(wrong_file) == wrong, 'the file has changed in spite of --output')
         self.assertEqual(self.rows_of_journal(corrected), self.rows_of_journal(wanted_file))
         # In place, to and fro.
         for poses, expected, scans in ((truth, wanted, 3), (truth, wanted, 0), (drifted, wrong, 3)):
             said = self.succeeds('correct_map', wrong_file, '--poses', poses, '--poses-in', 'lidar').stdout
             self.assertIn(f'kept_drifted.bkm: {scans} of 4 scans', said)
-            self.assertTrue(self.tiles_of(wrong_file) == expected, poses)
+            self.assertTrue(tiles_of(wrong_file) == expected, poses)
             self.succeeds('inspect_map', wrong_file)
         # With stamps, of which two suffice because the drift is even; sequences begin at 0 s.
         two = self.stamped_file('two.txt', [(0.0, true_poses[0]), (0.3000001, true_poses[3])])
         self.succeeds('correct_map', wrong_file, '--poses', two, '--output', corrected)
-        self.assertTrue(self.tiles_of(corrected) == wanted, 'by stamps')
+        self.assertTrue(tiles_of(corrected) == wanted, 'by stamps')
         # Of a camera, whose axes are others.
         camera, calib = self.poses_file('camera.txt', [(-y, -z, x) for x, y, z in true_poses]), self.path('of_camera.txt')
         with open(calib, 'w') as file:
             file.write('Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n')
         self.succeeds('correct_map', wrong_file, '--poses', camera, '--calib', calib, '--output', corrected)
-        self.assertTrue(self.tiles_of(corrected) == wanted, 'of the camera')
+        self.assertTrue(tiles_of(corrected) == wanted, 'of the camera')
         said = self.succeeds('correct_map', wrong_file, '--poses', truth, '--poses-in', 'lidar', '--tolerance', '0.6').stdout
         self.assertIn('1 of 4 scans', said)
 
     def test_the_journal_of_a_continued_map_is_kept(self):
         true_poses, drifted_poses = self.true_and_drifted()
         truth, drifted = self.poses_file('truth.txt', true_poses), self.poses_file('drifted.txt', drifted_poses)
-        wanted = self.tiles_of(self.kept('kept_true.bkm', truth))
+        wanted = tiles_of(self.kept('kept_true.bkm', truth))
         front = self.kept('kept_front.bkm', drifted, '--scans', '2')
         both = self.kept('kept_both.bkm', drifted, '--first', '2', '--resume', front)
         without = self.mapped('kept_without.bkm', '--poses', drifted, *self.KEPT[:-2], '--first', '2', '--resume', front)
@@ -1002,7 +942,7 @@ class Tools(unittest.TestCase):
         # The file itself is continued: it is the same.
         self.kept('kept_front.bkm', drifted, '--first', '2', '--resume', front)
         self.assertEqual(self.rows_of_journal(front), self.rows_of_journal(both))
-        self.assertEqual(self.tiles_of(front), self.tiles_of(both))
+        self.assertEqual(tiles_of(front), tiles_of(both))
         figures, _ = self.journal_of(both)
         self.assertEqual((figures['scans'], figures['drives']), (4, 2))
         self.assertEqual([row[0] for row in self.rows_of_journal(both)], [0, 1, 2, 3])
@@ -1013,18 +953,18 @@ class Tools(unittest.TestCase):
                    'correct_map', both, '--poses', ends, '--poses-in', 'lidar', '--drive', 'drive')
         self.assertIn('2 of 2 scans', self.succeeds('correct_map', both, '--poses', ends, '--poses-in', 'lidar', '--drive',
                                                     'drive/000002-000003').stdout)
-        self.assertTrue(self.tiles_of(both) != wanted)
+        self.assertTrue(tiles_of(both) != wanted)
         start = self.poses_file('start.txt', true_poses[:2])
         self.assertIn('1 of 2 scans', self.succeeds('correct_map', both, '--poses', start, '--poses-in', 'lidar', '--drive',
                                                     'drive/000000-000001').stdout)
-        self.assertTrue(self.tiles_of(both) == wanted, 'two drives were corrected, one after the other')
+        self.assertTrue(tiles_of(both) == wanted, 'two drives were corrected, one after the other')
 
     def test_what_was_cleared_stays_cleared_when_scans_move(self):
         true_poses, drifted_poses = self.true_and_drifted()
         a = self.kept('kept_cleared.bkm', self.poses_file('drifted.txt', drifted_poses))
         self.succeeds('clear_map', a, '--box', '-inf -inf -inf inf inf inf')
         self.succeeds('correct_map', a, '--poses', self.poses_file('truth.txt', true_poses), '--poses-in', 'lidar')
-        self.assertEqual(self.tiles_of(a), {})
+        self.assertEqual(tiles_of(a), {})
 
     def test_a_journal_is_shown_and_forgotten(self):
         true_poses, _ = self.true_and_drifted()
@@ -1036,7 +976,7 @@ class Tools(unittest.TestCase):
         self.assertEqual(len(lines), 1)
         self.assertRegex(lines[0], rf'4 scans of 1 drive that can be moved, [\d.]+ MB, {size // 4} bytes a scan')
         self.assertEqual(self.journal_of(plain), ({'scans': 0, 'bytes': 0, 'drives': 0}, []))
-        tiles = self.tiles_of(big)
+        tiles = tiles_of(big)
         merged = self.succeeds('merge_maps', big, '--output', small)
         self.assertRegex(merged.stderr, r'^warning: \S*big.bkm has scans in its journal, which the merged map does not have')
         self.assertEqual(self.journal_of(small)[0]['scans'], 0)
@@ -1045,7 +985,7 @@ class Tools(unittest.TestCase):
         self.assertEqual(len(self.rows_of_journal(big)), 4)
         self.assertEqual(self.succeeds('forget_journal', big).stdout, f'{big}: {said}')
         for path in (small, big):
-            self.assertEqual(self.tiles_of(path), tiles)
+            self.assertEqual(tiles_of(path), tiles)
             self.assertEqual(self.journal_of(path), ({'scans': 0, 'bytes': 0, 'drives': 0}, []))
         self.assertLess(os.path.getsize(small), os.path.getsize(big) - size // 2)
         self.fails('has no scans in its journal', 'correct_map', big, '--poses', truth, '--poses-in', 'lidar')
@@ -1136,7 +1076,7 @@ class Tools(unittest.TestCase):
 
     def test_stamps_of_scans_of_a_node_are_those_of_the_poses(self):
         true_poses, drifted_poses = self.true_and_drifted()
-        wanted = self.tiles_of(self.kept('kept_true.bkm', self.poses_file('truth.txt', true_poses)))
+        wanted = tiles_of(self.kept('kept_true.bkm', self.poses_file('truth.txt', true_poses)))
         a = self.kept('of_node.bkm', self.poses_file('drifted.txt', drifted_poses))
 
         def set_sensors(*names):
@@ -1155,7 +1095,7 @@ class Tools(unittest.TestCase):
                    'correct_map', a, '--poses', two)
         set_sensors('front', 'front', 'front', 'front')
         self.succeeds('correct_map', a, '--poses', two)
-        self.assertTrue(self.tiles_of(a) == wanted)
+        self.assertTrue(tiles_of(a) == wanted)
 
     def test_corrections_that_are_refused(self):
         true_poses, drifted_poses = self.true_and_drifted()
@@ -1185,17 +1125,17 @@ class Tools(unittest.TestCase):
         with contextlib.closing(sqlite3.connect(a)) as database:
             database.execute("UPDATE scan_content SET content = X'00' WHERE number = 2")
             database.commit()
-        tiles = self.tiles_of(a)
+        tiles = tiles_of(a)
         self.fails('the checksum of scan 2 is wrong', 'correct_map', a, '--poses', truth, *lidar)
         self.fails('the checksum of scan 2 is wrong', 'inspect_map', a)
-        self.assertEqual(self.tiles_of(a), tiles)
+        self.assertEqual(tiles_of(a), tiles)
 
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
         self.assertIn('version 4, from version 4', self.succeeds('migrate_map', a, copy).stdout)
         first = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'test', 'store', 'data', 'version_1.bkm')
         self.assertIn('version 4, from version 1', self.succeeds('migrate_map', first, self.path('second.bkm')).stdout)
-        self.assertEqual(self.tiles_of(copy), self.tiles_of(a))
+        self.assertEqual(tiles_of(copy), tiles_of(a))
         self.fails('exists already', 'migrate_map', a, copy)
         self.fails('needs two files', 'migrate_map', a)
         self.fails('must end in .bkm', 'migrate_map', a, self.path('copy.db'))
@@ -1204,8 +1144,7 @@ class Tools(unittest.TestCase):
     def test_occupancy_table_maps_everything_as_one_class(self):
         report = self.path('one.json')
         call('map_sequence', '--sequence', self.drive, '--classes', 'occupancy', '--report', report)
-        with open(report) as file:
-            counts = json.load(file)['voxels_by_class']
+        counts = read_json(report)['voxels_by_class']
         self.assertEqual(list(counts), ['occupied'])
         self.assertGreater(counts['occupied'], 1000)
 
