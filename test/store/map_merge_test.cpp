@@ -2,57 +2,18 @@
 #include "bki_mapping/store/map_merge.h"
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cstdlib>
 #include <fstream>
-#include <new>
 #include <sstream>
 
 #include "bki_mapping/rules/voxel_state.h"
 #include "reference/content.h"
+#include "store/counted_memory.h"
 #include "store/drive_overlap.h"
 #include "store/grid_transform.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"
-
-namespace {
-
-std::atomic<std::ptrdiff_t> allocated_bytes{0}, most_bytes{0};
-
-void* countedAllocation(std::size_t size) {
-  void* memory = std::malloc(size);
-  if (!memory) throw std::bad_alloc();
-  allocated_bytes += static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
-  most_bytes = std::max(most_bytes.load(), allocated_bytes.load());
-  return memory;
-}
-
-[[gnu::noinline]] void countedRelease(void* memory) noexcept {
-  allocated_bytes -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
-  std::free(memory);
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return countedAllocation(size);
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  try {
-    return countedAllocation(size);
-  } catch (const std::bad_alloc&) {
-    return nullptr;
-  }
-}
-void operator delete(void* memory) noexcept {
-  countedRelease(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  countedRelease(memory);
-}
 
 namespace bki_mapping {
 namespace {
