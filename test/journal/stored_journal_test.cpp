@@ -234,16 +234,20 @@ std::map<GridIndex, std::vector<EvidenceUnits>> evidenceOf(const SemanticMap& ma
   return planes;
 }
 
-TEST(StoredJournal, CorrectsAMapAcrossDrivesAndSettings) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+class StoredJournal : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  const std::string path_ = folder_ / "map.bkm";
+};
+
+TEST_F(StoredJournal, CorrectsAMapAcrossDrivesAndSettings) {
   for (const bool looks : {true, false}) {
     std::mt19937 random(looks ? 31 : 32);
     Drives drives = twoDrives(looks, random);
-    drives.save(path);
+    drives.save(path_);
     const Content before = reference::contentOf(drives.map());
     for (const std::string moved : {"second", "first", ""}) {
-      MapFile file(path, MapFile::Access::kUpdate);
+      MapFile file(path_, MapFile::Access::kUpdate);
       Restored restored(file);
       ASSERT_TRUE(restored.content() == reference::contentOf(drives.map()));
       ASSERT_EQ(restored.rows_.scans.size(), drives.entries_.size());
@@ -258,14 +262,12 @@ TEST(StoredJournal, CorrectsAMapAcrossDrivesAndSettings) {
   }
 }
 
-TEST(StoredJournal, RemembersTheRows) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, RemembersTheRows) {
   std::mt19937 random(33);
   Drives drives = twoDrives(true, random);
   drives.entries_[4].jump = true;
-  drives.save(path);
-  MapFile file(path, MapFile::Access::kUpdate);
+  drives.save(path_);
+  MapFile file(path_, MapFile::Access::kUpdate);
   const std::vector<ScanRecord> rows = file.scans();
   Restored restored(file);
   ASSERT_EQ(restored.rows_.sensors.size(), 2u);
@@ -289,27 +291,23 @@ TEST(StoredJournal, RemembersTheRows) {
 }
 
 /// Without looks, whose intervals may differ from those of a map made afresh where a box was cleared.
-TEST(StoredJournal, WhatWasClearedStaysEmptyOfWhatWasBefore) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, WhatWasClearedStaysEmptyOfWhatWasBefore) {
   std::mt19937 random(34);
   const Eigen::AlignedBox3d box(Eigen::Vector3d(-1.0, -3.0, -3.0), Eigen::Vector3d(2.0, 3.0, 3.0));
   Drives drives = twoDrives(false, random, {box});
-  drives.save(path);
-  MapFile file(path, MapFile::Access::kRead);
+  drives.save(path_);
+  MapFile file(path_, MapFile::Access::kRead);
   EXPECT_EQ(file.clearedBoxes().size(), 2u);
   Restored restored(file);
   restored.moveTo(moveSome(drives, "", random));
   EXPECT_TRUE(restored.content() == reference::contentOf(drives.map()));
 }
 
-TEST(StoredJournal, GivesTheScansOfOneDriveAndTheRestIsForeign) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, GivesTheScansOfOneDriveAndTheRestIsForeign) {
   std::mt19937 random(35);
   Drives drives = twoDrives(true, random);
-  drives.save(path);
-  MapFile file(path, MapFile::Access::kRead);
+  drives.save(path_);
+  MapFile file(path_, MapFile::Access::kRead);
   Restored restored(file, "second");
   ASSERT_EQ(restored.rows_.scans.size(), 8u);
   std::set<GridIndex> others;
@@ -322,13 +320,11 @@ TEST(StoredJournal, GivesTheScansOfOneDriveAndTheRestIsForeign) {
   EXPECT_TRUE(evidenceOf(restored.map_) == evidenceOf(drives.map()));
 }
 
-TEST(StoredJournal, TilesOfScansThatItLacksAreForeign) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, TilesOfScansThatItLacksAreForeign) {
   std::mt19937 random(36);
   Drives drives = twoDrives(true, random);
-  drives.save(path);
-  MapFile file(path, MapFile::Access::kUpdate);
+  drives.save(path_);
+  MapFile file(path_, MapFile::Access::kUpdate);
   const std::vector<TileEntry> tiles = file.tiles();
   ASSERT_GT(tiles.size(), 4u);
   const double edge = 64 * file.info().resolution;
@@ -351,9 +347,7 @@ TEST(StoredJournal, TilesOfScansThatItLacksAreForeign) {
 }
 
 /// A path that ends before a jump moves nothing after it.
-TEST(StoredJournal, KeepsJumps) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, KeepsJumps) {
   std::mt19937 random(37);
   Drives drives(manySettings(true));
   for (int n = 0; n < 6; ++n) {
@@ -362,8 +356,8 @@ TEST(StoredJournal, KeepsJumps) {
     entry.odometry = entry.pose;
     entry.jump = n == 3;
   }
-  drives.save(path);
-  MapFile file(path, MapFile::Access::kRead);
+  drives.save(path_);
+  MapFile file(path_, MapFile::Access::kRead);
   Restored restored(file);
   const Eigen::Isometry3d shift = randomMotion(random, 0.5, 0.0);
   EXPECT_TRUE(restored.corrector_.correct({{drives.entries_[1].scan.stamp, shift * drives.entries_[1].pose}},
@@ -376,22 +370,20 @@ TEST(StoredJournal, KeepsJumps) {
   EXPECT_TRUE(restored.content() == reference::contentOf(drives.map()));
 }
 
-TEST(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
   std::mt19937 random(38);
   for (const auto& [settings, words] : std::vector<std::pair<std::string, std::string>>{
            {"a_setting_of_the_future: 1\nresolution: -1\n", "resolution is"},
            {"resolution: 0.5\n", "resolution is 0.5, and that of the map 0.3"},
            {"free_space: {mode: lines}\n", "did you mean 'line'?"},
            {"[", "a key must be plain text"}}) {
-    twoDrives(true, random).save(path);
-    MapFile file(path, MapFile::Access::kUpdate);
+    twoDrives(true, random).save(path_);
+    MapFile file(path_, MapFile::Access::kUpdate);
     MapFile::Change change = file.change();
     change.addSettings(settings);
     change.commit();
     const std::string refusal = sentenceOf([&] { FileCorrection(file, 0.0); });
-    EXPECT_EQ(refusal.rfind("the settings in the journal of " + path, 0), 0u) << refusal;
+    EXPECT_EQ(refusal.rfind("the settings in the journal of " + path_, 0), 0u) << refusal;
     EXPECT_NE(refusal.find(words), std::string::npos) << refusal;
   }
 }
@@ -403,16 +395,14 @@ std::shared_ptr<const ClassTable> changedTable(const std::function<void(Semantic
   return std::make_shared<ClassTable>("dynamic", classes);
 }
 
-TEST(StoredJournal, KnowsFlagsOfClassesThatFilesDoNotStore) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "map.bkm";
+TEST_F(StoredJournal, KnowsFlagsOfClassesThatFilesDoNotStore) {
   std::mt19937 random(40);
   Drives drives(manySettings(true));
   drives.table_ = changedTable([](SemanticClass& c) { c.airborne = true; });
   for (int n = 0; n < 4; ++n) drives.add("only", 0, random);
-  drives.save(path);
+  drives.save(path_);
   const Content before = reference::contentOf(drives.map());
-  MapFile file(path, MapFile::Access::kUpdate);
+  MapFile file(path_, MapFile::Access::kUpdate);
   EXPECT_FALSE(file.info().classes->find(2)->airborne);
   EXPECT_TRUE(journalClasses(file)->find(2)->airborne);
   FileCorrection correction(file, 0.0);
@@ -425,8 +415,7 @@ TEST(StoredJournal, KnowsFlagsOfClassesThatFilesDoNotStore) {
   EXPECT_TRUE(after == reference::contentOf(drives.map()));
 }
 
-TEST(StoredJournal, RefusesScansOfAnotherClassTable) {
-  const TemporaryFolder folder;
+TEST_F(StoredJournal, RefusesScansOfAnotherClassTable) {
   std::mt19937 random(41);
   const std::vector<std::pair<std::function<void(SemanticClass&)>, bool>> changes = {
       {[](SemanticClass& c) { c.color = {1, 2, 3}; }, true},
@@ -436,12 +425,11 @@ TEST(StoredJournal, RefusesScansOfAnotherClassTable) {
       {[](SemanticClass& c) { c.free_gain = 2.0; }, false},
   };
   for (const auto& [change, allowed] : changes) {
-    const std::string path = folder / "map.bkm";
     Drives drives(manySettings(true));
     drives.add("only", 0, random);
     drives.table_of_settings_ = changedTable(change);
-    drives.save(path);
-    MapFile file(path, MapFile::Access::kRead);
+    drives.save(path_);
+    MapFile file(path_, MapFile::Access::kRead);
     const std::string refusal = sentenceOf([&] { journalClasses(file); });
     EXPECT_EQ(refusal.empty(), allowed) << refusal;
     if (!allowed) {
@@ -451,7 +439,7 @@ TEST(StoredJournal, RefusesScansOfAnotherClassTable) {
   }
 }
 
-TEST(StoredJournal, BoundsAreThoseOfTheBlocksInTiles) {
+TEST_F(StoredJournal, BoundsAreThoseOfTheBlocksInTiles) {
   std::mt19937 random(39);
   const Drives drives = twoDrives(true, random);
   const SemanticMap map = drives.map();
