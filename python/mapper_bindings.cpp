@@ -13,7 +13,7 @@
 #include "core/frame_name.h"
 #include "journal/journal_output.h"
 #include "settings/label_watch.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 
 namespace bki_mapping::python {
 namespace {

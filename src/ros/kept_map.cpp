@@ -12,7 +12,7 @@
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "ros/map_file_settings.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 
 namespace bki_mapping::ros_interface {
 namespace {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "bki_mapping/map/semantic_map.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 #include "store/eviction.h"
 #include "store/tile_store.h"
 

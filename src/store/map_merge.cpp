@@ -9,8 +9,7 @@
 #include <tuple>
 
 #include "bki_mapping/store/map_file.h"
-#include "store/drive_cover.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 #include "store/summand.h"
 
 namespace bki_mapping {

@@ -15,7 +15,7 @@
 #include "export/cleaned_points.h"
 #include "journal/stored_journal.h"
 #include "settings/label_watch.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 #include "tools/interruption.h"
 #include "tools/map_output.h"
 #include "tools/run_report.h"

@@ -10,7 +10,7 @@
 #include "bki_mapping/rules/voxel_state.h"
 #include "reference/content.h"
 #include "store/counted_memory.h"
-#include "store/drive_overlap.h"
+#include "store/drives.h"
 #include "store/grid_transform.h"
 #include "store/map_maker.h"
 #include "temporary_folder.h"

@@ -1,8 +1,10 @@
-/// @file Finds drives whose scans would count twice.
+/// @file Drives that count once: finds those whose scans would count twice, and chooses what to add.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,5 +34,16 @@ std::string textOf(const ScanRange& scans);
 /// @throws std::invalid_argument.
 void checkNotAdded(const std::string& where, const std::vector<DriveRecord>& there,
                    const std::vector<DriveRecord>& added, bool allow_overlap = false);
+
+using DriveSet = std::set<std::string>;  ///< ids
+
+bool disjoint(const DriveSet& a, const DriveSet& b);
+
+/// Chooses sets so that each of the drives is in exactly one of them, and no other drive is in any (an exact
+/// cover). The choice does not depend on the order of the sets.
+/// @param smallest_first prefers many small sets to few large ones.
+/// @return positions in `sets`; nullopt if there is no such choice.
+std::optional<std::vector<std::size_t>> exactCover(const DriveSet& drives, const std::vector<DriveSet>& sets,
+                                                   bool smallest_first);
 
 }  // namespace bki_mapping
