@@ -39,9 +39,9 @@ std::string FileCorrection::move(const std::string& drive, const std::vector<Eig
   std::vector<Eigen::Isometry3d> poses;
   auto next = wanted.begin();
   before_.clear();
-  for (std::size_t n = 0; n < rows_.scans.size(); ++n) {
+  for (std::size_t n = 0; n < rows_.size(); ++n) {
     before_.push_back(corrector_.journal().at(n).T_map_sensor);
-    poses.push_back(rows_.scans[n].drive == drive ? *next++ : before_.back());
+    poses.push_back(rows_[n].drive == drive ? *next++ : before_.back());
   }
   progress_ = progress;
   corrector_.correctTo(poses);
@@ -61,8 +61,8 @@ void FileCorrection::write(MapFile::Change& change, const std::string& drive, bo
   } else {
     for (const GridIndex& tile : changed_) change.writeTile(stored_.map, {tile});
   }
-  for (std::size_t n = 0; n < rows_.scans.size(); ++n) {
-    if (hasMoved(n)) change.moveScan(recordOf(corrector_.journal().at(n), rows_.scans[n]));
+  for (std::size_t n = 0; n < rows_.size(); ++n) {
+    if (hasMoved(n)) change.moveScan(recordOf(corrector_.journal().at(n), rows_[n]));
   }
   if (moved() > 0) putDrive(change, drive);
 }
@@ -70,8 +70,8 @@ void FileCorrection::write(MapFile::Change& change, const std::string& drive, bo
 void FileCorrection::putDrive(MapFile::Change& change, const std::string& drive) const {
   std::set<GridIndex> touched;
   std::uint64_t scans = 0;
-  for (std::size_t n = 0; n < rows_.scans.size(); ++n) {
-    if (rows_.scans[n].drive != drive) continue;
+  for (std::size_t n = 0; n < rows_.size(); ++n) {
+    if (rows_[n].drive != drive) continue;
     const JournalScan& scan = corrector_.journal().at(n);
     touched.insert(scan.regions.begin(), scan.regions.end());
     ++scans;

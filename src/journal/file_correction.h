@@ -47,7 +47,7 @@ class FileCorrection {
   std::set<GridIndex> changed_;
   std::function<void(std::size_t, std::size_t)> progress_;
   MapCorrector corrector_;
-  RestoredJournal rows_;
+  std::vector<StoredAs> rows_;
   std::vector<Eigen::Isometry3d> before_;  ///< where the scans were
 };
 

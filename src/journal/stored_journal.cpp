@@ -78,22 +78,19 @@ ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored) {
   return record;
 }
 
-RestoredJournal restoreJournal(MapFile& file, MapCorrector& corrector, const std::string& drive) {
-  RestoredJournal restored;
+std::vector<StoredAs> restoreJournal(MapFile& file, MapCorrector& corrector) {
+  std::vector<StoredAs> restored;
+  std::vector<std::string> sensors;
   const auto settings = journalSettings(file);
   for (const Eigen::AlignedBox3d& box : file.clearedBoxes()) corrector.noteCleared(box);
   std::map<std::string, std::uint64_t> kept;
   for (const ScanRecord& record : file.scans()) {
     ++kept[record.drive];
-    if (!drive.empty() && record.drive != drive) {
-      corrector.noteForeign(record.tiles);
-      continue;
-    }
     if (record.jump) corrector.noteJump(record.stamp);
     corrector.restore(scanOf(record, file.scanContent(record.number),
                              settings[static_cast<std::size_t>(record.settings)],
-                             numberOf(record.sensor, restored.sensors)));
-    restored.scans.push_back({record.number, record.drive, record.sensor, record.settings, 0, record.jump});
+                             numberOf(record.sensor, sensors)));
+    restored.push_back({record.number, record.drive, record.sensor, record.settings, 0, record.jump});
   }
   noteLacking(file, kept, corrector);
   return restored;

@@ -24,19 +24,13 @@ struct StoredAs {
 /// The row of a scan where it is in the map now.
 ScanRecord recordOf(const JournalScan& scan, const StoredAs& stored);
 
-/// What a corrector does not know of the scans that restoreJournal() gives it.
-struct RestoredJournal {
-  std::vector<StoredAs> scans;       ///< in the order of the journal in memory
-  std::vector<std::string> sensors;  ///< names, by the numbers that the scans have (JournalScan::sensor)
-};
-
 /// Gives a corrector that has no scans those of a file's journal, with the jumps of their poses and the
 /// boxes that were cleared, and notes as foreign where the map in the file has other evidence: from scans
-/// that the journal lacks, or of other drives.
-/// @param drive whose scans are given; "": the scans of all drives.
+/// that the journal lacks. @return what the corrector does not know of the scans, in the order of its
+/// journal.
 /// @throws MapFileError, also if a scan refers to settings that cannot be used; std::bad_alloc. The corrector
 /// then has some of the scans; reset() it.
-RestoredJournal restoreJournal(MapFile& file, MapCorrector& corrector, const std::string& drive = "");
+std::vector<StoredAs> restoreJournal(MapFile& file, MapCorrector& corrector);
 
 /// The bounding box of the blocks that a map has in some tiles, map frame [m]; empty if there are none.
 Eigen::AlignedBox3d boundsIn(const SemanticMap& map, const std::vector<GridIndex>& tiles);
