@@ -15,25 +15,10 @@ namespace {
 
 using Keyframes = std::vector<StampedMotion>;
 
-/// A scan from a place on a way through a room: hits on its walls, and some anywhere.
-Scan scanAt(const Eigen::Isometry3d& pose, std::uint64_t stamp, std::mt19937& random) {
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  std::vector<Eigen::Vector3f> points;
-  std::vector<std::uint32_t> labels;
-  for (int n = 0; n < 60; ++n) {
-    const double x = uniform(random), y = uniform(random), z = uniform(random);
-    Eigen::Vector3d hit(6.0 * x, 4.0 * y, 1.5 * z);
-    if (n % 5) hit[n % 3] = n % 2 ? 2.5 : -2.5;
-    points.push_back((pose.linear().transpose() * (hit - pose.translation())).cast<float>());
-    labels.push_back(10 * (random() % 4));
-  }
-  return scanFromSensorFrame(pose, points, labels, stamp);
-}
-
 /// A mapper with a corrector, and what the law demands of its map.
 class Corrected {
  public:
-  explicit Corrected(const MapperConfig& config, MapCorrector::Settings settings = exact())
+  explicit Corrected(const MapperConfig& config, MapCorrector::Settings settings = exactSettings())
       : config_(config),
         mapper_(config, reference::tableWithDynamicClass()),
         corrector_(config, reference::tableWithDynamicClass(), settings,
@@ -46,12 +31,6 @@ class Corrected {
                     [this](const GridIndex& region, const LooksByBlock& looks) {
                       return mapper_.replaceLooks(region, looks);
                     }}) {}
-
-  static MapCorrector::Settings exact() {
-    MapCorrector::Settings settings;
-    settings.tolerance = 0.0;
-    return settings;
-  }
 
   void add(const Scan& scan, const Eigen::Isometry3d& pose, const Eigen::Isometry3d& odometry) {
     const RoundedScan rounded = corrector_.round(scan, pose);
@@ -127,7 +106,7 @@ TEST(MapCorrector, TheMapIsThatOfTheCorrectedPoses) {
         truth.translation() = Eigen::Vector3d(0.1 * step - 2.0, 0.3 * std::sin(step), 0.0);
         const Eigen::Isometry3d pose = drift * truth;
         const std::uint64_t late = random() % 5 ? stamp : stamp - 60'000'000;
-        map.add(scanAt(truth, late, random), pose, pose);
+        map.add(roomScan(truth, late, random), pose, pose);
       } else if (!map.scans_.empty()) {
         Keyframes keyframes;
         for (std::size_t n = random() % 3; n < map.scans_.size(); n += 1 + random() % 4) {
@@ -179,7 +158,7 @@ TEST(MapCorrector, EachScanIsInTheMapOnceAtAnyMoment) {
   Corrected map(config);
   const Way poses = way(9, 1.0);
   for (const StampedMotion& pose : poses.odometry)
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   map.finish();  // packs
   const std::vector<Eigen::Isometry3d> old_poses = map.poses_;
   map.correct(poses.moved);
@@ -207,7 +186,7 @@ TEST(MapCorrector, ScansWithinTheToleranceStayUntilTheyAreFartherOff) {
   Corrected map(MapperConfig(), settings);
   const Way poses = way(3, 0.06), farther = way(3, 0.12);
   for (const StampedMotion& pose : poses.odometry)
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   const auto before = map.content();
   map.correct(poses.moved);
   map.finish();
@@ -226,7 +205,7 @@ TEST(MapCorrector, AClearedBoxStaysEmptyOfWhatWasBefore) {
   const Way poses = way(6, 0.4);
   const Eigen::AlignedBox3d box(Eigen::Vector3d(-1.0, -3.0, -3.0), Eigen::Vector3d(2.0, 3.0, 3.0));
   const auto add = [&](std::size_t n) {
-    map.add(scanAt(poses.odometry[n].motion, poses.odometry[n].stamp, random), poses.odometry[n].motion,
+    map.add(roomScan(poses.odometry[n].motion, poses.odometry[n].stamp, random), poses.odometry[n].motion,
             poses.odometry[n].motion);
   };
   for (std::size_t n = 0; n < 3; ++n) add(n);
@@ -243,7 +222,7 @@ TEST(MapCorrector, AClearedBoxStaysEmptyOfWhatWasBefore) {
 }
 
 TEST(MapCorrector, ForgottenScansStayWhereTheyAre) {
-  MapCorrector::Settings settings = Corrected::exact();
+  MapCorrector::Settings settings = exactSettings();
   settings.memory = 3000;
   std::mt19937 random(15);
   MapperConfig config;
@@ -251,7 +230,7 @@ TEST(MapCorrector, ForgottenScansStayWhereTheyAre) {
   Corrected map(config, settings);
   const Way poses = way(8, 1.0);
   for (const StampedMotion& pose : poses.odometry) {
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
     map.finish();
   }
   const MapCorrector::Progress progress = map.corrector_.progress();
@@ -271,7 +250,7 @@ TEST(MapCorrector, AScanThatCannotMoveStaysAndIsCounted) {
   Corrected map(withRules());
   Way poses = way(6, 0.5);
   for (const StampedMotion& pose : poses.odometry)
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   poses.moved[2].motion.translation().x() = 1e12;  // outside of any map
   map.correct(poses.moved);
   map.finish();
@@ -289,7 +268,7 @@ TEST(MapCorrector, ALaterPathWins) {
   Way wrong = way(6, 0.5);
   const Way right = way(6, -0.5);
   for (const StampedMotion& pose : wrong.odometry) {
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   }
   map.finish();
   for (StampedMotion& pose : wrong.moved) pose.motion.translation().x() = 1e12;  // outside of any map
@@ -310,12 +289,12 @@ TEST(MapCorrector, ForeignEvidenceAndItsLooksStay) {
   const Way poses = way(4, 0.5);
   SemanticMapper other(withRules(), reference::tableWithDynamicClass());
   for (const StampedMotion& pose : poses.odometry)
-    other.integrate(scanAt(pose.motion, pose.stamp / 2, random));
+    other.integrate(roomScan(pose.motion, pose.stamp / 2, random));
   Corrected map(withRules());
   map.mapper_.addMap(other.map());
   map.corrector_.noteForeign(other.map().regions());
   for (const StampedMotion& pose : poses.odometry) {
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   }
   map.correct(poses.moved);
   map.finish();
@@ -346,7 +325,7 @@ TEST(MapCorrector, AResetDuringAMoveForgetsIt) {
   Corrected map(withRules());
   const Way poses = way(4, 0.5);
   for (const StampedMotion& pose : poses.odometry) {
-    map.add(scanAt(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
   }
   map.finish();
   map.correct(poses.moved);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "journal/random_motion.h"
 #include "journal/scan_codec.h"
 
 namespace bki_mapping {
@@ -16,15 +17,7 @@ constexpr double kQuantum = 0.01;
 
 Eigen::Isometry3d somePose(unsigned seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const auto vector = [&] {
-    const double x = uniform(random), y = uniform(random), z = uniform(random);
-    return Eigen::Vector3d(x, y, z);
-  };
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::AngleAxisd(3.0 * uniform(random), vector().normalized()).toRotationMatrix();
-  pose.translation() = 50.0 * vector();
-  return pose;
+  return randomMotion(random, 50.0, 3.0);
 }
 
 /// A scan with hits, some of which no map can hold, in the axes of the map.

@@ -53,20 +53,10 @@ class Drives {
 
   /// Adds a scan from a random place, some of whose points are near others of earlier scans.
   Entry& add(const std::string& drive, int settings, std::mt19937& random) {
-    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     Eigen::Isometry3d pose = randomMotion(random, 1.5, 3.0);
     pose.translation().z() *= 0.2;
-    std::vector<Eigen::Vector3f> points;
-    std::vector<std::uint32_t> labels;
-    for (int n = 0; n < 60; ++n) {
-      const double x = uniform(random), y = uniform(random), z = uniform(random);
-      Eigen::Vector3d hit(6.0 * x, 4.0 * y, 1.5 * z);
-      if (n % 5) hit[n % 3] = n % 2 ? 2.5 : -2.5;
-      points.push_back((pose.inverse() * hit).cast<float>());
-      labels.push_back(10 * (random() % 4));
-    }
-    stamp_ += 70'000'000 + random() % 300'000'000;
-    const Scan scan = scanFromSensorFrame(pose, points, labels, stamp_);
+    Scan scan = roomScan(pose, 0, random);
+    scan.stamp = stamp_ += 70'000'000 + random() % 300'000'000;
     const MapperConfig& config = settings_[static_cast<std::size_t>(settings)];
     RoundedScan rounded = toSensorScan(scan, pose, 0.01, config.sensor_model);
     entries_.push_back({std::move(rounded.scan), drive, random() % 2 ? "left" : "right", settings,
@@ -151,7 +141,7 @@ class Restored {
  public:
   explicit Restored(MapFile& file)
       : map_(readMap(file).map),
-        corrector_(*journalSettings(file).front(), file.info().classes, exact(),
+        corrector_(*journalSettings(file).front(), file.info().classes, exactSettings(),
                    {[this](const SemanticMap& difference) {
                       map_.add(difference);
                       for (const GridIndex& region : difference.regions()) changed_.insert(region);
@@ -163,11 +153,6 @@ class Restored {
                     }}),
         rows_(restoreJournal(file, corrector_)) {}
 
-  static MapCorrector::Settings exact() {
-    MapCorrector::Settings settings;
-    settings.tolerance = 0.0;
-    return settings;
-  }
   void moveTo(const std::vector<Eigen::Isometry3d>& poses) {
     corrector_.correctTo(poses);
     corrector_.finish(Eigen::Vector3d::Zero());
