@@ -1,8 +1,10 @@
-/// @file A folder that is gone after the test.
+/// @file A folder that is gone after the test, and a disk that is full.
 #pragma once
 
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <string>
 
@@ -35,5 +37,20 @@ inline std::filesystem::path memoryFolder() {
   const char* const folder = "/dev/shm";
   return access(folder, W_OK | X_OK) == 0 ? folder : std::filesystem::temp_directory_path();
 }
+
+/// Simulates a full disk: while it lives, this process can write no file beyond some bytes.
+class FullDisk {
+ public:
+  explicit FullDisk(std::size_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
 
 }  // namespace bki_mapping

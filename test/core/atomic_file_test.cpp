@@ -1,7 +1,6 @@
 // Atomic files: what they may replace, what they keep, and which temporary files they leave or remove.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -211,14 +210,10 @@ TEST_F(FilesAndLinks, TwoAtATimeDoNotMeet) {
 TEST_F(FilesAndLinks, AFullDiskIsSaidWithTheFreeSpace) {
   const std::string path = folder_ / "file";
   writeTextFile(path, "old");
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{1000, before.rlim_max};  // simulates a full disk
-  setrlimit(RLIMIT_FSIZE, &small);
-  const std::string fault =
-      refusalOf<std::runtime_error>([&] { writeTextFile(path, std::string(5000, 'x')); });
-  setrlimit(RLIMIT_FSIZE, &before);
+  const std::string fault = refusalOf<std::runtime_error>([&] {
+    const FullDisk full(1000);
+    writeTextFile(path, std::string(5000, 'x'));
+  });
   EXPECT_NE(fault.find(path + " cannot be written: File too large"), std::string::npos) << fault;
   EXPECT_NE(fault.find("MB free"), std::string::npos) << fault;
   EXPECT_EQ(read(path), "old");

@@ -3,10 +3,8 @@
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
-#include <sys/resource.h>
 
 #include <array>
-#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -185,14 +183,11 @@ TEST_F(MapExport, RefusesOtherEndingsAndFolders) {
 TEST_F(MapExport, AFailureLeavesTheOldFile) {
   const std::string path = folder_ / "map.ply";
   writeTextFile(path, "a good map");
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{1000, before.rlim_max};  // simulates a full disk
-  setrlimit(RLIMIT_FSIZE, &small);
-  EXPECT_THROW(write(path, kAll), std::runtime_error);
-  EXPECT_THROW(write(folder_ / "map.pcd", kAll), std::runtime_error);
-  setrlimit(RLIMIT_FSIZE, &before);
+  {
+    const FullDisk full(1000);
+    EXPECT_THROW(write(path, kAll), std::runtime_error);
+    EXPECT_THROW(write(folder_ / "map.pcd", kAll), std::runtime_error);
+  }
   EXPECT_EQ(read(path), "a good map");
   EXPECT_EQ(folder_.fileCount(), 1u) << "temporary files are left";
 }

@@ -2,9 +2,7 @@
 #include "bki_mapping/store/map_keeper.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <thread>
 
@@ -238,21 +236,6 @@ TEST(MapKeeper, ClearsBoxesHereAndThere) {
   EXPECT_EQ(kept.keeper.close(), "");
   EXPECT_TRUE(same(contentIn(path), contentOf(plain.map())));
 }
-
-/// While it lives, files of this process cannot grow.
-class FullDisk {
- public:
-  explicit FullDisk(std::size_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST(MapKeeper, GoesOnWhenTheDiskIsFull) {
   const TemporaryFolder folder;
