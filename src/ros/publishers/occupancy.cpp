@@ -63,12 +63,8 @@ struct OccupancyMapFields {
   using Message = OccupancyMap;
 
   template <typename Visit>
-  void forEachMember(const Visit& visit) const {
-    visit(header);
-    visit(resolution);
-    visit(block_edge);
-    visit(classes);
-    visit(blocks);
+  void visitMembers(const Visit& visit) const {
+    visit(header, resolution, block_edge, classes, blocks);
   }
 
   std_msgs::Header header;
@@ -83,15 +79,8 @@ struct OccupancyUpdateFields {
   using Message = OccupancyUpdate;
 
   template <typename Visit>
-  void forEachMember(const Visit& visit) const {
-    visit(header);
-    visit(sequence);
-    visit(whole);
-    visit(resolution);
-    visit(block_edge);
-    visit(classes);
-    visit(blocks);
-    visit(removed);
+  void visitMembers(const Visit& visit) const {
+    visit(header, sequence, whole, resolution, block_edge, classes, blocks, removed);
   }
 
   std_msgs::Header header;

@@ -109,7 +109,7 @@ struct MarkerArrayFields {
   using Message = visualization_msgs::MarkerArray;
 
   template <typename Visit>
-  void forEachMember(const Visit& visit) const {
+  void visitMembers(const Visit& visit) const {
     visit(markers);
   }
 

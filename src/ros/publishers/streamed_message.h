@@ -36,7 +36,7 @@ inline void useLargePages(std::uint8_t* data, std::size_t bytes) {
 }
 
 /// A streamed message. @tparam Fields has the members of Fields::Message, which it stands for, and
-/// forEachMember, which visits them in the order of the .msg file.
+/// visitMembers, which passes all of them to one call, in the order of the .msg file.
 template <typename Fields>
 struct StreamedMessage : Fields {
   using Fields::Fields;
@@ -76,11 +76,12 @@ struct Serializer<bki_mapping::ros_interface::StreamedMessage<Fields>> {
   using Message = bki_mapping::ros_interface::StreamedMessage<Fields>;
 
   static void write(OStream& stream, const Message& message) {
-    message.forEachMember([&stream](const auto& member) { stream.next(member); });
+    message.visitMembers([&stream](const auto&... members) { (stream.next(members), ...); });
   }
   static std::uint32_t serializedLength(const Message& message) {
     std::uint32_t length = 0;
-    message.forEachMember([&length](const auto& member) { length += serializationLength(member); });
+    message.visitMembers(
+        [&length](const auto&... members) { ((length += serializationLength(members)), ...); });
     return length;
   }
 };

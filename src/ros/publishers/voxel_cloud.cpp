@@ -84,16 +84,9 @@ struct CloudFields {
   }
 
   template <typename Visit>
-  void forEachMember(const Visit& visit) const {
-    visit(frame.header);
-    visit(frame.height);
-    visit(frame.width);
-    visit(frame.fields);
-    visit(frame.is_bigendian);
-    visit(frame.point_step);
-    visit(frame.row_step);
-    visit(data);
-    visit(frame.is_dense);
+  void visitMembers(const Visit& visit) const {
+    visit(frame.header, frame.height, frame.width, frame.fields, frame.is_bigendian, frame.point_step,
+          frame.row_step, data, frame.is_dense);
   }
 
   sensor_msgs::PointCloud2 frame;  ///< all but the data
@@ -105,13 +98,8 @@ struct CloudUpdateFields {
   using Message = VoxelCloudUpdate;
 
   template <typename Visit>
-  void forEachMember(const Visit& visit) const {
-    visit(header);
-    visit(sequence);
-    visit(whole);
-    visit(resolution);
-    visit(blocks);
-    visit(cloud);
+  void visitMembers(const Visit& visit) const {
+    visit(header, sequence, whole, resolution, blocks, cloud);
   }
 
   std_msgs::Header header;
