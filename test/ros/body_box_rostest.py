@@ -11,13 +11,12 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from bki_mapping.msg import OccupancyMap
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointField
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import CAR, TIMEOUT, Listener, Mapping, make_cloud, random_scan, voxels_of, wait_until  # noqa: E402
+from harness import CAR, TIMEOUT, Mapping, make_cloud, random_scan, voxels_of, wait_until, whole_map  # noqa: E402
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
 PARAMETERS = f'config:={FOLDER}/mapping_params.yaml'
@@ -44,11 +43,7 @@ def outside(points, labels):
 
 
 def map_of(stamp):
-    listener = Listener('occupancy', OccupancyMap)
-    try:
-        return voxels_of(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map').blocks)
-    finally:
-        listener.close()
+    return voxels_of(whole_map(stamp).blocks)
 
 
 def map_after(points, labels, *arguments):

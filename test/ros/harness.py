@@ -177,6 +177,15 @@ def random_scan(seed, points=60, reach=30.0):
     return cloud, [rand.choice((CAR, ROAD)) for _ in cloud]
 
 
+def whole_map(stamp):
+    """The map after a scan, from the topic with whole maps."""
+    listener = Listener('occupancy', OccupancyMap)
+    try:
+        return listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map')
+    finally:
+        listener.close()
+
+
 def voxels_of(blocks):
     return {(b.x, b.y, b.z): (bytes(b.state), bytes(b.label), b.probability) for b in blocks if any(bytes(b.state))}
 
@@ -224,11 +233,7 @@ class MapperTest(unittest.TestCase):
 
     def map_of_server(self, stamp):
         """The blocks of the map after a scan: states, labels, probabilities."""
-        listener = Listener('occupancy', OccupancyMap)
-        try:
-            return voxels_of(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map').blocks)
-        finally:
-            listener.close()
+        return voxels_of(whole_map(stamp).blocks)
 
     def expect_same(self, client, stamp):
         """Waits until a client of map_clients.py has the map of the server after a scan; returns that map."""

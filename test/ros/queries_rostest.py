@@ -9,13 +9,12 @@ import sys
 import rospy
 import rostest
 from bki_mapping import srv
-from bki_mapping.msg import OccupancyMap
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from harness import CAR, ROAD, Listener, MapperTest, random_scan  # noqa: E402
+from harness import CAR, ROAD, Listener, MapperTest, random_scan, whole_map  # noqa: E402
 from map_reference import FREE, OCCUPIED, MapReference  # noqa: E402
 
 ALL = {'car', 'road'}  # of random_scan
@@ -43,11 +42,7 @@ class Queries(MapperTest):
 
     def reference(self, stamp):
         self.stamp = stamp
-        listener = Listener('occupancy', OccupancyMap)
-        try:
-            return MapReference(listener.wait_for(lambda m: m.header.stamp == stamp, 'the whole map'))
-        finally:
-            listener.close()
+        return MapReference(whole_map(stamp))
 
     def ask(self, service, **request):
         return rospy.ServiceProxy(f'mapping/{service}', KINDS[service])(**request)
