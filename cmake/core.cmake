@@ -78,7 +78,7 @@ bki_mapping_core_room(mapping SOURCES
   LINK bki_mapping_free_space)
 
 bki_mapping_kernels(rules limit_kernels)
-bki_mapping_kernels(rules view_kernels)
+bki_mapping_kernels(rules state_kernels)
 bki_mapping_kernels(update sum_kernels)
 bki_mapping_kernels(query distance_kernels)
 bki_mapping_kernels(points point_kernels kernel/kernel_table.h kernel/sparse_kernel.h)

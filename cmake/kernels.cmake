@@ -1,13 +1,13 @@
 # Vector kernels: loops that are compiled once for each instruction set, and chosen when the program runs.
 
 # bki_mapping_kernels(ROOM FILE [header...]): compiles src/ROOM/FILE_inl.h for each instruction set, and defines the function that
-# FILE.h declares, which chooses among them. FILE_inl.h ends with the table of its loops: for view_kernels the constant
-# kViewKernels of type ViewKernels, which viewKernelsFor() returns. The headers are those that the loops need compiled for any
+# FILE.h declares, which chooses among them. FILE_inl.h ends with the table of its loops: for state_kernels the constant
+# kStateKernels of type StateKernels, which stateKernelsFor() returns. The headers are those that the loops need compiled for any
 # processor.
 function(bki_mapping_kernels room file)
   get_filename_component(name ${file} NAME)
-  string(REPLACE "_kernels" "Kernels" function ${name})  # viewKernels
-  bki_mapping_capitalise(${function} type)               # ViewKernels
+  string(REPLACE "_kernels" "Kernels" function ${name})  # stateKernels
+  bki_mapping_capitalise(${function} type)               # StateKernels
   set(header ${room}/${file})
   set(needed "")
   foreach(each ${ARGN})

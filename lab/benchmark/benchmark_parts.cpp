@@ -16,7 +16,7 @@
 #include "parallel/counter_random.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
-#include "rules/view_kernels.h"
+#include "rules/state_kernels.h"
 #include "simd/instruction_sets.h"
 #include "simulation/lidar.h"
 #include "update/map_updater.h"
@@ -127,7 +127,7 @@ SemanticMap mapOfFivePlanes() {
 void readBlocks(benchmark::State& state, const std::string& instruction_set, BlockFields fields) {
   const SemanticMap map = mapOfFivePlanes();
   const auto blocks = sortedBlocks(map);
-  const ViewKernels& kernels = viewKernelsFor(instruction_set);
+  const StateKernels& kernels = stateKernelsFor(instruction_set);
   const StateRules rules;
   BlockView view;
   for (auto _ : state) {

@@ -6,7 +6,7 @@
 
 #include "bki_mapping/map/block.h"
 #include "bki_mapping/rules/state_rules.h"
-#include "rules/view_kernels.h"
+#include "rules/state_kernels.h"
 
 namespace bki_mapping {
 

@@ -103,7 +103,7 @@ bool mayAskNeighbourhood(const StateRules& rules, const Block& block) {
          std::any_of(classes.begin(), classes.end(), [&](ClassId id) { return rules.asksNeighbourhood(id); });
 }
 
-bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+bool findOverruled(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
                    const BlockIndex& index, const Block& block, Overruled& overruled) {
   if (!mayAskNeighbourhood(rules, block)) return false;
   BlockVotes own;

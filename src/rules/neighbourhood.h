@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bki_mapping/core/types.h"
-#include "rules/view_kernels.h"
+#include "rules/state_kernels.h"
 
 namespace bki_mapping {
 
@@ -32,7 +32,7 @@ inline bool isRestored(const StateRules& rules, EvidenceUnits vote, const VoteSu
 bool mayAskNeighbourhood(const StateRules& rules, const Block& block);
 
 /// Finds the voxels of a block that are overruled. @return false if none asks its neighbourhood.
-bool findOverruled(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+bool findOverruled(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
                    const BlockIndex& index, const Block& block, Overruled& overruled);
 
 /// The blocks, and all others of the map whose states depend on their evidence. @param blocks that have

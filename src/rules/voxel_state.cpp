@@ -8,7 +8,7 @@
 #include "rules/latest_looks.h"
 #include "rules/neighbourhood.h"
 #include "rules/occupancy_constants.h"
-#include "rules/view_kernels.h"
+#include "rules/state_kernels.h"
 
 namespace bki_mapping {
 namespace {
@@ -147,7 +147,7 @@ BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Bloc
   return planes;
 }
 
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+void readBlock(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
                const BlockIndex& index, const Block& block, BlockFields fields, BlockView& view) {
   const auto read = fields == BlockFields::kStates          ? kernels.states
                     : fields == BlockFields::kAllButEntropy ? kernels.posterior
@@ -170,7 +170,7 @@ void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRu
 
 void readBlock(const SemanticMap& map, const StateRules& rules, const BlockIndex& index, const Block& block,
                BlockFields fields, BlockView& view) {
-  static const ViewKernels* const fastest = &viewKernelsFor("");
+  static const StateKernels* const fastest = &stateKernelsFor("");
   readBlock(*fastest, map, rules, index, block, fields, view);
 }
 

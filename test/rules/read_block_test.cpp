@@ -6,7 +6,7 @@
 #include <random>
 
 #include "bki_mapping/rules/map_snapshot.h"
-#include "rules/view_kernels.h"
+#include "rules/state_kernels.h"
 #include "simd/instruction_sets.h"
 #include "simd/vec_generic.h"
 
@@ -124,7 +124,7 @@ void compare(const SemanticMap& map, const StateRules& rules, const std::string&
   BlockView view, states, posterior;
   std::memset(static_cast<void*>(&view), 0x55, sizeof(view));
   states = posterior = view;
-  const ViewKernels& kernels = viewKernelsFor(set);
+  const StateKernels& kernels = stateKernelsFor(set);
   readBlock(kernels, map, rules, kOrigin, block, BlockFields::kAll, view);
   readBlock(kernels, map, rules, kOrigin, block, BlockFields::kStates, states);
   readBlock(kernels, map, rules, kOrigin, block, BlockFields::kAllButEntropy, posterior);
@@ -247,7 +247,7 @@ TEST(ReadBlock, WhatRemainsIsAQuarterOfWhatHasLeft) {
     block.add(1, remains.data());
     block.add(kFreeClass, free.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, rules, {{0, 0, 0}}, block, BlockFields::kStates, view);
+    readBlock(stateKernelsFor(set), map, rules, {{0, 0, 0}}, block, BlockFields::kStates, view);
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const bool holds = left[v] <= 4 * remains[v];
       EXPECT_EQ(view.label[v], holds ? 1 : kFreeClass) << set << ' ' << left[v] << ' ' << remains[v];
@@ -262,7 +262,7 @@ TEST(ReadBlock, ATinyPriorIsANumberStill) {
     hits[0] = 1;
     map.getOrAllocate({{0, 0, 0}}).add(1, hits.data());
     BlockView view;
-    readBlock(viewKernelsFor(set), map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll,
+    readBlock(stateKernelsFor(set), map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), BlockFields::kAll,
               view);
     for (std::size_t v = 0; v < 2; ++v) {
       EXPECT_NEAR(view.probability[v], v == 0 ? 1.0 : 0.25, 1e-6);

@@ -49,7 +49,7 @@ struct BlockVotes {
 
 /// The loops for one instruction set: they set all fields of the view that they are named for, and state
 /// kUnknown also where the block has an occlusion mark.
-struct ViewKernels {
+struct StateKernels {
   using Read = void (*)(const BlockPlanes& planes, BlockView& view);
 
   const char* instruction_set;
@@ -63,13 +63,13 @@ struct ViewKernels {
 
 /// @param instruction_set one of instructionSets(); the fastest if empty.
 /// @throws std::invalid_argument for any other.
-const ViewKernels& viewKernelsFor(const std::string& instruction_set);
+const StateKernels& stateKernelsFor(const std::string& instruction_set);
 
 /// The planes of a block, which the map need not have.
 BlockPlanes planesOf(const SemanticMap& map, const StateRules& rules, const Block& block);
 
 /// readBlock with the given loops.
-void readBlock(const ViewKernels& kernels, const SemanticMap& map, const StateRules& rules,
+void readBlock(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
                const BlockIndex& index, const Block& block, BlockFields fields, BlockView& view);
 
 // Scalar parts, which all instruction sets share, so that they decide alike:

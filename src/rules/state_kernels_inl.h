@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "rules/occupancy_constants.h"
+#include "rules/state_kernels.h"
 #include "rules/vec_log_inl.h"
-#include "rules/view_kernels.h"
 
 namespace bki_mapping {
 namespace {
@@ -304,8 +304,8 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
   return AnyTrue(any != 0);
 }
 
-constexpr ViewKernels kViewKernels = {kInstructionSet, readPlanes<false, false>, readPlanes<true, false>,
-                                      readPlanes<true, true>, readVotes};
+constexpr StateKernels kStateKernels = {kInstructionSet, readPlanes<false, false>, readPlanes<true, false>,
+                                        readPlanes<true, true>, readVotes};
 
 }  // namespace
 }  // namespace bki_mapping
