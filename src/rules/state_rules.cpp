@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "rules/class_sets.h"
+#include "rules/rules_parameters.h"
 
 namespace bki_mapping {
 namespace {
@@ -38,11 +40,17 @@ double evidenceToStand(double scans, double resolution) {
   return std::max(here - 0.5, 0.0) * RulesConfig::kHit;
 }
 
+bool haveSameValues(const RulesConfig& a, const RulesConfig& b) {
+  const auto parameters = rulesParameters();
+  return std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) { return p.equal(a, b); });
+}
+
 }  // namespace
 
 StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, double resolution)
     : StateRules() {
   if (!config.enabled) return;
+  config_ = config;
   const bool says_what_moves = classes.saysWhatMoves();
   const int reach =
       static_cast<int>(std::lround(std::clamp(config.together / resolution, 1.0, 1.0 * kMostReach)));
@@ -117,13 +125,12 @@ StateRules StateRules::withLatest(bool decides) const {
 }
 
 bool StateRules::decidesAs(const StateRules& other) const {
-  return free_gains_ == other.free_gains_ && standing_gains_ == other.standing_gains_ &&
-         stands_after_ == other.stands_after_ && hit_of_scan_ == other.hit_of_scan_ &&
-         (neighbourhood_ratio_ == 0.0f ||
-          (asking_ == other.asking_ && neighbourhood_is_below_ == other.neighbourhood_is_below_ &&
-           neighbourhood_reach_ == other.neighbourhood_reach_)) &&
-         latest_decides_ == other.latest_decides_ && neighbourhood_ratio_ == other.neighbourhood_ratio_ &&
-         remaining_gain_ == other.remaining_gain_ && (remaining_gain_ == 0.0f || fixed_ == other.fixed_);
+  const auto all = [](const StateRules& r) {
+    return std::tie(r.free_gains_, r.standing_gains_, r.stands_after_, r.hit_of_scan_, r.remaining_gain_,
+                    r.fixed_, r.neighbourhood_ratio_, r.asking_, r.neighbourhood_is_below_,
+                    r.neighbourhood_reach_, r.latest_decides_);
+  };
+  return haveSameValues(config_, other.config_) && all(*this) == all(other);
 }
 
 }  // namespace bki_mapping

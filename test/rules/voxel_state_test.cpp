@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "bki_mapping/rules/voxel_state.h"
+#include "other_value.h"
+#include "reference/scenes.h"
+#include "rules/rules_parameters.h"
 
 namespace bki_mapping {
 namespace {
@@ -407,6 +410,20 @@ TEST(VoxelState, OccludedOnlyWithoutEvidence) {
   EXPECT_EQ(viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 1).state,
             VoxelState::kOccluded);
   EXPECT_EQ(viewVoxel(map, StateRules(), {{0, 0, 0}}, *map.find({{0, 0, 0}}), 2).state, VoxelState::kUnknown);
+}
+
+TEST(StateRules, OfOtherSettingsDecideOtherwise) {
+  RulesConfig config;
+  config.enabled = true;
+  const auto rulesOf = [](const RulesConfig& rules) {
+    return StateRules(rules, *reference::smallTable(), 0.3);
+  };
+  EXPECT_TRUE(rulesOf(config).decidesAs(rulesOf(config)));
+  for (const auto& p : rulesParameters()) {
+    RulesConfig other = config;
+    p.set(other, otherValue(p, other));
+    EXPECT_FALSE(rulesOf(config).decidesAs(rulesOf(other))) << p.name;
+  }
 }
 
 TEST(VoxelState, VisitsKnownVoxelsInSortedOrder) {

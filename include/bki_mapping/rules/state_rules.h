@@ -21,6 +21,9 @@ class StateRules {
   /// @param resolution edge of a voxel [m].
   StateRules(const RulesConfig& config, const ClassTable& classes, double resolution);
 
+  /// The settings that it was made from, if they are enabled; otherwise the defaults, which are not.
+  const RulesConfig& config() const { return config_; }
+
   /// Gain on the evidence for `free`; 1 unless set. It may change from some evidence of hits on: a gain above
   /// 1 is that of what passes, and 1 when it stands; the gain of what cannot move becomes 0 (Equation 12).
   /// @param id of the class with the most evidence. @param hits the evidence for that class.
@@ -86,11 +89,12 @@ class StateRules {
   }
   static constexpr int kMostFree = 300;
 
-  /// Whether equal blocks, with equal blocks around, have the same states and labels by these
-  /// rules and by the others.
+  /// Whether these rules are the others: equal blocks, with equal blocks around, then have the same states
+  /// and labels.
   bool decidesAs(const StateRules& other) const;
 
  private:
+  RulesConfig config_;
   std::array<float, 256> free_gains_, standing_gains_, stands_after_;
   float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
   int neighbourhood_reach_ = 2;
