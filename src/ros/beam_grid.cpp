@@ -13,8 +13,6 @@ constexpr float kJitter = 1e-4f;
 constexpr float kLeastSpacing = 1e-4f;
 /// Fractions of returns that may be off the grid: of a ring or firing that is used, and of a whole cloud.
 constexpr float kWrongOfLine = 0.05f, kWrongOfCloud = 0.1f;
-/// Smallest number of returns more than unknowns that says how well they fit.
-constexpr float kLeastFreedom = 16.0f;
 /// Offsets are carried from ring to ring through common firings at most this often.
 constexpr int kMostLayers = 8;
 

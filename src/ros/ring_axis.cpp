@@ -12,11 +12,9 @@ namespace {
 
 /// Five unknowns need no more returns than this.
 constexpr std::size_t kMostSamples = 8192;
-/// Smallest number of returns more than unknowns that says how well they fit.
-constexpr double kLeastFreedom = 16.0;
 /// Directions within rings differ at least this much [rad], and beams are taken to start within this of the
 /// origin [m] unless returns say otherwise (standard deviations).
-constexpr double kJitter = 1e-4, kOffset = 2e-3;
+constexpr double kDirectionJitter = 1e-4, kOffset = 2e-3;
 
 /// The step through the returns, odd so that it meets all rows and columns of grids whose sizes are even.
 std::size_t stepThrough(std::size_t count) {
@@ -77,7 +75,7 @@ class NormalEquations {
     }
     const double freedom = count_ - used - 4.0;
     if (freedom < kLeastFreedom) return false;
-    left_.diagonal() += Eigen::Vector4d(1e-6, 1e-6, 1.0, 1.0) * std::pow(kJitter / kOffset, 2);
+    left_.diagonal() += Eigen::Vector4d(1e-6, 1e-6, 1.0, 1.0) * std::pow(kDirectionJitter / kOffset, 2);
     inverse = left_.inverse();
     step = -inverse * right_;
     spread = std::sqrt(std::max(squares_, 0.0) / freedom);
@@ -152,7 +150,7 @@ std::optional<RingAxis> fitRingAxis(const std::vector<GridReturn>& returns, std:
     axis.radius += change[3];
     axis.covariance = inverse.cast<float>();
     for (std::size_t r = 0; r < rings; ++r) means[r] = equations.meanAfter(step, r);
-    limit = static_cast<float>(3.0 * std::max(spread, kJitter));
+    limit = static_cast<float>(3.0 * std::max(spread, kDirectionJitter));
   }
   return axis;
 }

@@ -8,6 +8,9 @@
 
 namespace bki_mapping::ros_interface {
 
+/// Smallest number of returns more than unknowns that says how well they fit.
+constexpr float kLeastFreedom = 16.0f;
+
 /// A return, and its place in an organised cloud. A laser of a spinning lidar makes a ring of beams with one
 /// elevation; all lasers together make a firing, a half plane through the axis but for an offset of each
 /// laser.

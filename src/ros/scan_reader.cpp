@@ -112,7 +112,7 @@ std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& p
 /// different ranges: some drivers write one far range where nothing came back.
 void checkMetres(const Scan& scan, const SensorModelConfig& sensor) {
   constexpr float kAtSensor = 1e-3f;
-  constexpr double kHardlyAny = 0.01;
+  constexpr double kFewInReach = 0.01;
   const double farthest = std::max(SensorModelConfig::kFarthest, sensor.max_range);
   std::vector<float> ranges;
   for (const Eigen::Vector3f& point : scan.points) {
@@ -121,7 +121,7 @@ void checkMetres(const Scan& scan, const SensorModelConfig& sensor) {
   }
   const auto near = std::count_if(ranges.begin(), ranges.end(),
                                   [&](float range) { return static_cast<double>(range) <= farthest; });
-  if (ranges.empty() || static_cast<double>(near) >= kHardlyAny * static_cast<double>(ranges.size())) return;
+  if (ranges.empty() || static_cast<double>(near) >= kFewInReach * static_cast<double>(ranges.size())) return;
   constexpr float kSame = 0.999f;
   const float longest = *std::max_element(ranges.begin(), ranges.end());
   const auto farthest_of_all =
