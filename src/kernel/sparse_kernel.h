@@ -51,8 +51,9 @@ struct VoxelKernel {
     reach = static_cast<float>(length / resolution);
     inverse_reach2 = static_cast<float>(resolution * resolution / (length * length));
     if (type == KernelType::kSparse) {
-      constexpr double kPi = 3.14159265358979323846;
-      constexpr double kIntegral = 2.0 * kPi / 9.0 - 4.0 / (3.0 * kPi);  // of k(r) over the unit ball
+      constexpr double kHalfTurn = 3.14159265358979323846;  // pi
+      constexpr double kIntegral =
+          2.0 * kHalfTurn / 9.0 - 4.0 / (3.0 * kHalfTurn);  // of k(r) over the unit ball
       total = static_cast<float>(config.scale * kIntegral * std::pow(length / resolution, 3.0));
     }
   }
