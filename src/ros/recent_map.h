@@ -73,6 +73,8 @@ class RecentMap {
 
  private:
   using Time = std::atomic<Clock::time_point>;
+  /// The clock's epoch will not do: it may be the last start of the machine, and so be recent.
+  static constexpr Clock::time_point kNever = Clock::time_point::min();
 
   /// Replaces the snapshot.
   void keep(Shared snapshot) noexcept;
@@ -81,13 +83,16 @@ class RecentMap {
   /// Calls a function in the background; drops it at once if there is no memory for that.
   template <typename Function>
   void later(Function function) noexcept;
-  bool isRecent(const Time& asked) const { return Clock::now() - asked.load() <= interest_; }
+  bool isRecent(const Time& asked) const {
+    const Clock::time_point last = asked;
+    return last != kNever && Clock::now() - last <= interest_;
+  }
 
   Take take_;
   ros::CallbackQueue& mapping_;
   ros::CallbackQueue& background_;
   Clock::duration interest_;
-  Time asked_{Clock::time_point()}, frontiers_asked_{Clock::time_point()};
+  Time asked_{kNever}, frontiers_asked_{kNever};
   std::mutex mutex_;
   Shared kept_;  ///< nullptr while no queries are asked
 };
