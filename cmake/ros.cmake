@@ -4,7 +4,7 @@ bki_mapping_room(ros SOURCES
     beam_grid.cpp city_tiles.cpp clock_offset.cpp cloud_conversion.cpp cloud_frame.cpp color_reader.cpp
     corrected_poses.cpp distance_section_config.cpp input_config.cpp input_notes.cpp kept_map.cpp
     label_reader.cpp live_settings.cpp load_advice.cpp map_cloud.cpp map_file_settings.cpp
-    mapping_diagnostics.cpp mapping_server.cpp mapping_services.cpp no_returns.cpp point_account.cpp
+    mapping_diagnostics.cpp mapping_server.cpp mapping_services.cpp no_returns.cpp odometry_poses.cpp point_account.cpp
     point_field.cpp point_times.cpp pose_source.cpp publisher_set.cpp publishers/*.cpp queries/*.cpp
     query_services.cpp recent_map.cpp recording_mapper.cpp ring_axis.cpp scan_ledger.cpp scan_reader.cpp
     score_reader.cpp sensor_trajectory.cpp server_config.cpp tf_jumps.cpp

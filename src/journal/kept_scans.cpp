@@ -17,26 +17,28 @@ KeptScans::KeptScans(SemanticMapper& mapper, const MapCorrector::Settings& setti
                   }}) {}
 
 ScanStats KeptScans::integrate(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
-                               const std::string& sensor) {
-  return add(corrector_.round(scan, T_map_sensor), sensor);
+                               const std::string& sensor,
+                               const std::optional<Eigen::Isometry3d>& T_odometry_sensor) {
+  return add(corrector_.round(scan, T_map_sensor), sensor, T_odometry_sensor);
 }
 
 ScanStats KeptScans::integrateRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
                                        const std::string& sensor) {
   RoundedScan rounded = corrector_.round(scan, Eigen::Isometry3d::Identity());
   rounded.T_map_sensor = roundedPose(T_map_sensor);
-  return add(std::move(rounded), sensor);
+  return add(std::move(rounded), sensor, std::nullopt);
 }
 
-ScanStats KeptScans::add(RoundedScan rounded, const std::string& sensor) {
+ScanStats KeptScans::add(RoundedScan rounded, const std::string& sensor,
+                         const std::optional<Eigen::Isometry3d>& T_odometry_sensor) {
   ScanStats stats = mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
   stats.counts += rounded.left_out;
   robot_ = rounded.T_map_sensor.translation();
   const auto known = std::find(sensors_.begin(), sensors_.end(), sensor);
   const auto number = static_cast<std::size_t>(known - sensors_.begin());
   if (known == sensors_.end()) sensors_.push_back(sensor);
-  corrector_.addScan(std::move(rounded.scan), number, rounded.T_map_sensor, rounded.T_map_sensor,
-                     mapper_.touchedBlocks());
+  corrector_.addScan(std::move(rounded.scan), number, rounded.T_map_sensor,
+                     T_odometry_sensor.value_or(rounded.T_map_sensor), mapper_.touchedBlocks());
   return stats;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,9 +19,11 @@ class KeptScans {
   KeptScans(SemanticMapper& mapper, const MapCorrector::Settings& settings);
 
   /// Adds a scan to the map, and keeps it. @param scan as the mapper takes it. @param sensor name of its
-  /// frame; "" if there is only one sensor. @throws as SemanticMapper::integrate.
+  /// frame; "" if there is only one sensor. @param T_odometry_sensor its recorded pose in a frame that does
+  /// not jump; by default, that in the map. @throws as SemanticMapper::integrate.
   ScanStats integrate(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
-                      const std::string& sensor = "");
+                      const std::string& sensor = "",
+                      const std::optional<Eigen::Isometry3d>& T_odometry_sensor = std::nullopt);
   /// The same of a scan in the axes of the sensor, as it was recorded: to the axes of the map and back, some
   /// points would be rounded to others. @param scan its origin does not count.
   ScanStats integrateRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
@@ -45,7 +48,8 @@ class KeptScans {
   const std::vector<Eigen::AlignedBox3d>& cleared() const { return cleared_; }
 
  private:
-  ScanStats add(RoundedScan rounded, const std::string& sensor);
+  ScanStats add(RoundedScan rounded, const std::string& sensor,
+                const std::optional<Eigen::Isometry3d>& T_odometry_sensor);
 
   SemanticMapper& mapper_;
   MapCorrector corrector_;

@@ -50,6 +50,7 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
       config_(std::make_shared<const MapperConfig>(config)),
       journal_(settings.memory, map_.fetch != nullptr),
       mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
+  if (!(settings_.quantum > 0.0)) settings_.quantum = usualQuantum(config.resolution);
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
   checkCorrectable(config);
   thread_ = std::thread(&MapCorrector::work, this);

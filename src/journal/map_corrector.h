@@ -43,10 +43,14 @@ struct CorrectedMap {
 class MapCorrector {
  public:
   struct Settings {
-    double quantum = 0.01;    ///< to which points are rounded in the sensor's frame [m]
+    double quantum = 0.0;     ///< to which points are rounded in the sensor's frame [m]; 0: usualQuantum()
     double tolerance = -1.0;  ///< scans that no point of which is farther off stay [m]; < 0: resolution / 10
     std::size_t memory = 0;   ///< of the packed scans in memory [bytes]; 0: no limit
   };
+
+  /// 1 cm; with a resolution below 0.3 m, a hundredth of it, since rounding costs accuracy by their ratio
+  /// [m].
+  static double usualQuantum(double resolution) { return resolution < 0.3 ? 0.01 * resolution : 0.01; }
 
   /// @throws as checkCorrectable().
   MapCorrector(const MapperConfig& config, std::shared_ptr<const ClassTable> classes,

@@ -31,8 +31,8 @@ CorrectedPoses::CorrectedPoses(ros::NodeHandle& node, const ServerConfig& config
                                MapCorrector& corrector, std::function<void()> on_path)
     : map_frame_(frameName(config.frame_id)),
       corrected_frame_(config.correction.corrected_frame_id),
-      odometry_frame_(config.correction.odometry_frame_id),
       poses_(poses),
+      odometry_(config.correction.odometry_frame_id, poses),
       corrector_(corrector),
       on_path_(std::move(on_path)),
       subscriber_(node.subscribe("corrected_path", 1, &CorrectedPoses::onPath, this)) {
@@ -46,29 +46,15 @@ std::size_t CorrectedPoses::numberOf(const std::string& sensor_frame) {
   return number;
 }
 
-Eigen::Isometry3d CorrectedPoses::odometryOf(const std::string& sensor_frame, std::uint64_t stamp,
-                                             const Eigen::Isometry3d& T_map_sensor) {
-  if (odometry_frame_.empty()) return T_map_sensor;
-  const ros::Time time = ros::Time().fromNSec(stamp);
-  if (const auto pose = poses_.find(odometry_frame_, sensor_frame, time)) {
-    if (!T_odometry_map_) corrector_.noteJump(stamp);  // those before are in the map frame
-    T_odometry_map_ = pose->T_target_source * T_map_sensor.inverse();
-    return pose->T_target_source;
-  }
-  const std::string why = poses_.explain(odometry_frame_, sensor_frame, time).why;
-  if (throttle_.allow(why, SentenceThrottle::Clock::now())) {
-    ROS_WARN(
-        "odometry_frame_id '%s': tf has no pose of '%s' in it at time %.3f; set it to the frame of the "
-        "odometry, or leave it empty (%s)",
-        odometry_frame_.c_str(), sensor_frame.c_str(), time.toSec(), why.c_str());
-  }
-  return T_odometry_map_ ? *T_odometry_map_ * T_map_sensor : T_map_sensor;
-}
-
 void CorrectedPoses::add(SensorScan scan, const Eigen::Isometry3d& T_map_sensor,
                          const std::string& sensor_frame, const std::vector<GridIndex>& touched) {
-  const Eigen::Isometry3d T_odometry_sensor = odometryOf(sensor_frame, scan.stamp, T_map_sensor);
-  corrector_.addScan(std::move(scan), numberOf(sensor_frame), T_map_sensor, T_odometry_sensor, touched);
+  const OdometryPoses::Pose odometry = odometry_.of(sensor_frame, scan.stamp, T_map_sensor);
+  if (odometry.is_first) corrector_.noteJump(scan.stamp);
+  if (!odometry.warning.empty() && throttle_.allow(odometry.warning, SentenceThrottle::Clock::now())) {
+    ROS_WARN("%s", odometry.warning.c_str());
+  }
+  corrector_.addScan(std::move(scan), numberOf(sensor_frame), T_map_sensor, odometry.T_odometry_sensor,
+                     touched);
   if (said_forgotten_ || corrector_.progress().forgotten == 0) return;
   said_forgotten_ = true;
   ROS_WARN(
@@ -77,7 +63,7 @@ void CorrectedPoses::add(SensorScan scan, const Eigen::Isometry3d& T_map_sensor,
 }
 
 void CorrectedPoses::noteJump(const ros::Time& stamp) {
-  if (odometry_frame_.empty()) corrector_.noteJump(stamp.toNSec());
+  if (odometry_.isMapFrame()) corrector_.noteJump(stamp.toNSec());
 }
 
 std::vector<StampedMotion> CorrectedPoses::keyframesOf(const nav_msgs::Path& path) const {

@@ -6,12 +6,11 @@
 #include <ros/node_handle.h>
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "journal/map_corrector.h"
-#include "ros/pose_source.h"
+#include "ros/odometry_poses.h"
 #include "ros/scan_reader.h"
 #include "ros/sentence_throttle.h"
 #include "ros/server_config.h"
@@ -60,21 +59,18 @@ class CorrectedPoses {
   std::vector<Eigen::Isometry3d> sensorToCorrected() const;
   /// Number of a sensor by its frame.
   std::size_t numberOf(const std::string& sensor_frame);
-  /// The pose in odometry_frame_id; where tf lacks it, the one that follows from the last known one.
-  Eigen::Isometry3d odometryOf(const std::string& sensor_frame, std::uint64_t stamp,
-                               const Eigen::Isometry3d& T_map_sensor);
 
-  std::string map_frame_, corrected_frame_, odometry_frame_;
+  std::string map_frame_, corrected_frame_;
   const PoseSource& poses_;
+  OdometryPoses odometry_;
   MapCorrector& corrector_;
   std::function<void()> on_path_;
   std::vector<std::string> sensor_frames_;
   std::string last_refusal_;
   std::uint64_t refused_ = 0;
   bool was_done_ = true, said_forgotten_ = false;
-  std::optional<Eigen::Isometry3d> T_odometry_map_;  ///< the last known one
-  nav_msgs::PathConstPtr waiting_;                   ///< the last message, until it is used
-  SentenceThrottle::Clock::time_point used_;         ///< when the last one was
+  nav_msgs::PathConstPtr waiting_;            ///< the last message, until it is used
+  SentenceThrottle::Clock::time_point used_;  ///< when the last one was
   SentenceThrottle throttle_;
   ros::Subscriber subscriber_;
 };

@@ -31,6 +31,7 @@ RecordingMapper::RecordingMapper(SemanticMapper& mapper, const ServerConfig& con
       frame_(config.frame_id),
       on_time_jump_(config.on_time_jump),
       listener_(std::move(listener)),
+      odometry_(config.correction.odometry_frame_id, poses_),
       points_(inputs.size()) {
   poses_.ignoreTimeout();
   for (const InputConfig& input : inputs) {
@@ -90,7 +91,10 @@ void RecordingMapper::map(const WaitingCloud& waiting) {
 ScanStats RecordingMapper::addToMap(const PlacedScan& placed, const std::string& sensor_frame) {
   if (!kept_) return mapper_.integrate(placed.scan);
   kept_->update();
-  return kept_->integrate(placed.scan, placed.T_map_sensor, sensor_frame);
+  const OdometryPoses::Pose odometry = odometry_.of(sensor_frame, placed.scan.stamp, placed.T_map_sensor);
+  if (odometry.is_first) kept_->noteJump(placed.scan.stamp);
+  if (!odometry.warning.empty()) warnOnce(odometry.warning);
+  return kept_->integrate(placed.scan, placed.T_map_sensor, sensor_frame, odometry.T_odometry_sensor);
 }
 
 void RecordingMapper::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {
@@ -108,7 +112,7 @@ void RecordingMapper::integrate(const WaitingCloud& waiting, const PlacedScan& p
   poses_.watchJumps(frame_, sensor_frame, ros::Time().fromNSec(placed.scan.stamp));
   for (const TfJump& jump : poses_.takeJumps()) {
     ledger_.tfJumped();
-    if (kept_) kept_->noteJump(jump.stamp.toNSec());
+    if (kept_ && odometry_.isMapFrame()) kept_->noteJump(jump.stamp.toNSec());
     warnOnce(sentenceOf(jump) + (kept_ ? "; correct the map file with correct_map"
                                        : "; map a recording with the corrected poses"));
   }

@@ -13,6 +13,7 @@
 #include "journal/kept_scans.h"
 #include "ros/input_notes.h"
 #include "ros/map_cloud.h"
+#include "ros/odometry_poses.h"
 #include "ros/point_account.h"
 #include "ros/pose_source.h"
 #include "ros/scan_ledger.h"
@@ -78,6 +79,7 @@ class RecordingMapper {
   OnTimeJump on_time_jump_;
   Listener listener_;
   PoseSource poses_;
+  OdometryPoses odometry_;
   std::vector<ScanReader> readers_;  ///< one per input
   std::vector<InputNotes> notes_;    ///< of each input
   std::vector<PointAccount> points_;

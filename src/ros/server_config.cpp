@@ -23,11 +23,11 @@ std::vector<NamedParameter<CorrectionConfig>> correctionParameters() {
                      "corrects the poses of the past. With window it needs map_file, whose journal then "
                      "keeps them."),
       realParameter(
-          "journal_quantum", &C::journal_quantum, NumberRange::atLeast(0.0001).upTo(1.0), "m",
+          "journal_quantum", &C::journal_quantum, NumberRange::atLeast(0.0001).upTo(1.0).orElse(0.0), "m",
           Changes::kAtStart,
           "Points of kept scans are rounded to multiples of this in the sensor's frame, before they "
-          "are mapped. Raise it to save memory; with a resolution below 0.2 m, lower it to a hundredth of "
-          "resolution."),
+          "are mapped. Raise it to save memory. 0 stands for 0.01, or for a hundredth of resolution where "
+          "that is below 0.3 m."),
       realParameter(
           "journal_limit", &C::journal_limit, NumberRange::atLeast(0.0), "MB", Changes::kAtStart,
           "Largest memory of kept scans. Beyond it the oldest ones are read from map_file when they "

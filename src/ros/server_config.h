@@ -21,7 +21,7 @@ namespace bki_mapping::ros_interface {
 /// The journal of scans, and corrected poses.
 struct CorrectionConfig {
   bool journal = false;            ///< whether scans are kept, so that they can move
-  double journal_quantum = 0.01;   ///< to which points are rounded in the sensor's frame [m]
+  double journal_quantum = 0.0;    ///< to which points are rounded in the sensor's frame [m]; 0: as usual
   double journal_limit = 4000.0;   ///< of the memory of kept scans [MB]; 0: none
   double tolerance = -1.0;         ///< by which points may be off [m]; < 0: a tenth of the resolution
   std::string corrected_frame_id;  ///< whose poses corrected_path has; "": the sensor's

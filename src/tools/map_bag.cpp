@@ -85,10 +85,10 @@ std::pair<ros_interface::ServerConfig, MapperConfig> settings(const po::variable
 /// What keeps the scans of a mapper; nullptr if nothing asks for it.
 std::unique_ptr<KeptScans> keptScans(const po::variables_map& given,
                                      const ros_interface::ServerConfig& server, SemanticMapper& mapper) {
+  if (given.count("journal") == 0 && !server.correction.journal) return nullptr;
   MapCorrector::Settings settings;
   settings.quantum =
       given.count("journal") ? given["journal"].as<double>() : server.correction.journal_quantum;
-  if (given.count("journal") == 0 && !server.correction.journal) return nullptr;
   return std::make_unique<KeptScans>(mapper, settings);
 }
 

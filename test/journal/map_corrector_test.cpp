@@ -338,6 +338,23 @@ TEST(MapCorrector, AResetDuringAMoveForgetsIt) {
   EXPECT_TRUE(map.corrector_.progress().done);
 }
 
+TEST(MapCorrector, RoundsByTheSizeOfVoxelsUnlessItIsToldHow) {
+  const auto quantumFor = [](double resolution, double asked) {
+    MapperConfig config;
+    config.resolution = resolution;
+    MapCorrector::Settings settings;
+    settings.quantum = asked;
+    const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    return Corrected(config, settings)
+        .corrector_.round(scanFromSensorFrame(pose, {}, {}, 1), pose)
+        .scan.quantum;
+  };
+  EXPECT_DOUBLE_EQ(quantumFor(0.1, 0.0), 0.001);
+  EXPECT_DOUBLE_EQ(quantumFor(0.3, 0.0), 0.01);
+  EXPECT_DOUBLE_EQ(quantumFor(2.0, 0.0), 0.01);
+  EXPECT_DOUBLE_EQ(quantumFor(0.1, 0.02), 0.02);
+}
+
 TEST(MapCorrector, SettingsThatDependOnTheOrderAreRefused) {
   MapperConfig config;
   config.occlusion = OcclusionExtent::kAll;

@@ -136,6 +136,15 @@ class MapBag(ProgramTest):
         said = self.map(bag, '--journal', '0.01', '--config', 'robot').stderr
         self.assertIn('; correct the map file with correct_map', said)
         self.assertEqual([jump for _, jump in rows(self.path('map.bkm'), 'SELECT number, jump FROM scan')], [0, 1])
+        # In a frame that does not jump, nothing does.
+        self.map(bag, '--journal', '0.01', '--config', 'robot', '--set', 'odometry_frame_id=odom')
+        found = rows(self.path('map.bkm'), 'SELECT number, jump, hex(pose), hex(odometry) FROM scan')
+        (_, _, first_pose, first), (_, jump, second_pose, second) = found
+        self.assertEqual(jump, 0)
+        self.assertNotEqual(first_pose, second_pose)
+        self.assertEqual(first, second)
+        said = self.map(bag, '--journal', '0.01', '--config', 'robot', '--set', 'odometry_frame_id=wheels').stderr
+        self.assertIn("odometry_frame_id 'wheels': tf has no pose of 'velodyne' in it at time 1", said)
 
     def test_what_else_it_writes(self):
         report, trajectory = self.path('report.json'), self.path('trajectory.txt')
