@@ -29,11 +29,8 @@ Values valuesOf(const std::string& yaml, const std::string& file) {
 
 std::shared_ptr<const MapperConfig> configOf(const Values& values, const std::string& file) {
   auto config = std::make_shared<MapperConfig>();
-  Values known;
-  for (const Parameter& parameter : mapperParameters()) {
-    const auto found = values.find(parameter.name);
-    if (found != values.end()) known.insert(*found);
-  }
+  Values known = values;
+  for (const char* const of_classes : {kAirborne, kDigest}) known.erase(of_classes);
   try {
     setParameters(*config, known);
     checkParameters(*config);

@@ -333,7 +333,9 @@ TEST_F(StoredJournal, KeepsJumps) {
 TEST_F(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
   std::mt19937 random(38);
   for (const auto& [settings, words] : std::vector<std::pair<std::string, std::string>>{
-           {"a_setting_of_the_future: 1\nresolution: -1\n", "resolution is"},
+           {"a_setting_of_the_future: 1\n", "a_setting_of_the_future"},
+           {"rules: {hit_outweighs: 20}\n", "rules/hit_outweighs is no longer one"},
+           {"resolution: -1\n", "resolution is"},
            {"resolution: 0.5\n", "resolution is 0.5, and that of the map 0.3"},
            {"free_space: {mode: lines}\n", "did you mean 'line'?"},
            {"[", "a key must be plain text"}}) {
