@@ -10,6 +10,7 @@
 
 #include "bki_mapping/store/map_file.h"
 #include "store/drives.h"
+#include "store/journal_merge.h"
 #include "store/summand.h"
 
 namespace bki_mapping {
@@ -297,6 +298,29 @@ TileLists listTiles(const std::vector<Group>& groups, const std::optional<TileCo
   return lists;
 }
 
+/// The files whose journals may have scans of the chosen groups.
+std::vector<JournalSource> journalSources(const Files& files, const std::vector<Group>& groups,
+                                          const MergeOptions& options) {
+  std::vector<JournalSource> sources;
+  for (const auto& file : files) {
+    JournalSource source{&file->file, {}, ""};
+    for (const Group& group : groups) {
+      for (const Summand& summand : group) {
+        if (summand.isOf(*file)) source.drives.insert(summand.drives().begin(), summand.drives().end());
+      }
+    }
+    if (!file->transform.identity()) {
+      source.obstacle = "it is moved by --transform";
+    } else if (options.keep_drives) {
+      source.obstacle = "--keep-drives stores drives separately";
+    } else if (options.columns) {
+      source.obstacle = "--tiles leaves out some of their evidence";
+    }
+    sources.push_back(std::move(source));
+  }
+  return sources;
+}
+
 }  // namespace
 
 MergeReport mergeMaps(const MergeOptions& options) {
@@ -359,6 +383,7 @@ MergeReport mergeMaps(const MergeOptions& options) {
     report.blocks += sum.size();
     if (options.progress) options.progress(++done, lists.all.size());
   }
+  report.without_journal = mergeJournals(journalSources(files, groups, options), output.content());
   output.commit();
   return report;
 }

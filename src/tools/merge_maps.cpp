@@ -114,22 +114,8 @@ MergeOptions mergeOptions(const po::variables_map& given) {
   return options;
 }
 
-/// What to say of maps with a journal, which the merged map does not have: its drives may be turned, left out
-/// or in several of the maps. "": none has one.
-std::string journalWarning(const std::vector<MergeInput>& inputs) {
-  for (const MergeInput& input : inputs) {
-    MapFile file(input.path, MapFile::Access::kRead);
-    if (!file.hasJournal() || file.scans().empty()) continue;
-    return input.path +
-           " has scans in its journal, which the merged map does not have; correct their poses before you "
-           "merge";
-  }
-  return "";
-}
-
 int mergeFiles(const po::variables_map& given) {
   MergeOptions options = mergeOptions(given);
-  const std::string journal_warning = journalWarning(options.inputs);
   const tools::Interruption interruption;
   options.progress = [&](std::size_t done, std::size_t all) {
     tools::showProgress(done, all, "tiles");
@@ -139,7 +125,7 @@ int mergeFiles(const po::variables_map& given) {
                          options.output + " is as it was");
   };
   const MergeReport report = mergeMaps(options);
-  tools::warn(journal_warning);
+  for (const std::string& sentence : report.without_journal) tools::warn(sentence);
   for (const std::string& path : report.resampled) {
     std::cerr << "warning: " << path
               << " is not turned by a multiple of 90 degrees and moved by whole voxels; each voxel takes the "

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <random>
 
+#include "bki_mapping/store/map_merge.h"
 #include "bki_mapping/store/mapper_file.h"
 #include "journal/file_correction.h"
 #include "journal/random_motion.h"
@@ -348,6 +350,122 @@ TEST_F(StoredJournal, SettingsThatCannotBeUsedAreNamed) {
     EXPECT_EQ(refusal.rfind("the settings in the journal of " + path_, 0), 0u) << refusal;
     EXPECT_NE(refusal.find(words), std::string::npos) << refusal;
   }
+}
+
+/// The poses of a drive's scans.
+std::vector<Eigen::Isometry3d> posesOf(const Drives& drives, const std::string& drive) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Drives::Entry& entry : drives.entries_) {
+    if (entry.drive == drive) poses.push_back(entry.pose);
+  }
+  return poses;
+}
+
+/// What a map holds but its looks.
+std::map<GridIndex, std::vector<EvidenceUnits>> evidenceOf(const SemanticMap& map) {
+  std::map<GridIndex, std::vector<EvidenceUnits>> planes;
+  for (const auto& [index, block] : map.entries()) {
+    planes[index].assign(block->plane(0), block->plane(0) + block->classes().size() * kBlockVoxels);
+  }
+  return planes;
+}
+
+/// Merges two maps, whatever their order, and corrects drives of the result.
+void correctMerged(const std::vector<Eigen::AlignedBox3d>& boxes, std::mt19937& random) {
+  const TemporaryFolder folder;
+  const std::string left = folder / "left.bkm", right = folder / "right.bkm", merged = folder / "merged.bkm",
+                    expected = folder / "expected.bkm";
+  Drives two = twoDrives(true, random, boxes), third({manySettings(true)[2], manySettings(true)[0]});
+  for (int n = 0; n < 5; ++n) third.add("third", n % 2, random);
+  two.save(left);
+  third.save(right);
+  const auto merge = [&](const std::string& output, bool reverse = false) {
+    MergeOptions options;
+    options.inputs = {{left, std::nullopt}, {right, MapPlacement()}};
+    if (reverse) std::swap(options.inputs[0], options.inputs[1]);
+    options.output = output;
+    EXPECT_EQ(mergeMaps(options).without_journal, std::vector<std::string>());
+  };
+  const auto rowsOf = [](const std::string& path) {
+    MapFile file(path, MapFile::Access::kRead);
+    std::vector<std::string> rows = file.settings();
+    for (const ScanRecord& scan : file.scans()) {
+      rows.push_back(scan.drive + " " + std::to_string(scan.number) + " " + std::to_string(scan.stamp) + " " +
+                     std::to_string(scan.settings) + " " + std::to_string(scan.cleared) +
+                     file.scanContent(scan.number));
+    }
+    return rows;
+  };
+  merge(merged);
+  merge(expected, true);
+  EXPECT_EQ(rowsOf(merged).size(), 3u + 16u + 5u);
+  EXPECT_TRUE(rowsOf(merged) == rowsOf(expected)) << "whatever the order";
+  for (const std::string drive : {"third", "first", "second"}) {
+    Drives& of_drive = drive == "third" ? third : two;
+    moveSome(of_drive, drive, random);
+    two.save(left);
+    third.save(right);
+    merge(expected);
+    MapFile file(merged, MapFile::Access::kUpdate);
+    FileCorrection correction(file, 0.0);
+    correction.move(drive, posesOf(of_drive, drive));
+    EXPECT_GT(correction.moved(), 1u);
+    MapFile::Change change = file.change();
+    correction.write(change, drive, false);
+    change.commit();
+    MapFile wanted(expected, MapFile::Access::kRead);
+    const SemanticMap found = readMap(file).map, map = readMap(wanted).map;
+    ASSERT_TRUE(evidenceOf(found) == evidenceOf(map)) << drive;
+    if (!boxes.empty()) continue;  // intervals of looks may differ (map_corrector.h)
+    EXPECT_TRUE(reference::contentOf(found) == reference::contentOf(map)) << drive;
+  }
+}
+
+TEST_F(StoredJournal, ADriveIsCorrectedInAMergedMapAsBefore) {
+  std::mt19937 random(39);
+  correctMerged({}, random);
+  correctMerged({{Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1.5, 1, 1)}}, random);
+}
+
+TEST_F(StoredJournal, WhatAMergedMapCannotHaveIsSaid) {
+  const std::string left = folder_ / "left.bkm", right = folder_ / "right.bkm",
+                    merged = folder_ / "merged.bkm";
+  std::mt19937 random(40);
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1.5, 1, 1));
+  twoDrives(true, random, {box}).save(left);
+  Drives third(manySettings(true));
+  for (int n = 0; n < 5; ++n) third.add("third", 0, random);
+  third.save(right);
+  const auto merge = [&](const std::function<void(MergeOptions&)>& change) {
+    MergeOptions options;
+    options.inputs = {{left, std::nullopt}, {right, std::nullopt}};
+    options.output = merged;
+    change(options);
+    const std::vector<std::string> said = mergeMaps(options).without_journal;
+    return std::pair(said, MapFile(merged, MapFile::Access::kRead).scans().size());
+  };
+  const auto sentence = [](const std::string& path, const std::string& why) {
+    return path + " has scans in its journal, which the merged map does not have, because " + why +
+           "; correct their poses before you merge";
+  };
+  using Said = std::pair<std::vector<std::string>, std::size_t>;
+  EXPECT_EQ(merge([](MergeOptions& o) {
+              o.inputs[1].placement = MapPlacement{{0.3, 0.0, 0.0}, 0.0};
+            }),
+            Said({sentence(right, "it is moved by --transform")}, 16u));
+  EXPECT_EQ(merge([](MergeOptions& o) { o.without = {"third"}; }), Said({}, 16u));
+  for (const auto& [change, why] : std::vector<std::pair<std::function<void(MergeOptions&)>, std::string>>{
+           {[](MergeOptions& o) { o.keep_drives = true; }, "--keep-drives stores drives separately"},
+           {[](MergeOptions& o) {
+              o.columns = TileColumns{-1, -1, 0, 0};
+            },
+            "--tiles leaves out some of their evidence"}}) {
+    EXPECT_EQ(merge(change), Said({sentence(left, why), sentence(right, why)}, 0u));
+  }
+  third.clear(box);
+  third.save(right);
+  const std::string why = "boxes were cleared in several maps";
+  EXPECT_EQ(merge([](MergeOptions&) {}), Said({sentence(left, why), sentence(right, why)}, 0u));
 }
 
 /// The class table of the file, with a class changed.

@@ -977,9 +977,11 @@ class Tools(ProgramTest):
         self.assertRegex(lines[0], rf'4 scans of 1 drive that can be moved, [\d.]+ MB, {size // 4} bytes a scan')
         self.assertEqual(self.journal_of(plain), ({'scans': 0, 'bytes': 0, 'drives': 0}, []))
         tiles = tiles_of(big)
-        merged = self.succeeds('merge_maps', big, '--output', small)
+        merged = self.succeeds('merge_maps', big, '--keep-drives', '--output', small)
         self.assertRegex(merged.stderr, r'^warning: \S*big.bkm has scans in its journal, which the merged map does not have')
         self.assertEqual(self.journal_of(small)[0]['scans'], 0)
+        self.assertEqual(self.succeeds('merge_maps', big, '--output', small).stderr, '')
+        self.assertEqual(self.journal_of(small)[0]['scans'], 4)
         said = f'4 scans of the journal forgotten, {size} bytes\n'
         self.assertEqual(self.succeeds('forget_journal', big, '--output', small).stdout, f'{small}: {said}')
         self.assertEqual(len(self.rows_of_journal(big)), 4)

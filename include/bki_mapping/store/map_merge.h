@@ -48,9 +48,11 @@ struct MergeOptions {
 };
 
 struct MergeReport {
-  std::vector<DriveRecord> drives;      ///< of the result, sorted by id
-  std::vector<std::string> repeated;    ///< ids of the drives that more than one input contains, sorted
-  std::vector<std::string> resampled;   ///< paths of the inputs whose placement is not exact
+  std::vector<DriveRecord> drives;     ///< of the result, sorted by id
+  std::vector<std::string> repeated;   ///< ids of the drives that more than one input contains, sorted
+  std::vector<std::string> resampled;  ///< paths of the inputs whose placement is not exact
+  /// A sentence for each input with scans in its journal that the result does not have.
+  std::vector<std::string> without_journal;
   std::uint64_t tiles = 0, blocks = 0;  ///< in part 0 of the result
   /// Number of sums of a voxel and class that were cut at the greatest evidence (kMostUnits).
   std::uint64_t saturated = 0;
@@ -59,6 +61,10 @@ struct MergeReport {
 /// Merges maps: the result is the sum of all drives in the inputs, each counted once. It does not depend on
 /// the order of the inputs. It is written as NewMapFile does. The memory needed is that of the lists of tiles
 /// and of one tile for each file (where a map is resampled, of the tiles that one tile is made from).
+///
+/// The journal of the result has the scans of its drives, where inputs have them, with two exceptions: if
+/// drives are kept apart, inputs are moved or only some tiles are written, and if boxes were cleared in
+/// several inputs.
 ///
 /// Placements by whole voxels and multiples of 90 degrees are exact. With others, each voxel takes the
 /// evidence of the voxel that contains its centre, so that some evidence is doubled or lost.
