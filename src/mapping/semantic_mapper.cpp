@@ -120,7 +120,7 @@ struct SemanticMapper::Pipeline {
       : config(applied(asked)),
         rules(config.scan_limit, classes),
         preprocessor(config),
-        hits(geometry, config.kernel, config.scan_limit.hits_before_misses,
+        hits(geometry, config.kernel, config.scan_limit.asksForHits(),
              config.scan_limit.static_spread ? ClassSet() : rules.fixed),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(

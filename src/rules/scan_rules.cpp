@@ -130,12 +130,12 @@ void noteHits(const ScanRules& rules, const LimitKernels& kernels, const BlockSu
               VoxelMask& hit) {
   VoxelMask may_move;
   for (const BlockSums::Plane& plane : hits) {
-    (rules.fixed[plane.label] ? seen.fixed : may_move) |=
+    (rules.fixed[plane.label] ? seen.bounds : may_move) |=
         atLeast(std::numeric_limits<float>::min(), plane, kernels);
   }
-  hit = seen.fixed | may_move;
-  seen.fixed &= ~may_move;
-  seen.moving = may_move;
+  hit = seen.bounds | may_move;
+  seen.moving = may_move & hits.occupied;
+  seen.bounds = hit & ~seen.moving;
 }
 
 }  // namespace bki_mapping

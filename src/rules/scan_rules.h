@@ -65,7 +65,8 @@ EvidenceUnits roundedUnits(float sum);
 /// The units that the threshold has taken from a sum >= 0 of a voxel, but would not above a crossed one.
 EvidenceUnits heldBack(const ScanRules& rules, float sum);
 
-/// Notes what the hits of one block say of its voxels. @param[out] hit voxels to which hits add evidence.
+/// Notes what the hits of one block say of its voxels. @param hits with those that contain a hit.
+/// @param[out] hit voxels to which hits add evidence.
 void noteHits(const ScanRules& rules, const LimitKernels& kernels, const BlockSums& hits, SeenVoxels& seen,
               VoxelMask& hit);
 

@@ -80,9 +80,9 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
     empty_[b] = seen.crossed;
     if (seen.crossed.none() || seen.crossed.all()) return;
     empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
-                 ~(seen.fixed | seen.moving);
+                 ~(seen.bounds | seen.moving);
   });
-  const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].fixed; };
+  const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].bounds; };
   forEachBlock([&](std::size_t b) {
     along_x_[b] = seen(b);
     if (along_x_[b].any()) along_x_[b] &= betweenIn(b, 0, seen);

@@ -15,14 +15,14 @@ namespace bki_mapping {
 /// What a scan says of the voxels of one block.
 struct SeenVoxels {
   VoxelMask crossed;  ///< evidence for `free` reaches its limit, and no hit adds evidence
-  VoxelMask fixed;    ///< hits add evidence, all of them of classes that cannot move
-  VoxelMask moving;   ///< other hits add evidence
-  VoxelMask hit;      ///< contain a hit, if the evidence reports them
+  VoxelMask bounds;   ///< hits add evidence, but those of what can move lie in other voxels
+  VoxelMask moving;   ///< other voxels to which hits add evidence
+  VoxelMask hit;      ///< contain a hit
   bool adds = false;  ///< the scan adds evidence to the block; noted if the rules keep looks
 };
 
 /// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
-/// bridged or fixed. A bridged voxel lies between two crossed ones, below and above it, and no hit adds
+/// bridged or a bound. A bridged voxel lies between two crossed ones, below and above it, and no hit adds
 /// evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:

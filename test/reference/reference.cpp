@@ -323,8 +323,8 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
       for (const SemanticClass& c : classes_) {
         if (point.shareOf(c.id) != 0.0) hit |= spreads(c) ? near : inside;
       }
-      // With hits_before_misses a block holds a hit even if the hit's kernel reaches no voxel centre.
-      hit |= config_.scan_limit.hits_before_misses && inside;
+      // Rules that ask for hits count a block that holds one even if its kernel reaches no voxel centre.
+      hit |= config_.scan_limit.asksForHits() && inside;
       if (hit) break;
     }
   }
@@ -391,6 +391,11 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
     close |= hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * scale);
     (c.dynamic || c.unlabelled ? may_move : fixed) |= hits.sum > 0.0;
   }
+  Answer holds = Answer::kNo;
+  for (const Point& hit : hits_) {
+    const double outside = ((hit.p - relativeCentre(voxel)) / config_.resolution).cwiseAbs().maxCoeff() - 0.5;
+    if (outside <= kClose) holds = std::max(holds, outside < -kClose ? Answer::kYes : Answer::kUndecided);
+  }
   const Value free = unlimited(voxel, kFreeClass);
   const double above = free.sum - config_.scan_limit.free, tolerance = free.tolerance(scale);
   Seen result = {Answer::kNo, Answer::kNo, Answer::kNo};
@@ -401,7 +406,8 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
     if (is_free) result.crossed = Answer::kYes;
   } else {
     result.hit = Answer::kYes;
-    if (!may_move) result.fixed = Answer::kYes;
+    if (!may_move || holds == Answer::kNo) result.bounds = Answer::kYes;
+    if (may_move && holds == Answer::kUndecided) result.bounds = Answer::kUndecided;
   }
   return seen_[key] = result;
 }
@@ -430,7 +436,7 @@ ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
         if (std::abs(x) + std::abs(y) + std::abs(z) == 3) continue;  // across a corner
         const VoxelIndex neighbour{{voxel.x + x, voxel.y + y, voxel.z + z}};
         if (!isUpdated(neighbour)) return Answer::kNo;
-        answer = std::min(answer, std::max(isEmpty(neighbour), seen(neighbour).fixed));
+        answer = std::min(answer, std::max(isEmpty(neighbour), seen(neighbour).bounds));
       }
     }
   }

@@ -68,7 +68,9 @@ class ScanReference {
   Value unlimited(const VoxelIndex& voxel, ClassId label) const;
   enum class Answer { kNo, kUndecided, kYes };
   struct Seen {
-    Answer crossed, fixed, hit;
+    Answer crossed;
+    Answer bounds;  ///< hits add evidence, but those of classes that can move lie in other voxels
+    Answer hit;     ///< hits add evidence
   };
   /// What the scan says of one voxel, for isVoid.
   Seen seen(const VoxelIndex& voxel) const;

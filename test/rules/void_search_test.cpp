@@ -24,7 +24,7 @@ bool isEmpty(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex&
     return has(blocks, search, {{voxel.x, voxel.y, voxel.z + step}}, &SeenVoxels::crossed);
   };
   const bool hit =
-      has(blocks, search, voxel, &SeenVoxels::fixed) || has(blocks, search, voxel, &SeenVoxels::moving);
+      has(blocks, search, voxel, &SeenVoxels::bounds) || has(blocks, search, voxel, &SeenVoxels::moving);
   return crossed(0) || (!hit && crossed(-1) && crossed(1));
 }
 
@@ -50,7 +50,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
           if (random() % 1000 < unseen_of_thousand) continue;
           const auto kind = random() % 50;
-          (kind < 5 ? search.at(b).fixed : kind == 5 ? search.at(b).moving : search.at(b).crossed).set(v);
+          (kind < 5 ? search.at(b).bounds : kind == 5 ? search.at(b).moving : search.at(b).crossed).set(v);
         }
       }
       ThreadPool pool(static_cast<int>(threads));
@@ -65,7 +65,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
             const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
             if (std::abs(x) + std::abs(y) + std::abs(z) == 3) continue;  // across a corner
             const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
-            is_void = isEmpty(blocks, search, at) || has(blocks, search, at, &SeenVoxels::fixed);
+            is_void = isEmpty(blocks, search, at) || has(blocks, search, at, &SeenVoxels::bounds);
           }
           ASSERT_EQ(search.voidsOf(b)[static_cast<std::size_t>(v)], is_void) << b << ' ' << v;
           count += is_void;

@@ -23,11 +23,14 @@ struct ScanLimitConfig {
   /// does not apply where the evidence of the voxel below reaches `free`.
   double free_threshold = 0.0;
   /// Further evidence for `free` where a voxel and its 18 neighbours are all seen, and all empty but for
-  /// classes that cannot move; needs `free`. 0: none.
+  /// classes that cannot move, and for voxels that hits of the others only reach; needs `free`. 0: none.
   double void_space = 0.0;
   /// Largest number of blocks that the hits of a scan, or its free space, may touch; 0: the number within the
   /// sensor's reach, at most kMostBlocks. A larger scan is refused.
   std::int64_t blocks = 0;
+
+  /// Whether it matters which voxels contain hits.
+  bool asksForHits() const { return hits_before_misses || void_space > 0.0; }
 
   static constexpr std::int64_t kMostBlocks = 1 << 18;  ///< 0.5 GB for each class that they all hold
 };
