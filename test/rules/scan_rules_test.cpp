@@ -1,8 +1,9 @@
 // What the threshold takes from the bottom layer of a block and what is given back there later make, to the
-// bit, what a block gets at once that knows the voxels below it. And blocks come in the order that this
-// needs.
+// bit, what a block gets at once that knows the voxels below it. Blocks come in the order that this needs.
+// And what hits say of voids beside them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "kernel/sparse_kernel.h"
@@ -78,6 +79,28 @@ TEST(ScanRules, GiveBackWhatTheThresholdHasTakenAboveCrossedVoxels) {
   }
   EXPECT_GT(given_back, 1000u);
   EXPECT_GT(held_back, given_back);
+}
+
+TEST(ScanRules, OfWhatCanMoveOnlyTheVoxelsThatContainAHitKeepVoidsAway) {
+  constexpr ClassId kRoad = 1, kCar = 2;
+  ScanRules rules;
+  rules.fixed.set(kRoad);
+  BlockSums hits;
+  hits.reserve(2);
+  enum { kOfRoad, kOfCar, kOfBoth, kEnd };  // by voxel: whose hits add evidence, without and with a hit in it
+  for (const ClassId label : {kRoad, kCar}) {
+    float* const sums = hits.open(label).values;
+    std::fill_n(sums, kBlockVoxels, 0.0f);
+    for (const int v : {int{label == kRoad ? kOfRoad : kOfCar}, int{kOfBoth}})
+      sums[v] = sums[kEnd + v] = 0.1f;
+  }
+  for (int v = kEnd; v < 2 * kEnd + 1; ++v) hits.occupied.set(static_cast<std::size_t>(v));
+  SeenVoxels seen;
+  VoxelMask hit;
+  noteHits(rules, limitKernelsFor(""), hits, seen, hit);
+  EXPECT_EQ(hit.to_ullong(), 0b111111u) << "not where a hit adds no evidence";
+  EXPECT_EQ(seen.bounds.to_ullong(), 0b001111u);
+  EXPECT_EQ(seen.moving.to_ullong(), 0b110000u);
 }
 
 TEST(BlocksByGroup, ComesToEachBlockAfterTheOneBelow) {
