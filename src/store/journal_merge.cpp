@@ -18,7 +18,7 @@ struct DriveScans {
 };
 using ScansByDrive = std::map<std::string, DriveScans>;
 
-ScansByDrive scansOf(const JournalSource& source) {
+ScansByDrive journalScansOf(const JournalSource& source) {
   ScansByDrive drives;
   if (!source.file->hasJournal()) return drives;
   for (ScanRecord& scan : source.file->scans()) {
@@ -31,7 +31,7 @@ ScansByDrive scansOf(const JournalSource& source) {
 }
 
 /// Writes the scans, numbered anew.
-void write(const ScansByDrive& drives, MapFile::Change& merged) {
+void writeScans(const ScansByDrive& drives, MapFile::Change& merged) {
   std::map<const MapFile*, std::vector<std::string>> settings;
   std::map<std::string, int> numbers;  // of the settings in the result
   const MapFile* with_boxes = nullptr;
@@ -68,7 +68,7 @@ std::vector<std::string> mergeJournals(const std::vector<JournalSource>& sources
   ScansByDrive chosen;
   std::map<std::string, std::string> sentences;  // by path
   for (const JournalSource& source : sources) {
-    ScansByDrive drives = scansOf(source);
+    ScansByDrive drives = journalScansOf(source);
     if (drives.empty()) continue;
     const std::string obstacle =
         many_are_cleared && isCleared(source) ? "boxes were cleared in several maps" : source.obstacle;
@@ -83,7 +83,7 @@ std::vector<std::string> mergeJournals(const std::vector<JournalSource>& sources
       if (!is_new && drive.isBefore(known->second)) known->second = std::move(drive);
     }
   }
-  write(chosen, merged);
+  writeScans(chosen, merged);
   std::vector<std::string> list;
   for (const auto& [path, sentence] : sentences) list.push_back(sentence);
   return list;
