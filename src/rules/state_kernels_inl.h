@@ -283,7 +283,7 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
   static_assert(kLayer % kLanes == 0, "vectors end with a layer");
   IntVec any = {};
   for (int v = kLayer * layers.begin; v < kLayer * layers.end; v += kLanes) {
-    const IntVec free = Min(Max(LoadU(planes.free + v), IntVec{}), Set(planes.most_free));
+    const IntVec free = Max(LoadU(planes.free + v), IntVec{});
     Likeliest found = findLikeliest<true>(planes, v);
     IntVec asks = {};
     for (std::size_t p = 0; p < planes.count; ++p) {
@@ -292,7 +292,7 @@ inline bool readVotes(const BlockPlanes& planes, Block::Layers layers, BlockVote
     const IntVec vote = Min(found.best, Set(planes.most_vote)) & asks;
     any |= vote;
     findGains(planes, found);
-    const Mask is_kept = occupied(found, free);
+    const Mask is_kept = occupied(found, Min(free, Set(planes.most_free)));
     StoreU(vote & is_kept, votes.kept.data() + v);
     constexpr EvidenceUnits kMostHits = kMostUnits / kFreeOfOneHit;  // more outweigh all
     const Mask outweighs =

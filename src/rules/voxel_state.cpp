@@ -180,7 +180,7 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
   bool holds = own.holds, restored = false, has_left = false;
   if (rules.neighbourhoodRatio() > 0.0f && own.best > 0 && rules.asksNeighbourhood(own.label)) {
     const VoteSums sums = votesAround(map, rules, GridGeometry::voxelOf(index, offset));
-    const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.counted;
+    const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
     holds = own.holds ? areKept(rules, sums)
                       : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
     restored = holds && !own.holds;
