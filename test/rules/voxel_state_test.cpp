@@ -360,6 +360,27 @@ TEST(VoxelState, WhereLooksDecideSpaceThatWasLongFreeCountsForSoMuch) {
       << "no scan's evidence is known";
 }
 
+TEST(VoxelState, NeighboursKeepWhatIsInDoubtByAllTheEvidenceForFree) {
+  const StateRules rules =
+      StateRules().withHitOfScan(0.01).withLatest(true).withNeighbourhood(1.0, ClassSet().set(1));
+  const auto stateOf = [&](float free) {
+    SemanticMap map = mapWith({{1, 0.2f}, {kFreeClass, free}}, 77);
+    Block& block = map.getOrAllocate({{0, 0, 0}});
+    EvidenceUnits kept[kBlockVoxels] = {};
+    kept[78] = unitsOf(5.0);
+    block.add(1, kept);
+    Look::Voxels elsewhere;
+    elsewhere.set(400);
+    block.looks().add(Look(100, elsewhere, {}, {}));
+    BlockView whole;
+    readBlock(map, rules, {{0, 0, 0}}, block, BlockFields::kStates, whole);
+    EXPECT_EQ(whole.state[77], viewVoxel(map, rules, {{0, 0, 0}}, block, 77).state);
+    return whole.state[77];
+  };
+  EXPECT_EQ(stateOf(3.9f), VoxelState::kOccupied) << "a hit outweighs a twentieth of it";
+  EXPECT_EQ(stateOf(3000.0f), VoxelState::kFree) << "also beyond that of 300 scans with hits";
+}
+
 TEST(VoxelState, WhatRemainsIsAskedOfAllTheEvidenceForFree) {
   // A truck of which some scans said building has left.
   SemanticMap map = mapWith({{1, 1.2f}, {2, 0.4f}, {kFreeClass, 300.0f}}, 77);
