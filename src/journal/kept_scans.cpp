@@ -23,10 +23,9 @@ ScanStats KeptScans::integrate(const ScanView& scan, const Eigen::Isometry3d& T_
 }
 
 ScanStats KeptScans::integrateRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
-                                       const std::string& sensor) {
-  RoundedScan rounded = corrector_.round(scan, Eigen::Isometry3d::Identity());
-  rounded.T_map_sensor = roundedPose(T_map_sensor);
-  return add(std::move(rounded), sensor, std::nullopt);
+                                       const std::string& sensor,
+                                       const std::optional<Eigen::Isometry3d>& T_odometry_sensor) {
+  return add(corrector_.roundRecorded(scan, T_map_sensor), sensor, T_odometry_sensor);
 }
 
 ScanStats KeptScans::add(RoundedScan rounded, const std::string& sensor,

@@ -24,10 +24,11 @@ class KeptScans {
   ScanStats integrate(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
                       const std::string& sensor = "",
                       const std::optional<Eigen::Isometry3d>& T_odometry_sensor = std::nullopt);
-  /// The same of a scan in the axes of the sensor, as it was recorded: to the axes of the map and back, some
-  /// points would be rounded to others. @param scan its origin does not count.
+  /// The same of a scan in the axes of the sensor (MapCorrector::roundRecorded). @param scan its origin does
+  /// not count.
   ScanStats integrateRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor,
-                              const std::string& sensor = "");
+                              const std::string& sensor = "",
+                              const std::optional<Eigen::Isometry3d>& T_odometry_sensor = std::nullopt);
   /// Does what is due between scans, with some milliseconds of this thread.
   void update() { corrector_.update(robot_); }
   /// Moves what is still to be moved, and packs all scans.

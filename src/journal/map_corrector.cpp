@@ -79,6 +79,12 @@ RoundedScan MapCorrector::round(const ScanView& scan, const Eigen::Isometry3d& T
   return toSensorScan(scan, T_map_sensor, settings_.quantum, config_->sensor_model);
 }
 
+RoundedScan MapCorrector::roundRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor) const {
+  RoundedScan rounded = round(scan, Eigen::Isometry3d::Identity());
+  rounded.T_map_sensor = roundedPose(T_map_sensor);
+  return rounded;
+}
+
 void MapCorrector::addScan(SensorScan scan, std::size_t sensor, const Eigen::Isometry3d& T_map_sensor,
                            const Eigen::Isometry3d& T_odometry_sensor,
                            const std::vector<GridIndex>& touched) {

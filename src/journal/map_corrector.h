@@ -60,6 +60,9 @@ class MapCorrector {
   /// Rounds a scan; the result is what must be integrated, and then given to addScan().
   /// @param T_map_sensor pose at which it is integrated.
   RoundedScan round(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor) const;
+  /// The same of a scan in the axes of the sensor, as it was recorded: turned to the axes of the map and
+  /// back, some points would be rounded to others.
+  RoundedScan roundRecorded(const ScanView& scan, const Eigen::Isometry3d& T_map_sensor) const;
   /// Notes a scan that has been integrated. @param touched blocks (SemanticMapper::touchedBlocks).
   /// @param T_odometry_sensor its recorded pose in a frame that does not jump.
   void addScan(SensorScan scan, std::size_t sensor, const Eigen::Isometry3d& T_map_sensor,

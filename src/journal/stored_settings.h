@@ -15,8 +15,8 @@ namespace bki_mapping {
 /// `class_table/...`, what a map file does not say of the class table.
 std::string settingsText(const MapperConfig& config, const ClassTable& classes);
 
-/// The settings of a file's journal, by their numbers. Parameters that this version does not know are
-/// ignored. @throws MapFileError if they are not YAML, or not allowed.
+/// The settings of a file's journal, by their numbers. @throws MapFileError if they are not YAML, not
+/// allowed, or not known to this version.
 std::vector<std::shared_ptr<const MapperConfig>> journalSettings(MapFile& file);
 
 /// The class table with which the scans of a file's journal were integrated: that of the file with the flags

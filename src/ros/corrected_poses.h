@@ -28,9 +28,9 @@ class CorrectedPoses {
   CorrectedPoses(ros::NodeHandle& node, const ServerConfig& config, const PoseSource& poses,
                  MapCorrector& corrector, std::function<void()> on_path);
 
-  /// The scan as it is to be mapped, rounded for the journal.
+  /// The scan as it is to be mapped, rounded for the journal. @param placed in the axes of the sensor.
   RoundedScan round(const PlacedScan& placed) const {
-    return corrector_.round(placed.scan, placed.T_map_sensor);
+    return corrector_.roundRecorded(placed.scan, placed.T_map_sensor);
   }
   /// Notes a rounded scan that has been integrated. @param touched blocks.
   void add(SensorScan scan, const Eigen::Isometry3d& T_map_sensor, const std::string& sensor_frame,

@@ -93,10 +93,15 @@ MappingServer::~MappingServer() {
   say(lost.empty() ? "The map is saved in " + kept_->filePath() : lost);
 }
 
+ScanReader MappingServer::readerOf(const InputConfig& input) const {
+  return {input, config_.frame_id, mapper_->classes(), mapper_->config().label_values,
+          corrected_ ? ScanAxes::kSensor : ScanAxes::kMap};
+}
+
 void MappingServer::subscribe() {
   for (const InputConfig& input : allInputs(config_, mapper_->config())) {
     const std::size_t number = readers_.size();
-    readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
+    readers_.push_back(readerOf(input));
     // Queue size 0: no limit. waiting_ is the queue that drops clouds, because it counts them.
     const boost::function<void(const CloudEvent&)> call = [this, number](const CloudEvent& event) {
       onCloud(number, event);
@@ -121,7 +126,7 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
   const std::vector<InputConfig> inputs = allInputs(config_, mapper_->config());
   readers_.clear();
   for (const InputConfig& input : inputs) {
-    readers_.emplace_back(input, config_.frame_id, mapper_->classes(), mapper_->config().label_values);
+    readers_.push_back(readerOf(input));
   }
   for (InputNotes& notes : notes_) notes.restart();
   wholeMapChanged();

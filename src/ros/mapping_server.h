@@ -54,6 +54,7 @@ class MappingServer {
   void subscribe();
   void applySettings(const ServerConfig& server, const MapperConfig& mapper);
   void offerServices();
+  ScanReader readerOf(const InputConfig& input) const;
   void work();
 
   using CloudEvent = ros::MessageEvent<const sensor_msgs::PointCloud2>;

@@ -35,7 +35,8 @@ RecordingMapper::RecordingMapper(SemanticMapper& mapper, const ServerConfig& con
       points_(inputs.size()) {
   poses_.ignoreTimeout();
   for (const InputConfig& input : inputs) {
-    readers_.emplace_back(input, frame_, mapper_.classes(), mapper_.config().label_values);
+    readers_.emplace_back(input, frame_, mapper_.classes(), mapper_.config().label_values,
+                          kept_ ? ScanAxes::kSensor : ScanAxes::kMap);
     notes_.emplace_back(input.topic);
   }
 }
@@ -94,7 +95,7 @@ ScanStats RecordingMapper::addToMap(const PlacedScan& placed, const std::string&
   const OdometryPoses::Pose odometry = odometry_.of(sensor_frame, placed.scan.stamp, placed.T_map_sensor);
   if (odometry.is_first) kept_->noteJump(placed.scan.stamp);
   if (!odometry.warning.empty()) warnOnce(odometry.warning);
-  return kept_->integrate(placed.scan, placed.T_map_sensor, sensor_frame, odometry.T_odometry_sensor);
+  return kept_->integrateRecorded(placed.scan, placed.T_map_sensor, sensor_frame, odometry.T_odometry_sensor);
 }
 
 void RecordingMapper::integrate(const WaitingCloud& waiting, const PlacedScan& placed) {

@@ -23,12 +23,30 @@ ros::Time later(const ros::Time& stamp, double seconds) {
   return time > 0.0 && time < 4e9 ? stamp + ros::Duration(seconds) : stamp;
 }
 
-/// Transforms a point of the cloud to the scan: relative to its origin, in the axes of the map frame.
-/// @param point relative to `cloud_origin`, in the axes of the cloud's frame.
-void moveToScan(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& cloud_origin,
-                const Eigen::Vector3d& origin, Eigen::Vector3f& point) {
-  point = (T_map_cloud * (point.cast<double>() + cloud_origin) - origin).cast<float>();
-}
+/// Transforms points and directions of a cloud to those of a scan.
+class ScanFrame {
+ public:
+  ScanFrame(const Eigen::Isometry3d& T_map_sensor, ScanAxes axes)
+      : origin_(T_map_sensor.translation()),
+        turns_(axes == ScanAxes::kSensor),
+        R_sensor_map_(T_map_sensor.linear().transpose()) {}
+
+  /// @param point relative to `cloud_origin`, in the axes of the cloud's frame.
+  void take(const Eigen::Isometry3d& T_map_cloud, const Eigen::Vector3d& cloud_origin,
+            Eigen::Vector3f& point) const {
+    const Eigen::Vector3d in_map = T_map_cloud * (point.cast<double>() + cloud_origin) - origin_;
+    point = (turns_ ? R_sensor_map_ * in_map : in_map).cast<float>();
+  }
+  Eigen::Matrix3f rotation(const Eigen::Isometry3d& T_map_cloud) const {
+    if (!turns_) return T_map_cloud.linear().cast<float>();
+    return (R_sensor_map_ * T_map_cloud.linear()).cast<float>();
+  }
+
+ private:
+  Eigen::Vector3d origin_;
+  bool turns_;
+  Eigen::Matrix3d R_sensor_map_;
+};
 
 /// The time at which the pose of a slice is looked up: its middle.
 ros::Time timeOfSlice(const ros::Time& stamp, std::int64_t slice) {
@@ -84,17 +102,18 @@ class PosesOfScan {
 /// the cloud, so that those at the sensor stay there. A point whose time is not finite becomes NaN, so that
 /// it is counted among those. Directions at times without a pose take that of the cloud: drivers may write
 /// any time where nothing came back. @return the missing pose of a point, if there is one.
-std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& poses, Scan& scan) {
+std::optional<MissingPose> undistort(const CloudContent& content, const ScanFrame& frame, PosesOfScan& poses,
+                                     Scan& scan) {
   scan.points = content.points;
   const Eigen::Vector3f zero = (-content.origin).cast<float>();
   for (std::size_t i = 0; i < content.times.size(); ++i) {
     Eigen::Vector3f& point = scan.points[i];
     if (!needsTime(point, zero)) {
-      moveToScan(poses.ofCloud(), content.origin, scan.origin, point);
+      frame.take(poses.ofCloud(), content.origin, point);
     } else if (!std::isfinite(content.times[i])) {
       point.setConstant(std::numeric_limits<float>::quiet_NaN());
     } else if (const Eigen::Isometry3d* const pose = poses.at(content.times[i])) {
-      moveToScan(*pose, content.origin, scan.origin, point);
+      frame.take(*pose, content.origin, point);
     } else {
       return poses.missing;
     }
@@ -103,7 +122,7 @@ std::optional<MissingPose> undistort(const CloudContent& content, PosesOfScan& p
   for (std::size_t i = 0; i < content.no_return_times.size(); ++i) {
     if (scan.no_returns[i].isZero()) continue;
     const Eigen::Isometry3d* const pose = poses.at(content.no_return_times[i]);
-    scan.no_returns[i] = (pose ? *pose : poses.ofCloud()).linear().cast<float>() * scan.no_returns[i];
+    scan.no_returns[i] = frame.rotation(pose ? *pose : poses.ofCloud()) * scan.no_returns[i];
   }
   return std::nullopt;
 }
@@ -177,27 +196,29 @@ std::variant<PlacedScan, MissingPose> ScanReader::read(const sensor_msgs::PointC
   CloudContent content = readCloud(cloud, input_, classes_, label_values_, beams_start);
   PlacedScan placed;
   Scan& scan = placed.scan;
+  scan.origin = sensor->T_target_source.translation();
+  const ScanFrame scan_frame(sensor->T_target_source, axes_);
   if (!input_.time_field.empty()) {
-    scan.origin = sensor->T_target_source.translation();
     const TimeValues times = timeValues(cloud, input_.time_field);
     const TimeReading reading = readingOf(times, input_, sensor->stamp);
     PosesOfScan poses_of_scan(poses, map_frame_, cloud_frame, {frame->T_target_source, sensor->stamp},
                               reading, now);
-    if (const auto missing = undistort(content, poses_of_scan, scan)) return *missing;
+    if (const auto missing = undistort(content, scan_frame, poses_of_scan, scan)) return *missing;
     const bool automatic =
         input_.time_unit == TimeUnit::kAuto || input_.time_reference == TimeReference::kAuto;
     if (automatic && times.any) placed.times = reading.text();
   } else {
-    if (one_frame) {
+    if (one_frame && axes_ == ScanAxes::kSensor) {
+      scan.points = content.points;
+    } else if (one_frame) {
       scan = scanFromSensorFrame(sensor->T_target_source, content.points, {}, 0);
     } else {
-      scan.origin = sensor->T_target_source.translation();
       scan.points = content.points;
       for (Eigen::Vector3f& point : scan.points) {
-        moveToScan(frame->T_target_source, content.origin, scan.origin, point);
+        scan_frame.take(frame->T_target_source, content.origin, point);
       }
     }
-    const Eigen::Matrix3f rotation = frame->T_target_source.linear().cast<float>();
+    const Eigen::Matrix3f rotation = scan_frame.rotation(frame->T_target_source);
     for (const Eigen::Vector3f& way : content.no_returns) scan.no_returns.push_back(rotation * way);
   }
   checkMetres(scan, input_.sensor_model);

@@ -18,9 +18,13 @@
 
 namespace bki_mapping::ros_interface {
 
+/// The axes of a scan's points and directions. A journal rounds scans in those of the sensor, so that what it
+/// keeps does not depend on the pose.
+enum class ScanAxes { kMap, kSensor };
+
 /// A scan, and the pose of the sensor.
 struct PlacedScan {
-  Scan scan;
+  Scan scan;                       ///< in the axes that the reader was told
   Eigen::Isometry3d T_map_sensor;  ///< at the cloud's stamp
   std::string times;               ///< how the times of points were read by `auto` settings; "": not so
   UnlistedLabels unlisted_labels;
@@ -32,8 +36,12 @@ class ScanReader {
  public:
   /// @param classes must outlive the reader.
   ScanReader(const InputConfig& input, const std::string& map_frame, const ClassTable& classes,
-             LabelValues label_values)
-      : input_(input), map_frame_(frameName(map_frame)), classes_(classes), label_values_(label_values) {}
+             LabelValues label_values, ScanAxes axes = ScanAxes::kMap)
+      : input_(input),
+        map_frame_(frameName(map_frame)),
+        classes_(classes),
+        label_values_(label_values),
+        axes_(axes) {}
 
   /// The scan of a cloud, or why its pose is missing; the pose may become available later.
   /// @param now the time on this computer, for the explanation; 0: not known.
@@ -76,6 +84,7 @@ class ScanReader {
   std::string map_frame_;
   const ClassTable& classes_;
   LabelValues label_values_;
+  ScanAxes axes_;
 };
 
 }  // namespace bki_mapping::ros_interface

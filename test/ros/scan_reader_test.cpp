@@ -494,6 +494,47 @@ TEST_F(Reader, ACloudInMillimetresIsRefused) {
   EXPECT_NO_THROW(read(cloud({{655.35f, 0, 0}, {0, 655.35f, 0}, {0, 0, 655.35f}}).message())) << "no returns";
 }
 
+TEST_F(Reader, InTheAxesOfTheSensorAScanDoesNotDependOnThePose) {
+  const std::vector<Eigen::Vector3f> points = {{20.1f, 0.3f, -1.7f}, {-3.3f, 7.7f, 0.1f}, {0, 0, 0}};
+  const auto inSensor = [&](const sensor_msgs::PointCloud2& message) {
+    return std::get<PlacedScan>(ScanReader(input_, "map", *classes(), LabelValues::kRaw, ScanAxes::kSensor)
+                                    .read(message, poses_))
+        .scan;
+  };
+  for (const double yaw : {0.0, 2.0}) {
+    const std::string sensor = yaw == 0.0 ? "sensor" : "turned", other = sensor + "_base";
+    pose(other, 100.0, {0.5, -0.2, 1.0}, 0.7, sensor);
+    for (const double t : {99.0, 100.0, 101.0}) {
+      // Along its x axis at 10 m/s.
+      const double along = 10.0 * (t - 100.0);
+      pose(sensor, t, {1e4 + along * std::cos(yaw), -70.0 + along * std::sin(yaw), 3.0}, yaw);
+    }
+    input_ = {};
+    input_.clear_no_returns = true;
+    CloudMaker maker = cloud(points);
+    maker.frame = sensor;
+    const Scan scan = inSensor(maker.message());
+    EXPECT_EQ(scan.origin, Eigen::Vector3d(1e4, -70.0, 3.0));
+    ASSERT_EQ(scan.points.size(), 2u);
+    EXPECT_EQ(scan.points[0], points[0]) << "to the bit";
+    EXPECT_EQ(scan.points[1], points[1]);
+    EXPECT_EQ(scan.no_returns.size(), 1u);
+
+    input_.sensor_frame_id = other;
+    const Scan from_base = inSensor(maker.message());
+    EXPECT_LT((from_base.points[0] - Eigen::AngleAxisf(-0.7f, Eigen::Vector3f::UnitZ()) *
+                                         (points[0] - Eigen::Vector3f(0.5f, -0.2f, 1.0f)))
+                  .norm(),
+              1e-5f);
+
+    input_ = {};
+    input_.time_field = "t";
+    maker.add("t", PointField::FLOAT64, {0.0, 0.5, 0.0});
+    const Scan moved = inSensor(maker.message());
+    EXPECT_LT((moved.points[1] - points[1] - Eigen::Vector3f(5, 0, 0)).norm(), 0.011f);  // half a time slice
+  }
+}
+
 TEST_F(Reader, HolesTurnWithTheSensorLikeTheirFiring) {
   pose("sensor", 99.0, {0, 0, 0}, -1.0);  // turns at 1 rad/s: by eight beams in a scan
   pose("sensor", 101.0, {0, 0, 0}, 1.0);
