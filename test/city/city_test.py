@@ -75,6 +75,34 @@ class Made(MadeCity):
         self.finish(self.start(self.describe(names[:-1]), '--workers', '2', '--resume', '--add', str(self.folder / 'd6')))
         self.assertEqual({region['file'] for region in self.expect_equal(names)['regions']}, before)
 
+    def test_corrected_poses_change_what_they_touch(self):
+        """Only the pieces whose poses are new are mapped again; the city is then that of a first run with these poses."""
+        corrected = self.folder / 'corrected.txt'
+        rows = (self.folder / 'd1/poses.txt').read_text().splitlines()
+        last = [float(word) for word in rows[-1].split()]
+        corrected.write_text('\n'.join([*rows[:-1], ' '.join(map(str, [*last[:3], last[3] + 1.0, *last[4:]]))]) + '\n')
+        drives = [{'sequence': 'd1', 'poses': 'corrected.txt'}, {'sequence': 'd2'}, {'sequence': 'd3'}]
+
+        def pieces():
+            return {str(path.relative_to(self.output)) for path in self.output.glob('pieces/*/*.bkm')}
+
+        self.finish(self.start(self.describe(['d1', 'd2', 'd3']), '--workers', '2', '--no-picture'))
+        before = pieces()
+        index = self.expect_equal(['d1', 'd2', 'd3'])
+        self.finish(self.start(self.describe([], drives=drives), '--workers', '2', '--no-picture', '--resume'))
+        new = pieces() - before
+        self.assertEqual([path.split('/')[1] for path in new], ['d1'])
+        changed = json.loads((self.output / 'index.json').read_text())
+        self.assertTrue({region['file'] for region in index['regions']} & {region['file'] for region in changed['regions']})
+        shutil.rmtree(self.output)
+        self.finish(self.start(self.describe([], drives=drives), '--workers', '2', '--no-picture'))
+        self.assertEqual(json.loads((self.output / 'index.json').read_text())['regions'], changed['regions'])
+        # Stamped poses belong to scans by their times: nothing is known of single pieces.
+        drive = Drive('d1', self.folder / 'd1', 'labels', corrected)
+        whole = [piece.file for piece in pieces_of(read_city(self.describe(['d1'])), drive)]
+        corrected.write_text('0 0 0 0 0 0 0 1\n')
+        self.assertFalse({*whole} & {piece.file for piece in pieces_of(read_city(self.describe(['d1'])), drive)})
+
     def test_a_broken_drive_is_named_and_left_out(self):
         broken = self.folder / 'broken'
         shutil.copytree(self.folder / 'd2', broken)

@@ -7,7 +7,7 @@ import json
 import os
 import pathlib
 import sqlite3
-from typing import Dict, Iterable, List, NamedTuple, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Tuple
 
 from bki_mapping.city.description import City, Drive, scans_of
 
@@ -50,6 +50,15 @@ def stamps_of(paths: Iterable[pathlib.Path]) -> List:
     return stamps
 
 
+def matrices_in(path: pathlib.Path) -> Optional[List[str]]:
+    """The lines of a file of poses, of which each belongs to one scan; None if it has stamps, or cannot be read."""
+    try:
+        lines = [line for line in path.read_text().splitlines() if not line.startswith('#')]
+    except (OSError, UnicodeDecodeError):
+        return None
+    return lines if all(len(line.split()) in (0, 12, 16) for line in lines) else None
+
+
 def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     """identity: what the programs say of themselves, because other versions may make other pieces. Raises CityError if the
     drive has no scans."""
@@ -61,13 +70,15 @@ def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
         return [piece_of(drive, first, count, source, settings, count) for first, count in counts.items()]
     files = scans_of(drive)
     numbers = list(files)
-    shared = [str(drive.poses), *filter(None, [drive.poses_in]), stamps_of([drive.poses, drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
+    shared = [*filter(None, [drive.poses_in]), stamps_of([drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
+    rows = matrices_in(drive.poses)
     pieces = []
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
         scans = stamps_of(files[number] for number in some)
+        poses = [str(drive.poses), stamps_of([drive.poses])] if rows is None else [rows[n] if n < len(rows) else '' for n in some]
         labels = stamps_of(drive.folder / drive.labels / f'{files[number].stem}.label' for number in some)
-        pieces.append(piece_of(drive, some[0], len(some), str(drive.folder), drive.labels, shared, settings, scans, labels))
+        pieces.append(piece_of(drive, some[0], len(some), str(drive.folder), drive.labels, shared, settings, scans, labels, poses))
     return pieces
 
 
