@@ -340,7 +340,7 @@ if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   catkin_install_python(PROGRAMS
     test/ros/body_box_rostest.py test/ros/city_rostest.py test/ros/corrections_rostest.py test/ros/filters_rostest.py test/ros/follower_rostest.py test/ros/killed_rostest.py
-    test/ros/large_coordinates_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
+    test/ros/large_coordinates_rostest.py test/ros/launch_rostest.py test/ros/lifecycle_rostest.py test/ros/live_corrections_rostest.py test/ros/live_rostest.py test/ros/map_file_rostest.py
     test/ros/bumper_rostest.py test/ros/mapping_rostest.py test/ros/navigation_rostest.py test/ros/publishing_rostest.py test/ros/queries_rostest.py
     test/ros/query_latency_rostest.py test/ros/rates_rostest.py test/ros/real_bag_rostest.py test/ros/replay_rostest.py
     test/ros/two_mappers_rostest.py
@@ -392,11 +392,19 @@ if(CATKIN_ENABLE_TESTING)
   add_rostest(test/ros/rates.test)
   add_rostest(test/ros/replay.test)
   # rostest does not report skipped tests, so a wrapper tells ctest beforehand.
-  add_test(NAME real_bag_rostest
-    COMMAND ${PROJECT_SOURCE_DIR}/test/with_data bags/luminar_no_label_no_tf.bag ${CATKIN_ENV}
-      rostest --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} --results-filename test_ros_real_bag.xml
-      --results-base-dir ${CATKIN_TEST_RESULTS_DIR} ${PROJECT_SOURCE_DIR}/test/ros/real_bag.test)
-  set_tests_properties(real_bag_rostest PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
+  function(add_real_rostest name data)
+    add_test(NAME ${name}_rostest
+      COMMAND ${PROJECT_SOURCE_DIR}/test/with_data ${data} ${CATKIN_ENV}
+        rostest --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} --results-filename test_ros_${name}.xml
+        --results-base-dir ${CATKIN_TEST_RESULTS_DIR} ${PROJECT_SOURCE_DIR}/test/ros/${name}.test)
+    set_tests_properties(${name}_rostest PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
+  endfunction()
+  add_real_rostest(real_bag bags/luminar_no_label_no_tf.bag)
+  if(BKI_MAPPING_LAB AND TARGET bki_mapping_python)
+    add_rostest(test/ros/live_corrections.test)
+    add_real_rostest(real_corrections trajectories/kitti_00_truth.txt)
+    bki_mapping_long_tests(_ctest_${PROJECT_NAME}_rostest_test_ros_live_corrections.test real_corrections_rostest)
+  endif()
   add_rostest(test/ros/two_mappers.test)
   # Found by rostest where catkin puts executables; loads the nodelet into its own process.
   add_executable(soak_test test/ros/soak_test.cpp)
