@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,9 @@ constexpr std::size_t kScansAtOnce = 4;
 constexpr std::size_t kMovesAtOnce = 2;
 /// Scans of equal priority [m]: of those within this distance of each other, the newest are moved first.
 constexpr double kEquallyNear = 20.0;
+/// Scans move first where they may touch what is within this distance of the robot, and the looks there are
+/// then made before other scans move [m].
+constexpr double kAround = 40.0;
 /// Regions whose looks are made at once: few, so that they need little memory.
 constexpr std::size_t kRegionsAtOnce = 256;
 /// Scans that may wait for being packed: a raw one takes ten times the memory.
@@ -119,6 +123,7 @@ void MapCorrector::noteCleared(const Eigen::AlignedBox3d& box) {
   journal_.noteCleared(box);
   ++generation_;
   dropLooks();
+  moved_looks_.clear();
 }
 
 void MapCorrector::noteForeign(const std::vector<GridIndex>& regions) {
@@ -130,6 +135,7 @@ void MapCorrector::reset() {
   changes_ = {};
   unpacked_.clear();
   dropLooks();
+  moved_looks_.clear();
   changed_regions_.clear();
   ++generation_;
   alone_ = false;
@@ -167,6 +173,7 @@ void MapCorrector::correctTo(const std::vector<Eigen::Isometry3d>& T_map_sensor)
 void MapCorrector::markAll() {
   ++progress_.paths;
   progress_.largest_move = 0.0;
+  moves_before_looks_ = 0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
     mark(journal_.at(n));
     progress_.largest_move = std::max(progress_.largest_move, ScanJournal::errorOf(journal_.at(n)));
@@ -246,8 +253,14 @@ void MapCorrector::start(Work work) {
 }
 
 void MapCorrector::startNext(const Eigen::Vector3d& robot) {
-  if (startPacking() || startMoving(robot)) return;
-  startLooking(robot);
+  if (startPacking()) return;
+  const std::optional<NextMove> next = nextMove(robot);
+  if (!next && progress_.to_go > 0) countToGo();  // some have been forgotten
+  if (!next && progress_.to_go == 0) startLooking(robot, std::numeric_limits<double>::infinity());
+  if (!next || (!next->is_around && startLooking(robot, kAround))) return;
+  const bool replaces_looks = looks_ && to_look_.empty();
+  if ((replaces_looks && !next->is_around) || (map_.ready && !map_.ready())) return;
+  startMoving(next->number);
 }
 
 bool MapCorrector::startPacking() {
@@ -262,25 +275,29 @@ bool MapCorrector::startPacking() {
   return true;
 }
 
-bool MapCorrector::startMoving(const Eigen::Vector3d& robot) {
-  if (progress_.to_go == 0 || (map_.ready && !map_.ready())) return false;
-  std::optional<Number> best;
-  double best_distance = 0.0;
+std::optional<MapCorrector::NextMove> MapCorrector::nextMove(const Eigen::Vector3d& robot) const {
+  std::optional<NextMove> next;
+  double nearest = 0.0;
+  if (progress_.to_go == 0) return next;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
     const JournalScan& scan = journal_.at(n);
     if (!scan.isPacked() || !scan.off) continue;
-    const double distance = std::floor((scan.wanted.translation() - robot).norm() / kEquallyNear);
-    if (best && distance > best_distance) continue;
-    best = n;
-    best_distance = distance;
+    const double metres = std::min((scan.wanted.translation() - robot).norm(),
+                                   (scan.T_map_sensor.translation() - robot).norm());
+    const double distance = std::floor(metres / kEquallyNear);
+    if (next && distance > nearest) continue;
+    next = {n, metres < scan.reach + kAround};
+    nearest = distance;
   }
-  if (!best) {
-    countToGo();
-    return false;
-  }
+  return next;
+}
+
+void MapCorrector::startMoving(Number newest) {
   Moving moving;
-  const JournalScan& first = journal_.at(*best);
-  for (Number n = *best; moving.numbers.size() < (alone_ ? 1 : kMovesAtOnce); --n) {
+  const JournalScan& first = journal_.at(newest);
+  // In a cleared box, the intervals of looks depend on which scans were cleared together.
+  const bool alone = alone_ || !journal_.placed(newest).cleared.empty();
+  for (Number n = newest; moving.numbers.size() < (alone ? 1 : kMovesAtOnce); --n) {
     const JournalScan& scan = journal_.at(n);
     const bool alike = scan.settings == first.settings && scan.cleared_before == first.cleared_before;
     if (!scan.isPacked() || !scan.off || !alike) break;
@@ -289,37 +306,50 @@ bool MapCorrector::startMoving(const Eigen::Vector3d& robot) {
     if (n == journal_.begin()) break;
   }
   start(std::move(moving));
-  return true;
 }
 
-void MapCorrector::beginLooks(const Eigen::Vector3d& robot) {
+bool MapCorrector::beginLooks(const Eigen::Vector3d& robot, double within) {
   const double edge = Region::kEdge * GridGeometry(config_->resolution).blockSize();
   std::vector<std::pair<double, GridIndex>> nearest;
   for (const GridIndex& region : changed_regions_) {
     const Eigen::Vector3d centre = edge * (Eigen::Array3d(region.x, region.y, region.z) + 0.5);
-    nearest.emplace_back((centre - robot).norm(), region);
+    const double distance = (centre - robot).norm();
+    if (distance <= within) nearest.emplace_back(distance, region);
   }
+  if (nearest.empty()) return false;
   const std::size_t count = std::min(kRegionsAtOnce, nearest.size());
   std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count), nearest.end());
   nearest.resize(count);
   looks_ = std::make_shared<LooksByRegion>();
+  std::map<GridIndex, std::set<Number>> moved;  // scans whose looks are known already
   for (const auto& [distance, region] : nearest) {
-    if (journal_.foreign().count(region) == 0) (*looks_)[region];
+    MovedLooks::OfRegion known = moved_looks_.take(region);
     changed_regions_.erase(region);
+    if (journal_.foreign().count(region) > 0) continue;
+    (*looks_)[region] = std::move(known.looks);
+    moved[region] = std::move(known.scans);
   }
   rounds_ = 0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
-    if (anyIn(*looks_, journal_.at(n).regions)) to_look_.push_back(n);
+    const std::vector<GridIndex>& regions = journal_.at(n).regions;
+    const bool is_missing = std::any_of(regions.begin(), regions.end(), [&](const GridIndex& region) {
+      const auto known = moved.find(region);
+      return known != moved.end() && known->second.count(n) == 0;
+    });
+    if (is_missing) to_look_.push_back(n);
   }
+  moves_before_looks_ = to_look_.size();
+  return true;
 }
 
-bool MapCorrector::startLooking(const Eigen::Vector3d& robot) {
-  if (progress_.to_go > 0 || (changed_regions_.empty() && !looks_)) return false;
+bool MapCorrector::startLooking(const Eigen::Vector3d& robot, double within) {
+  if (changed_regions_.empty() && !looks_) return false;
   if (!config_->rules.enabled || !config_->rules.latest) {
     changed_regions_.clear();  // there are no looks
     return false;
   }
-  if (!looks_) beginLooks(robot);
+  const bool is_time = progress_.to_go == 0 || moves_before_looks_ == 0;
+  if (!looks_ && (!is_time || !beginLooks(robot, within))) return false;
   const bool in_memory =
       !to_look_.empty() && journal_.has(to_look_.front()) && journal_.at(to_look_.front()).packed;
   if (in_memory && to_look_.size() <= kScansAtOnce && ++rounds_ > kPatience) {
@@ -456,9 +486,14 @@ std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
     countToGo();
     return changed;
   }
+  for (const Number number : moving.numbers) {
+    dropLooksOf(journal_.at(number).regions);
+    moved_looks_.drop(number, journal_.at(number).regions);
+  }
+  moved_looks_.add(std::move(moving.moved->looks), moving.numbers, moving.moved->regions);
+  moves_before_looks_ -= std::min(moves_before_looks_, moving.numbers.size());
   for (std::size_t n = 0; n < moving.numbers.size(); ++n) {
     JournalScan& scan = journal_.at(moving.numbers[n]);
-    dropLooksOf(scan.regions);
     scan.T_map_sensor = moving.moves[n].to;
     changes_.moved.insert(moving.numbers[n]);
     mark(scan);

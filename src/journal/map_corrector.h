@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
+#include "journal/moved_looks.h"
 #include "journal/scan_journal.h"
 #include "journal/scan_mover.h"
 
@@ -34,10 +35,11 @@ struct CorrectedMap {
 /// of all scans at their corrected poses.
 ///
 /// Looks (rules/latest) cannot be subtracted. While scans move, a block keeps the looks at the old poses
-/// beside those at the new ones; when no scan is left to be moved, the looks of all changed regions are made
-/// anew from the scans, and replaced at once. Where the map has evidence that is of no scan of the journal,
-/// from another map or a forgotten scan, the old looks stay; and where a box was cleared, intervals of looks
-/// may differ from those of a map made afresh.
+/// beside those at the new ones; when no scan near the robot is left to be moved, the looks of the changed
+/// regions there are made anew, and when none is left at all, those of the others. They come from the moves,
+/// if all scans of a region have moved (MovedLooks); others are looked through again. Where the map has
+/// evidence that is of no scan of the journal, from another map or a forgotten scan, the old looks stay; and
+/// where a box was cleared, intervals of looks may differ from those of a map made afresh.
 ///
 /// Not thread-safe; for the thread of the mapper.
 class MapCorrector {
@@ -179,9 +181,16 @@ class MapCorrector {
   void giveUp(const Moving& moving, const std::string& fault);
   void startNext(const Eigen::Vector3d& robot);
   bool startPacking();
-  bool startMoving(const Eigen::Vector3d& robot);
-  bool startLooking(const Eigen::Vector3d& robot);
-  void beginLooks(const Eigen::Vector3d& robot);
+  struct NextMove {
+    Number number;
+    bool is_around;  ///< it is, or will be, where the robot may see what it saw
+  };
+  std::optional<NextMove> nextMove(const Eigen::Vector3d& robot) const;
+  void startMoving(Number newest);
+  /// @param within only of regions within this distance of the robot [m].
+  bool startLooking(const Eigen::Vector3d& robot, double within);
+  /// @return whether there are regions whose looks are to be made.
+  bool beginLooks(const Eigen::Vector3d& robot, double within);
   /// Looks through one of the last scans in this thread.
   void lookAtNext();
   /// What has been made of the looks is out of date: all of it, or that of some regions.
@@ -208,8 +217,12 @@ class MapCorrector {
   /// changes the looks, this one the set of regions, while the thread is idle.
   std::shared_ptr<LooksByRegion> looks_;
   std::deque<Number> to_look_;  ///< scans for looks_
-  int rounds_ = 0;              ///< of jobs for the last few scans of looks_
-  bool alone_ = false;          ///< moves one scan at a time, because several have failed
+  MovedLooks moved_looks_;      ///< of regions in changed_regions_
+  /// Scans that are to be moved before looks around the robot are made again: else, on a robot that drives
+  /// on, those would take all the time.
+  std::size_t moves_before_looks_ = 0;
+  int rounds_ = 0;      ///< of jobs for the last few scans of looks_
+  bool alone_ = false;  ///< moves one scan at a time, because several have failed
   Progress progress_;
   std::uint64_t generation_ = 0;  ///< of what results of jobs may be added to the map
 

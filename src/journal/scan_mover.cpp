@@ -16,6 +16,18 @@ MapperConfig asideOf(MapperConfig config) {
   return config;
 }
 
+/// Calls visit(region, block, looks) for the blocks of a map that were looked at.
+template <typename Visit>
+void forEachLooks(const SemanticMap& map, Visit&& visit) {
+  for (const GridIndex& region : map.regions()) {
+    const Region& blocks = *map.findRegion(region);
+    blocks.forEachIndex([&](const BlockIndex& index) {
+      const Looks& looks = blocks.find(Region::numberOf(index))->looks();
+      if (!looks.empty()) visit(region, index, looks);
+    });
+  }
+}
+
 }  // namespace
 
 std::vector<GridIndex> regionsOf(const std::vector<GridIndex>& blocks) {
@@ -56,17 +68,22 @@ ScanMover::Moved ScanMover::move(const std::vector<ScanMove>& moves) {
   for (const ScanMove& move : moves) {
     use(move.scan);
     scans.push_back(unpack(move.scan));
-    mapper_->withdraw(place(scans.back(), move.scan.T_map_sensor));
-  }
-  // After all is withdrawn: a block that is empty for a moment loses its looks.
-  for (std::size_t n = 0; n < moves.size(); ++n) {
-    mapper_->integrate(place(scans[n], moves[n].to));
+    mapper_->integrate(place(scans.back(), move.to));
     regions.push_back(regionsOf(mapper_->touchedBlocks()));
   }
-  Moved moved{mapper_->takeMap(), std::move(regions)};
-  if (!moves.empty()) {
-    for (const Eigen::AlignedBox3d& box : moves.front().scan.cleared) clearBox(moved.difference, box);
+  const std::vector<Eigen::AlignedBox3d> cleared =
+      moves.empty() ? std::vector<Eigen::AlignedBox3d>() : moves.front().scan.cleared;
+  for (const Eigen::AlignedBox3d& box : cleared) mapper_->clearBox(box);
+  // Before anything is withdrawn: a block whose evidence is then 0 loses its looks.
+  LooksByRegion looks;
+  forEachLooks(mapper_->map(), [&](const GridIndex& region, const BlockIndex& block, const Looks& seen) {
+    looks[region][block] = seen;
+  });
+  for (std::size_t n = 0; n < moves.size(); ++n) {
+    mapper_->withdraw(place(scans[n], moves[n].scan.T_map_sensor));
   }
+  Moved moved{mapper_->takeMap(), std::move(looks), std::move(regions)};
+  for (const Eigen::AlignedBox3d& box : cleared) clearBox(moved.difference, box);
   return moved;
 }
 
@@ -75,15 +92,10 @@ void ScanMover::addLooks(const PlacedJournalScan& scan, LooksByRegion& looks) {
   mapper_->takeMap();  // what a failed call has left
   mapper_->integrate(place(unpack(scan), scan.T_map_sensor));
   for (const Eigen::AlignedBox3d& box : scan.cleared) mapper_->clearBox(box);
-  for (const GridIndex& region : mapper_->map().regions()) {
+  forEachLooks(mapper_->map(), [&](const GridIndex& region, const BlockIndex& block, const Looks& seen) {
     const auto to = looks.find(region);
-    if (to == looks.end()) continue;
-    const Region& blocks = *mapper_->map().findRegion(region);
-    blocks.forEachIndex([&](const BlockIndex& index) {
-      const Block& block = *blocks.find(Region::numberOf(index));
-      if (!block.looks().empty()) to->second[index].add(block.looks());
-    });
-  }
+    if (to != looks.end()) to->second[block].add(seen);
+  });
 }
 
 }  // namespace bki_mapping

@@ -45,8 +45,9 @@ class ScanMover {
 
   struct Moved {
     /// Is to be added to the map: it holds the scans at their new poses, less the scans at their old ones.
-    /// Its looks are those of the new poses.
+    /// Its looks are those of the new poses, where its evidence is not 0.
     SemanticMap difference;
+    LooksByRegion looks;  ///< of the scans at their new poses
     /// For each scan the regions that it touches at the new pose, sorted.
     std::vector<std::vector<GridIndex>> regions;
   };
