@@ -54,6 +54,11 @@ Health judge(const MappingStatus& before, const MappingStatus& now, const Mapper
          "others are within " +
          numberText(std::round(now.weather_half_range)) + " m; slow down");
   }
+  constexpr double kMost = 0.75;  // half of the beams of a lidar that looks up and down meet the sky
+  if (now.weather_no_returns > kMost) {
+    warn(percentText(now.weather_no_returns) +
+         " of the beams return nothing; clean the lidar, or slow down in fog and rain");
+  }
   // A map may be empty at one report because it was reset.
   if (now.blocks == 0 && before.blocks == 0 && before.integrated > 0 &&
       now.points_used > before.points_used) {

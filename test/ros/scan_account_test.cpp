@@ -133,6 +133,28 @@ TEST(ScanLedger, TellsTheWeatherOfTheLastCloud) {
   EXPECT_FLOAT_EQ(status.weather_half_range, 12.5f);
 }
 
+TEST(Diagnostics, TellOfTheWeather) {
+  MappingStatus before, now;
+  now.received = now.integrated = 1;
+  now.blocks = 1;
+  now.weather_half_range = 12.4f;
+  now.weather_particles = 0.03f;
+  now.weather_no_returns = 0.6f;
+  EXPECT_EQ(judge(before, now, {}).message, "mapping");
+  now.weather_particles = 0.2f;
+  Health health = judge(before, now, {});
+  EXPECT_EQ(health.level, diagnostic_msgs::DiagnosticStatus::WARN);
+  EXPECT_EQ(
+      health.message,
+      "20 % of the returns are rain, snow, fog or dust, and half of the others are within 12 m; slow down");
+  now.weather_particles = 0.0f;
+  now.weather_no_returns = 0.9f;
+  health = judge(before, now, {});
+  EXPECT_EQ(health.level, diagnostic_msgs::DiagnosticStatus::WARN);
+  EXPECT_EQ(health.message,
+            "90 % of the beams return nothing; clean the lidar, or slow down in fog and rain");
+}
+
 UnlistedLabels unlisted(const std::map<std::int64_t, std::size_t>& counts) {
   UnlistedLabels labels;
   for (const auto& [label, points] : counts) labels.add(label, points);

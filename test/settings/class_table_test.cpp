@@ -27,7 +27,8 @@ TEST(ClassTable, FlagsAndGainsBelongToClasses) {
   std::ofstream(file) << "classes:\n"
                          "  - {id: 0, name: a, color: [1, 2, 3], flags: [ground], free_gain: 0.5}\n"
                          "  - {id: 1, name: b, color: [1, 2, 3], flags: [ignored, dynamic]}\n"
-                         "  - {id: 2, name: c, color: [1, 2, 3], flags: [living]}\n";
+                         "  - {id: 2, name: c, color: [1, 2, 3], flags: [living]}\n"
+                         "  - {id: 4, name: d, color: [1, 2, 3], flags: [airborne]}\n";
   const ClassTable table = loadClassTable(file);
   EXPECT_EQ(table.nameOf(1), "b");
   for (const ClassId none : {ClassId{3}, kFreeClass}) EXPECT_EQ(table.nameOf(none), "");
@@ -36,8 +37,10 @@ TEST(ClassTable, FlagsAndGainsBelongToClasses) {
   EXPECT_TRUE(table.find(1)->ignored && table.find(1)->dynamic && !table.find(1)->ground);
   EXPECT_FALSE(table.find(1)->free_gain || table.find(1)->living);
   EXPECT_TRUE(table.find(2)->living && table.find(2)->dynamic) << "what lives can move";
+  EXPECT_TRUE(table.find(4)->airborne && !table.find(4)->dynamic && !table.find(2)->airborne);
   const std::string head = "classes:\n  - {id: 0, name: a, color: [1, 2, 3], ";
   EXPECT_NAMES(faultOf(head + "flags: [ground, ignored]}\n"), "both ground and ignored");
+  EXPECT_NAMES(faultOf(head + "flags: [ground, airborne]}\n"), "both ground and airborne");
   EXPECT_NAMES(faultOf(head + "free_gain: 0}\n"), "free_gain of class 'a' must be a number > 0");
 }
 
