@@ -20,9 +20,6 @@ constexpr std::size_t kScansAtOnce = 4;
 constexpr std::size_t kMovesAtOnce = 2;
 /// Scans of equal priority [m]: of those within this distance of each other, the newest are moved first.
 constexpr double kEquallyNear = 20.0;
-/// Scans move first where they may touch what is within this distance of the robot, and the looks there are
-/// then made before other scans move [m].
-constexpr double kAround = 40.0;
 /// Regions whose looks are made at once: few, so that they need little memory.
 constexpr std::size_t kRegionsAtOnce = 256;
 /// Scans that may wait for being packed: a raw one takes ten times the memory.
@@ -173,6 +170,7 @@ void MapCorrector::correctTo(const std::vector<Eigen::Isometry3d>& T_map_sensor)
 void MapCorrector::markAll() {
   ++progress_.paths;
   progress_.largest_move = 0.0;
+  progress_.done_around = false;
   moves_before_looks_ = 0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
     mark(journal_.at(n));
@@ -209,6 +207,7 @@ MapCorrector::Progress MapCorrector::progress() const {
   progress.bytes = journal_.bytes();
   progress.forgotten = journal_.forgotten();
   progress.done = progress.to_go == 0 && changed_regions_.empty() && !looks_;
+  progress.done_around = progress.done_around || progress.done;
   return progress;
 }
 
@@ -255,6 +254,7 @@ void MapCorrector::start(Work work) {
 void MapCorrector::startNext(const Eigen::Vector3d& robot) {
   if (startPacking()) return;
   const std::optional<NextMove> next = nextMove(robot);
+  progress_.done_around = !(next && next->is_around) && areLooksDone(robot, kAround);
   if (!next && progress_.to_go > 0) countToGo();  // some have been forgotten
   if (!next && progress_.to_go == 0) startLooking(robot, std::numeric_limits<double>::infinity());
   if (!next || (!next->is_around && startLooking(robot, kAround))) return;
@@ -308,12 +308,24 @@ void MapCorrector::startMoving(Number newest) {
   start(std::move(moving));
 }
 
-bool MapCorrector::beginLooks(const Eigen::Vector3d& robot, double within) {
+double MapCorrector::distanceTo(const GridIndex& region, const Eigen::Vector3d& robot) const {
   const double edge = Region::kEdge * GridGeometry(config_->resolution).blockSize();
+  return (edge * (Eigen::Array3d(region.x, region.y, region.z) + 0.5).matrix() - robot).norm();
+}
+
+bool MapCorrector::areLooksDone(const Eigen::Vector3d& robot, double within) const {
+  const auto is_near = [&](const GridIndex& region) { return distanceTo(region, robot) <= within; };
+  if (looks_ &&
+      std::any_of(looks_->begin(), looks_->end(), [&](const auto& of) { return is_near(of.first); })) {
+    return false;
+  }
+  return std::none_of(changed_regions_.begin(), changed_regions_.end(), is_near);
+}
+
+bool MapCorrector::beginLooks(const Eigen::Vector3d& robot, double within) {
   std::vector<std::pair<double, GridIndex>> nearest;
   for (const GridIndex& region : changed_regions_) {
-    const Eigen::Vector3d centre = edge * (Eigen::Array3d(region.x, region.y, region.z) + 0.5);
-    const double distance = (centre - robot).norm();
+    const double distance = distanceTo(region, robot);
     if (distance <= within) nearest.emplace_back(distance, region);
   }
   if (nearest.empty()) return false;

@@ -130,10 +130,15 @@ class MapCorrector {
     std::uint64_t failed = 0;     ///< scans that cannot be moved to where they belong
     double largest_move = 0.0;    ///< of a point of a scan, by the last path [m]
     double scan_ms = 0.0;         ///< time of the thread for a scan, in the last moves [ms]
+    bool done_around = true;      ///< whether that holds within kAround of the robot
     bool done = true;             ///< whether the map is that of the corrected poses
     std::string fault;            ///< why the last failed scan cannot be moved
   };
   Progress progress() const;
+
+  /// Scans move first where they may touch what is within this distance of the robot, and the looks there are
+  /// then made before other scans move [m].
+  static constexpr double kAround = 40.0;
 
  private:
   using Number = ScanJournal::Number;
@@ -191,6 +196,8 @@ class MapCorrector {
   bool startLooking(const Eigen::Vector3d& robot, double within);
   /// @return whether there are regions whose looks are to be made.
   bool beginLooks(const Eigen::Vector3d& robot, double within);
+  double distanceTo(const GridIndex& region, const Eigen::Vector3d& robot) const;
+  bool areLooksDone(const Eigen::Vector3d& robot, double within) const;
   /// Looks through one of the last scans in this thread.
   void lookAtNext();
   /// What has been made of the looks is out of date: all of it, or that of some regions.

@@ -168,6 +168,7 @@ void CorrectedPoses::fill(MappingStatus& status) const {
   status.correction_fault = progress.fault;
   status.correction_largest_move = static_cast<float>(progress.largest_move);
   status.correction_scan_ms = static_cast<float>(progress.scan_ms);
+  status.correction_done_around = progress.done_around;
   status.correction_done = progress.done;
 }
 

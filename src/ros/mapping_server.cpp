@@ -325,7 +325,7 @@ Health MappingServer::judgeAllPoints() {
 MappingStatus MappingServer::status() {
   MappingStatus status = ledger_.status(Clock::now(), waiting_.size());
   status.paused = paused_;
-  status.correction_done = true;
+  status.correction_done_around = status.correction_done = true;
   if (corrected_) corrected_->fill(status);
   if (live_settings_) status.last_refusal = live_settings_->lastRefusal();
   status.blocks = static_cast<std::uint32_t>(mapper_->map().size());

@@ -179,6 +179,46 @@ TEST(MapCorrector, EachScanIsInTheMapOnceAtAnyMoment) {
   EXPECT_GT(between, 0u);
 }
 
+TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
+  constexpr double kStep = 10.0;  // between scans that see 8 m far [m]
+  std::mt19937 random(17);
+  Corrected map(withRules());
+  Keyframes moved;
+  for (std::size_t n = 0; n < 30; ++n) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation().x() = kStep * static_cast<double>(n);
+    const std::uint64_t stamp = 1'000'000'000 + 400'000'000 * n;
+    Scan scan = roomScan(Eigen::Isometry3d::Identity(), stamp, random);
+    scan.origin = pose.translation();
+    map.add(scan, pose, pose);
+    pose.translation().y() = 1.0;
+    moved.push_back({stamp, pose});
+  }
+  map.finish();  // packs
+  EXPECT_TRUE(map.corrector_.progress().done_around);
+  map.correct(moved);
+  EXPECT_FALSE(map.corrector_.progress().done_around);
+  const Eigen::Vector3d robot = moved[20].motion.translation();
+  while (!map.corrector_.progress().done_around) {
+    map.corrector_.update(robot);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_GT(map.corrector_.progress().to_go, 10u);
+  EXPECT_FALSE(map.corrector_.progress().done);
+  const GridGeometry& geometry = map.mapper_.map().geometry();
+  const auto around = [&](std::map<GridIndex, std::string> blocks) {
+    for (auto block = blocks.begin(); block != blocks.end();) {
+      const Eigen::Vector3d centre = geometry.blockCentre({block->first});
+      block = (centre - robot).norm() < 30.0 ? std::next(block) : blocks.erase(block);
+    }
+    return blocks;
+  };
+  EXPECT_GT(around(map.content()).size(), 100u);
+  EXPECT_TRUE(around(map.content()) == around(map.wanted(random)));
+  map.finish();
+  EXPECT_TRUE(map.content() == map.wanted(random));
+}
+
 TEST(MapCorrector, ScansWithinTheToleranceStayUntilTheyAreFartherOff) {
   MapCorrector::Settings settings;
   settings.tolerance = 0.1;
