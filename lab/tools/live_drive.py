@@ -74,8 +74,8 @@ class LiveDrive:
         self.clouds = rospy.Publisher('/live_drive/cloud', PointCloud2, queue_size=1000)
         self.paths = rospy.Publisher('/live_drive/path', Path, queue_size=10)
         self.transforms = rospy.Publisher('/live_drive/tf', TFMessage, queue_size=1000)
-        for publisher in (self.clouds, self.paths, self.transforms):
-            wait_until(lambda: publisher.get_num_connections() > 0, f'the node subscribing to {publisher.name}')
+        for topic in (self.clouds, self.paths, self.transforms, self.status_subscriber):
+            wait_until(lambda: topic.get_num_connections() > 0, f'the connection of {topic.name} to the node')
 
     def on_status(self, status):
         with self.changed:
@@ -92,7 +92,7 @@ class LiveDrive:
                         return received, status
                 seen = len(self.statuses)
                 if time.monotonic() > end or self.node.poll() is not None:
-                    raise SystemExit(f'{what} did not happen within {seconds:.0f} s; the last status says:\n{self.statuses[-1][1]}')
+                    raise SystemExit(f'{what} did not happen within {seconds:.0f} s; the last statuses say:\n{self.statuses[-1:]}')
                 self.changed.wait(1.0)
 
     def transform(self, stamp, parent, child, pose):
