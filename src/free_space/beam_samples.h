@@ -1,24 +1,12 @@
 /// @file Evidence for `free` at points sampled along beams.
 #pragma once
 
-#include <cmath>
-
 #include "free_space/free_space_model.h"
 #include "parallel/chunks.h"
 #include "points/downsample.h"
 #include "points/point_evidence.h"
 
 namespace bki_mapping {
-
-/// Distance of a random sample from the sensor [m], uniform along the beam. @param u uniform on [0, 1).
-inline double uniformDistance(double u, double length) {
-  return u * length;
-}
-/// The same with a density proportional to the distance, which covers a plane of beams evenly (Theorem 1 of
-/// Zhong and Peng).
-inline double linearDistance(double u, double length) {
-  return std::sqrt(u) * length;
-}
 
 /// Turns samples on each beam into evidence; they are down-sampled like hits.
 class BeamSamples {

@@ -6,7 +6,7 @@
 namespace bki_mapping {
 namespace {
 
-/// Mode `even`: a sample at every multiple of the gap, up to the end of the beam.
+/// Mode `even`: equidistant samples, at every multiple of the gap up to the end of the beam.
 class EvenSamples : public FreeSpaceModel {
  public:
   explicit EvenSamples(const FreeSpaceSetup& setup) : gap_(setup.config.gap), samples_(setup) {}

@@ -1,12 +1,13 @@
 #include "free_space/beam_samples.h"
 #include "free_space/free_space_model.h"
+#include "free_space/random_distance.h"
 #include "parallel/counter_random.h"
 
 namespace bki_mapping {
 namespace {
 
-/// Modes `uniform` and `linear`: a fixed number of random samples for each beam. `Distance` maps (u, length)
-/// to the distance from the sensor: uniformDistance, or linearDistance (Theorem 1), in beam_samples.h.
+/// Modes `uniform` and `linear`: a fixed number of random samples for each beam. `Distance` is that of the
+/// mode from random_distance.h, where Theorem 1 is, too.
 template <double (*Distance)(double, double)>
 class RandomSamples : public FreeSpaceModel {
  public:

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "free_space/beam_samples.h"
+#include "free_space/random_distance.h"
 #include "parallel/counter_random.h"
 
 namespace bki_mapping {
@@ -37,7 +37,7 @@ std::vector<double> squaredFractions(double (*distance)(double, double)) {
   return fractions;
 }
 
-TEST(LinearSamples, CoverThePlaneEvenly) {  // Theorem 1: (r / d)^2 is uniform
+TEST(LinearSamples, AreEquallyDenseAllOverThePlane) {  // Theorem 1: (r / d)^2 is uniform
   EXPECT_LT(distanceFromUniform(squaredFractions(linearDistance)), criticalDistance(20000));
 }
 
