@@ -66,8 +66,8 @@ bki_mapping_core_room(points SOURCES
     cell_merger.cpp downsample.cpp isolated_points.cpp point_bins.cpp point_evidence.cpp tile_grid.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 bki_mapping_core_room(beams SOURCES
-    beam_directions.cpp beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp
-    longest_beams.cpp near_sensor.cpp occlusion.cpp
+    beam_field.cpp beam_rtree.cpp beam_table.cpp block_walk.cpp line_evidence.cpp
+    longest_beams.cpp near_sensor.cpp occlusion.cpp split_directions.cpp
     raster/group_sums.cpp raster/line_setup.cpp
   LINK bki_mapping_kernel bki_mapping_update)
 target_link_libraries(bki_mapping_beams PRIVATE Boost::headers)

@@ -165,7 +165,7 @@ bool NearSensor::sumsOf(const BlockIndex& index, Workspace& own, float* sums) co
       if (voxel.isZero(0.0)) continue;  // rho is 0
       const std::size_t ranges = field_->rangesIn(windows, v, own.ranges);
       const float sum = scale * kernels_.sum_at(directions_.arrays(), own.ranges, ranges,
-                                                PointDirection(voxel), reach, weight_);
+                                                SplitPointDirection(voxel), reach, weight_);
       to[v] = sum > 0.0f ? sum : 0.0f;
       some |= sum > 0.0f;
     }

@@ -4,11 +4,11 @@
 #include <limits>
 #include <vector>
 
-#include "beams/beam_directions.h"
 #include "beams/beam_field.h"
 #include "beams/longest_beams.h"
 #include "beams/raster/group_sums.h"
 #include "beams/raster/line_kernels.h"
+#include "beams/split_directions.h"
 #include "map/voxel_mask.h"
 #include "update/sum_sink.h"
 
@@ -70,7 +70,7 @@ class NearSensor {
   double density_ = 0.0;   ///< beams by steradian
   double farthest_ = 0.0;  ///< up to which distance blocks are near [voxels]
   LineSetups some_lines_;
-  BeamDirections directions_;
+  SplitDirections directions_;
   LongestBeams longest_;
 };
 

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "beams/beam_cells.h"
-#include "beams/beam_directions.h"
 #include "beams/raster/group_sums.h"
 #include "beams/raster/line_setup.h"
+#include "beams/split_directions.h"
 #include "bki_mapping/beams/beam_config.h"
 
 namespace bki_mapping {
@@ -32,11 +32,11 @@ struct LineKernels {
   void (*weigh)(BeamWeight weight, float* rho);
   /// Computes the directions of beams. @param beams, resolution as for set_up_lines.
   void (*set_up_directions)(const Eigen::Vector3f* beams, std::size_t count, double resolution,
-                            const BeamDirectionTargets& to);
+                            const SplitDirectionTargets& to);
   /// The sum of w(rho) k(d) over the beams of some ranges at one voxel, which is not the sensor's own place.
   /// @param reach length of the kernel [voxels].
-  float (*sum_at)(const BeamDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
-                  const PointDirection& voxel, float reach, BeamWeight weight);
+  float (*sum_at)(const SplitDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
+                  const SplitPointDirection& voxel, float reach, BeamWeight weight);
   /// Finds the direction bins of the 64 voxels of a layer of a block, and the squares of their distances
   /// [voxels^2]. @param first the coordinates of the first of them, from the sensor [voxels].
   void (*find_cells)(const float* first, std::int32_t* cells, float* distances2);

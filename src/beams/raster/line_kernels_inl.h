@@ -128,8 +128,8 @@ void weigh(BeamWeight weight, float* rho) {
   withWeight(weight, [&](auto w) { weighWith<decltype(w)::value>(rho); });
 }
 
-float sumAt(const BeamDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
-            const PointDirection& voxel, float reach, BeamWeight weight) {
+float sumAt(const SplitDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
+            const SplitPointDirection& voxel, float reach, BeamWeight weight) {
   float sum = 0.0f;
   withWeight(weight,
              [&](auto w) { sum = sumAtWith<decltype(w)::value>(beams, ranges, count, voxel, reach); });

@@ -5,16 +5,16 @@
 #include <cmath>
 
 #include "beams/beam_cells.h"
-#include "beams/beam_directions.h"
 #include "beams/raster/beam_weight_inl.h"
 #include "beams/raster/line_kernels.h"
+#include "beams/split_directions.h"
 #include "kernel/vec_kernel_inl.h"
 
 namespace bki_mapping {
 namespace {
 
 inline void setUpDirections(const Eigen::Vector3f* beams, std::size_t count, double resolution,
-                            const BeamDirectionTargets& to) {
+                            const SplitDirectionTargets& to) {
   constexpr std::size_t kMost = 64;
   double ends[3][kMost], inverse[kMost];
   float* const rounded[3] = {to.x, to.y, to.z};
@@ -51,8 +51,8 @@ inline void findGreater(const float* a, const float* b, int count, float* to) {
 /// Lanes are beams. With the unit vectors u of a beam and v of the voxel's direction, and e = u - v, the
 /// line's distance is |p| |e| sqrt(1 - |e|^2 / 4), and the projection on it |p| (1 - |e|^2 / 2).
 template <BeamWeight kWeight>
-float sumAtWith(const BeamDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
-                const PointDirection& voxel, float reach) {
+float sumAtWith(const SplitDirectionArrays& beams, const BeamRange* ranges, std::size_t count,
+                const SplitPointDirection& voxel, float reach) {
   const float(&direction)[3] = voxel.direction, (&rest)[3] = voxel.rest;
   const float length = voxel.distance, by_reach = length / reach;
   const float to_kernel = by_reach * by_reach * VecKernel::kScale;

@@ -1,4 +1,4 @@
-#include "beams/beam_directions.h"
+#include "beams/split_directions.h"
 
 #include "beams/beam_cells.h"
 #include "beams/raster/line_kernels.h"
@@ -6,8 +6,8 @@
 
 namespace bki_mapping {
 
-void BeamDirections::set(const Beams& beams, double resolution, const LineKernels& kernels,
-                         ThreadPool& pool) {
+void SplitDirections::set(const Beams& beams, double resolution, const LineKernels& kernels,
+                          ThreadPool& pool) {
   const std::size_t count = beams.ends.size();
   for (std::vector<float>& part : parts_) part.resize(count + kBeamPadding, 0.0f);
   const Chunks chunks(count);
