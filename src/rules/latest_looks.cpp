@@ -42,7 +42,7 @@ std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t
 
 }  // namespace
 
-std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_move) {
+std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave) {
   const auto& all = looks.all();
   std::uint64_t crossed = 0;  // since the last hit, at most [ticks]
   int voids = 0;
@@ -59,7 +59,7 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool c
     return look->level() == 0 || has_stayed ? kKept : kNotOverruled;
   }
   if (voids >= kVoidsToClear) return kCleared;
-  if (can_move && crossed >= kCrossedToClear && visitBefore(all.rbegin(), all.rend()) <= look)
+  if (can_leave && crossed >= kCrossedToClear && visitBefore(all.rbegin(), all.rend()) <= look)
     return kCleared;
   return kNotOverruled;
 }

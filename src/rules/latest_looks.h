@@ -33,9 +33,8 @@ constexpr Stay stayOf(EvidenceUnits best, EvidenceUnits most_vote) {
 }
 
 /// What the looks say of a voxel: kKept, kCleared, or kNotOverruled where the sum decides.
-/// @param offset of the voxel in its block. @param can_move whether the gain of its likeliest class is
-/// above 1.
-std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_move);
+/// @param offset of the voxel in its block. @param can_leave StateRules::canLeave of its likeliest class.
+std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave);
 
 /// The same for all voxels of a block: where looks decide, overwrites what the voxels around say.
 /// @return whether they decide anywhere.

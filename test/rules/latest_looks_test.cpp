@@ -29,8 +29,8 @@ Looks looksOf(const std::string& sights, std::size_t voxel = 0, std::uint64_t st
   return looks;
 }
 
-std::string verdict(const std::string& sights, Stay stay = Stay::kPassing, bool can_move = true) {
-  const std::int32_t verdict = verdictOf(looksOf(sights), 0, stay, can_move);
+std::string verdict(const std::string& sights, Stay stay = Stay::kPassing, bool can_leave = true) {
+  const std::int32_t verdict = verdictOf(looksOf(sights), 0, stay, can_leave);
   return verdict == kKept ? "occupied" : verdict == kCleared ? "free" : "the sum";
 }
 
@@ -92,7 +92,7 @@ TEST(LatestLooks, WhatAnEarlierVisitHitIsClearedSooner) {
 }
 
 /// The definition in docs/method.md, voxel by voxel and look by look.
-std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool can_move) {
+std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool can_leave) {
   std::vector<std::pair<Sight, Look>> seen;  // from the latest
   for (auto look = looks.all().rbegin(); look != looks.all().rend(); ++look) {
     if (look->at(voxel) != Sight::kNothing) seen.emplace_back(look->at(voxel), *look);
@@ -123,7 +123,7 @@ std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool 
     voids += seen[n].first == Sight::kVoid;
   }
   if (voids >= 2) return kCleared;
-  if (can_move && visit_of(hit_look) > 0 && crossed >= 2) return kCleared;
+  if (can_leave && visit_of(hit_look) > 0 && crossed >= 2) return kCleared;
   return kNotOverruled;
 }
 
@@ -166,9 +166,9 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const EvidenceUnits best = std::max(block.evidence(3)[v], block.evidence(7)[v]);
       const Stay stay = best >= 6 * kMost ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
-      const bool can_move = best > 0 && block.evidence(3)[v] == best;
-      const std::int32_t expected = slowVerdict(block.looks(), v, stay, can_move);
-      ASSERT_EQ(verdictOf(block.looks(), v, stay, can_move), expected);
+      const bool can_leave = best > 0 && block.evidence(3)[v] == best;
+      const std::int32_t expected = slowVerdict(block.looks(), v, stay, can_leave);
+      ASSERT_EQ(verdictOf(block.looks(), v, stay, can_leave), expected);
       ASSERT_EQ(overruled[v], expected) << "round " << round << ", voxel " << v;
       expected_any |= expected != kNotOverruled;
     }
