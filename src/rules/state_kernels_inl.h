@@ -190,13 +190,13 @@ struct Priors {
 };
 
 /// Equations 10 and 13 of a vector of voxels. @param found what decides the state: the likeliest class, or
-/// what remains. @param counted the evidence for `free` as far as it counts for the state. @param restored,
-/// cleared the voxels whose own evidence is overruled.
+/// what remains. @param counted the evidence for `free` as far as it counts for the state. @param restored
+/// the voxels that are kept against their own evidence. @param has_left those that are free against it.
 template <bool kEntropy>
 [[gnu::always_inline]] inline void storePosterior(const BlockPlanes& planes, const Priors& prior,
                                                   const Likeliest& likeliest, const Likeliest& found,
                                                   IntVec free, IntVec counted, Mask is_occupied,
-                                                  Mask restored, Mask cleared, int v, BlockView& view) {
+                                                  Mask restored, Mask has_left, int v, BlockView& view) {
   ExactSum total = found.classes;
   total.add(free);
   const FloatVec evidence = total.evidence(), sum = prior.sum + evidence, inverse_sum = 1.0f / sum;
@@ -205,7 +205,6 @@ template <bool kEntropy>
   others.subtract(own);
   const FloatVec p = (prior.once + evidenceOf(own)) * inverse_sum,
                  not_p = (prior.classes + others.evidence()) * inverse_sum;
-  const Mask has_left = cleared & ~is_occupied;  // otherwise a fixed class remains
   const FloatVec best = evidenceOf(found.best), alpha = prior.once + best,
                  weight = static_cast<float>(kWeightOfFree) * Max(found.gain, Set(1.0f)),
                  weighted_free = weight * unless(restored, evidenceOf(counted)),
@@ -250,16 +249,17 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
     const Likeliest likeliest = found;
     Mask is_occupied = found.best > 0;
     const IntVec overruling = planes.overruled ? LoadU(planes.overruled->data() + v) : IntVec{};
-    Mask restored = {}, cleared = {};
+    Mask restored = {}, has_left = {};
     // Elsewhere the gain makes no difference to the state.
     const Mask disputed = (is_occupied & (free > 0)) | (overruling != 0);
     if (kPosterior || AnyTrue(disputed)) {
       findGains(planes, found);
       is_occupied &= occupied(found, counted);
       restored = (overruling == kKept) & (found.best > 0) & ~is_occupied;
-      cleared = (overruling == kCleared) & is_occupied;
+      const Mask cleared = (overruling == kCleared) & is_occupied;
       is_occupied = (is_occupied | restored) & ~cleared;
       is_occupied = keepRemaining(planes, free, v, is_occupied, found);
+      has_left = cleared & ~is_occupied;  // where a fixed class remains, that is there
     }
     static_assert(static_cast<int>(VoxelState::kFree) == 1 && static_cast<int>(VoxelState::kOccupied) == 2);
     const IntVec state = (is_known & 1) - is_occupied, label = found.label | ~is_occupied;
@@ -273,7 +273,7 @@ void readPlanes(const BlockPlanes& planes, BlockView& view) {
       continue;
     }
     if (!AnyTrue(is_known)) unknown = v;
-    storePosterior<kEntropy>(planes, prior, likeliest, found, free, counted, is_occupied, restored, cleared,
+    storePosterior<kEntropy>(planes, prior, likeliest, found, free, counted, is_occupied, restored, has_left,
                              v, view);
   }
 }
