@@ -33,7 +33,20 @@ namespace po = tools::po;
 /// On simulated drives, ghosts are counted after every kGhostsEvery scans.
 constexpr std::size_t kGhostsEvery = 10;
 
+/// The parameters that change what the map says and not what is in it.
+constexpr const char* kDecide[] = {"rules/stands_after", "rules/living_stands_after",
+                                   "rules/fixed_stands_after", "rules/together"};
+std::string decidingParameters() {
+  std::string all = kDecide[0];
+  for (std::size_t n = 1; n < std::size(kDecide); ++n) {
+    all += (n + 1 < std::size(kDecide) ? ", " : " or ") + std::string(kDecide[n]);
+  }
+  return all;
+}
+
 po::options_description options() {
+  const std::string judge =
+      "also give SA and DA of the same map with other values of " + decidingParameters() + "; repeatable";
   po::options_description options("Options");
   options.add_options()("json", po::value<std::string>()->value_name("FILE.json"),
                         "JSON file for the figures")(
@@ -69,10 +82,8 @@ po::options_description options() {
       "also map the same points with OctoMap, with these settings or the default ones of octomap_server, "
       "called default, and measure that map; repeatable")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
-      "also give SA and DA of the same map with other values of rules/stands_after, "
-      "rules/living_stands_after or rules/together; repeatable")(
-      "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
-      "seed of the errors");
+      judge.c_str())("noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
+                     "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
@@ -288,9 +299,6 @@ struct Judgement {
   MapperConfig config;
 };
 
-/// The parameters that change what the map says and not what is in it.
-constexpr const char* kDecide[] = {"rules/stands_after", "rules/living_stands_after", "rules/together"};
-
 /// @throws std::invalid_argument if settings change more than decisions.
 std::vector<Judgement> judgements(const po::variables_map& given, const MapperConfig& config) {
   std::vector<Judgement> all;
@@ -301,7 +309,7 @@ std::vector<Judgement> judgements(const po::variables_map& given, const MapperCo
       const std::string changed = name.substr(0, name.find('='));
       if (std::find(std::begin(kDecide), std::end(kDecide), changed) != std::end(kDecide)) continue;
       throw std::invalid_argument("--judge " + settings + " changes more than decisions; give it " +
-                                  kDecide[0] + ", " + kDecide[1] + " or " + kDecide[2] + " only");
+                                  decidingParameters() + " only");
     }
     all.push_back({settings, tools::withSettings(config, "--judge", settings)});
   }

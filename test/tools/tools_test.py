@@ -234,7 +234,7 @@ class Tools(ProgramTest):
         self.fails("'maxrange' is unknown; did you mean 'max_range'?", 'evaluate_map', '--sequence', self.drive, '--octomap', 'maxrange=10')
 
     def test_a_map_is_judged_by_other_gains(self):
-        gains = ('rules/stands_after=1', 'rules/stands_after=9,rules/living_stands_after=1,rules/together=0')
+        gains = ('rules/stands_after=1', 'rules/stands_after=9,rules/living_stands_after=1,rules/fixed_stands_after=3,rules/together=0')
         judged = self.evaluation('rules/enabled=true', more=[word for each in gains for word in ('--judge', each)])['judged']
         table = self.table
         self.assertEqual([each.pop('settings') for each in judged], list(gains))
