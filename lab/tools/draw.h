@@ -6,7 +6,7 @@
 
 namespace bki_mapping::tools {
 
-/// Runs scripts/NAME with python3 and matplotlib. @throws std::runtime_error if it fails.
+/// Runs lab/tools/NAME with python3 and matplotlib. @throws std::runtime_error if it fails.
 void draw(const std::string& name, const std::vector<std::string>& arguments);
 
 }  // namespace bki_mapping::tools

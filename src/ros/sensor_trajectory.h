@@ -15,8 +15,8 @@ class SensorTrajectory {
   /// Bounds the memory, also of a robot that drives round and round in its window: 15 km at 0.3 m.
   static constexpr std::size_t kMostPoses = 50'000;
 
-  /// Adds a pose; the oldest ones go when there are too many. Poses less than `step` apart are merged, so
-  /// that a robot that stands still adds one, not thousands. @param step [m].
+  /// Adds a pose; the oldest ones go when there are too many. A pose goes if those before and after it are
+  /// less than `step` apart, so that a robot that stands still has two, not thousands. @param step [m].
   void append(const SensorPose& pose, double step);
   /// Removes the poses outside of a cube. @param centre map frame [m]. @param edge [m].
   void keepWithin(const Eigen::Vector3d& centre, double edge);

@@ -38,7 +38,7 @@ struct alignas(64) BlockStates {
   };
 
   std::array<Layer, kBlockEdge> layers;
-  std::array<std::uint64_t, kBlockEdge> occluded{};  ///< no evidence, and an occlusion mark
+  std::array<std::uint64_t, kBlockEdge> occluded{};  ///< without evidence, with an occlusion mark
   std::array<ClassId, kBlockVoxels> labels;          ///< kFreeClass where not occupied
   const Block* block = nullptr;                      ///< the evidence
   bool any_occupied = false, any_free = false, all_free = false;

@@ -13,10 +13,10 @@ namespace bki_mapping {
 
 /// The state of a voxel. Files and messages use these values.
 enum class VoxelState : std::uint8_t {
-  kUnknown = 0,   ///< no evidence
-  kFree = 1,      ///< there is evidence, and StateRules do not keep the voxel occupied
+  kUnknown = 0,   ///< without evidence
+  kFree = 1,      ///< with evidence, but StateRules do not keep it occupied
   kOccupied = 2,  ///< StateRules keep it occupied; by default, if some class has the largest alpha (11)
-  kOccluded = 3,  ///< no evidence; the last scan to reach it saw it only beyond the ends of beams
+  kOccluded = 3,  ///< without evidence; the last scan to reach it saw it only beyond the ends of beams
 };
 
 /// A set of voxel states.
