@@ -1,7 +1,7 @@
 #include "ros/load_advice.h"
 
 #include <cmath>
-#include <vector>
+#include <optional>
 
 #include "bki_mapping/core/named_parameter.h"
 
@@ -20,16 +20,18 @@ struct Medians {
   double line_observed = 16.4;
 };
 
-/// The measured time of a mode [ms].
-double timeOf(const FreeSpaceConfig& free_space) {
+/// The measured time of a mode [ms]; nothing if it has not been measured.
+std::optional<double> timeOf(const FreeSpaceConfig& free_space) {
   const Medians measured;
   if (free_space.mode == "none") return measured.none;
   if (free_space.mode == "even") return measured.none + (measured.even - measured.none) / free_space.gap;
   if (free_space.mode == "line") {
     return free_space.extent == FreeSpaceExtent::kObserved ? measured.line_observed : measured.line_mapped;
   }
-  const double one = free_space.mode == "uniform" ? measured.uniform : measured.linear;
-  return one + (measured.linear_5 - measured.linear) / 4.0 * (free_space.samples_per_beam - 1);
+  const double more = (measured.linear_5 - measured.linear) / 4.0 * (free_space.samples_per_beam - 1);
+  if (free_space.mode == "uniform") return measured.uniform + more;
+  if (free_space.mode == "linear") return measured.linear + more;
+  return std::nullopt;
 }
 
 /// Times after a change, as fractions of the present time.
@@ -38,7 +40,8 @@ struct Savings {
   double nearer;   ///< half the maximum range
 };
 
-/// The centres of the ranges in docs/tuning.md; a test compares them.
+/// The centres of the ranges in docs/tuning.md; a test compares them. Modes that have not been measured count
+/// as samples.
 Savings savingsOf(const FreeSpaceConfig& free_space) {
   if (free_space.mode == "none") return {0.68, 0.76};
   if (free_space.mode != "line") return {0.63, 0.85};
@@ -74,14 +77,13 @@ std::string loadAdvice(const MapperConfig& config, double integration_ms, double
   mapped.extent = FreeSpaceExtent::kMapped;
   linear.mode = "linear";
   linear.samples_per_beam = 1;
-  const double now = timeOf(config.free_space);
-  if (config.free_space.mode == "line" && timeOf(mapped) < now) {
-    text += "; free_space/extent mapped about " + milliseconds(integration_ms * timeOf(mapped) / now);
-  }
-  if (timeOf(linear) < now) {
-    text += "; free_space/mode linear with one sample a beam about " +
-            milliseconds(integration_ms * timeOf(linear) / now);
-  }
+  const auto now = timeOf(config.free_space);
+  const auto advise = [&](const std::string& setting, const FreeSpaceConfig& other) {
+    if (!now || !(*timeOf(other) < *now)) return;
+    text += "; " + setting + " about " + milliseconds(integration_ms * *timeOf(other) / *now);
+  };
+  if (config.free_space.mode == "line") advise("free_space/extent mapped", mapped);
+  advise("free_space/mode linear with one sample a beam", linear);
   const double range = config.sensor_model.max_range;
   if (range > 0.0) {
     text += "; sensor_model/max_range " + numberText(range / 2.0) + " about " +

@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "free_space/free_space_model.h"
 #include "kinds.h"
 
 namespace bki_mapping::hostile {
@@ -62,9 +63,7 @@ const std::vector<std::string> kWords = {"free_space_mode", "free_space_weight",
 void setAllowed(Config& config, Dice& dice) {
   using Words = std::vector<std::string>;
   const auto sometimes = [&] { return dice.oneIn(3); };
-  if (sometimes())
-    set(config, "free_space_mode",
-        dice.oneOf<std::string>(Words{"none", "even", "uniform", "linear", "line"}));
+  if (sometimes()) set(config, "free_space_mode", dice.oneOf<std::string>(freeSpaceModes()));
   if (sometimes()) set(config, "free_space_gap", dice.between(0.3, 3.0));
   if (sometimes()) set(config, "free_space_samples_per_beam", static_cast<int>(1 + dice.below(4)));
   if (sometimes())
