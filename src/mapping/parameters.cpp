@@ -121,8 +121,7 @@ MapperConfig applied(const MapperConfig& config) {
   if (!config.rules.enabled) return result;
   result.prior = RulesConfig::kPrior;
   result.kernel.scale = RulesConfig::kPeak;
-  result.scan_limit = limitsOf(config.rules);
-  result.scan_limit.blocks = config.scan_limit.blocks;
+  result.scan_rules = ScanRules(config.rules);
   if (config.downsample_resolution > 0.0) {
     const double cells = std::round(config.resolution / config.downsample_resolution);
     result.downsample_resolution = config.resolution / std::max(cells, 2.0);

@@ -19,7 +19,7 @@
 #include "mapping/scan_preprocessor.h"
 #include "mapping/sensor_height.h"
 #include "points/point_evidence.h"
-#include "rules/scan_rules.h"
+#include "rules/class_sets.h"
 #include "update/map_updater.h"
 
 namespace bki_mapping {
@@ -118,25 +118,26 @@ struct SemanticMapper::Pipeline {
 
   Pipeline(const MapperConfig& asked, const GridGeometry& geometry, const ClassTable& classes)
       : config(applied(asked)),
-        rules(config.scan_limit, classes),
+        rules(config.scan_rules),
         preprocessor(config),
-        hits(geometry, config.kernel, config.scan_limit.asksForHits(),
-             config.scan_limit.static_spread ? ClassSet() : rules.fixed),
+        hits(geometry, config.kernel, rules.asksForHits(),
+             rules.static_spread ? ClassSet() : fixedClasses(classes)),
         beams(geometry, config.kernel, config.free_space.beam_index),
         free_space(
             makeFreeSpaceModel({config.free_space, geometry, config.kernel, config.downsample_resolution})),
         occlusion(config.occlusion),
         height(classes) {
-    rules.keeps_looks = config.rules.enabled && config.rules.latest;
+    rules.fixed = fixedClasses(classes);
   }
 
   /// The threshold of free space for a scan, whose hits the preprocessor holds.
-  double thresholdFor(const ScanView& scan) {
-    if (!config.rules.enabled) return config.scan_limit.free_threshold;
+  float thresholdFor(const ScanView& scan) {
+    if (!config.rules.enabled) return config.scan_rules.free_threshold;
     double above = scan.sensor_model.value_or(config.sensor_model).height;
     if (!(above > 0.0)) above = height.in(preprocessor.hitGroups());
-    if (!(above > 0.0)) return 0.0;
-    return groundThreshold(config.kernel.scale, config.kernel.lengthFor(config.resolution), above);
+    if (!(above > 0.0)) return 0.0f;
+    return static_cast<float>(
+        groundThreshold(config.kernel.scale, config.kernel.lengthFor(config.resolution), above));
   }
 };
 
@@ -315,7 +316,7 @@ ScanStats SemanticMapper::add(const ScanView& scan, bool withdraws) {
     p.occlusion.setField(field, std::clamp(range, 0.0, std::max(edge, 0.0)));
     evidence.occlusion = &p.occlusion;
   }
-  p.rules.free_threshold = static_cast<float>(p.thresholdFor(scan));
+  p.rules.free_threshold = p.thresholdFor(scan);
   stats.free_count = free.count;
   stats.evidence_ms = watch.lap();
 

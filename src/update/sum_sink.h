@@ -8,7 +8,7 @@
 
 #include "map/block_group.h"
 #include "parallel/thread_pool.h"
-#include "rules/scan_rules.h"
+#include "rules/apply_scan_rules.h"
 #include "update/sum_kernels.h"
 
 namespace bki_mapping {

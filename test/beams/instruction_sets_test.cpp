@@ -274,7 +274,7 @@ void expectPointsEqualBruteForce(const reference::Scene& scene) {
       MapperConfig config;
       config.downsample_resolution = 0.0;
       config.kernel.length = length;  // below, at and above a voxel
-      config.scan_limit.static_spread = spreads;
+      config.scan_rules.static_spread = spreads;
       const ClassSet confined = spreads ? 0b0000 : 0b1110;
       PointEvidence evidence(GridGeometry(config.resolution), config.kernel, false, confined, set);
       evidence.setPoints(scene.scan.origin, {&points}, pool);

@@ -205,13 +205,13 @@ TEST(Allocation, AFailureAnywhereInAScanLeavesTheMapAsItWas) {
       config.free_space.mode = mode;
       config.threads = 1;
       failEverywhere(config, fewPoints(0), fewPoints(1), on);
-      config.scan_limit.hits_before_misses = true;
-      config.scan_limit.hits = 0.2;
-      config.scan_limit.free = 1e-3;
-      config.scan_limit.free_threshold = 0.02;
-      config.scan_limit.void_space = 2.0;
+      config.scan_rules.hits_before_misses = true;
+      config.scan_rules.most_hits = 0.2f;
+      config.scan_rules.most_free = 1e-3f;
+      config.scan_rules.free_threshold = 0.02f;
+      config.scan_rules.void_evidence = 2.0f;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
-      config.scan_limit.static_spread = false;
+      config.scan_rules.static_spread = false;
       failEverywhere(config, fewPoints(0), fewPoints(2), on);
     }
   }

@@ -106,7 +106,7 @@ TEST_P(EveryScene, HitsBeforeMissesEqualsBruteForce) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;
-      config.scan_limit.hits_before_misses = true;
+      config.scan_rules.hits_before_misses = true;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, " + mode);
       config.kernel.length = 0.2;  // may reach no voxel centre
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", hits before misses, short, " + mode);
@@ -190,7 +190,7 @@ TEST_P(EveryScene, SoftLabelsEqualBruteForce) {
       config.kernel.length = length;
       expectEqualsBruteForce(scan, config, scene_.name + ", soft labels");
       if (scene_.name == "near the sensor") continue;  // nothing is left to clear there with what follows
-      config.scan_limit.hits_before_misses = true;
+      config.scan_rules.hits_before_misses = true;
       config.free_space.extent = FreeSpaceExtent::kMapped;
       config.downsample_resolution = 0.0;
       expectEqualsBruteForce(scan, config, scene_.name + ", soft labels, hits before misses");
@@ -203,8 +203,8 @@ TEST_P(EveryScene, LimitsOfAScanEqualBruteForce) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;
-      config.scan_limit.hits = kernel == KernelType::kSparse ? 0.05 : 1.0;
-      config.scan_limit.free = kernel == KernelType::kSparse ? 0.03 : 0.4;
+      config.scan_rules.most_hits = kernel == KernelType::kSparse ? 0.05f : 1.0f;
+      config.scan_rules.most_free = kernel == KernelType::kSparse ? 0.03f : 0.4f;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", limits, " + mode);
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
                              scene_.name + ", soft labels, limits, " + mode);
@@ -217,10 +217,10 @@ TEST_P(EveryScene, TheThresholdOfFreeSpaceEqualsBruteForce) {
     for (const KernelType kernel : {KernelType::kSparse, KernelType::kCounting}) {
       MapperConfig config = withMode(mode);
       config.kernel.type = kernel;
-      config.scan_limit.free_threshold = kernel == KernelType::kSparse ? 0.004 : 0.3;
+      config.scan_rules.free_threshold = kernel == KernelType::kSparse ? 0.004f : 0.3f;
       expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold, " + mode);
-      for (const double most : {0.02, 0.0005}) {  // above and below the threshold of the sparse kernel
-        config.scan_limit.free = most;
+      for (const float most : {0.02f, 0.0005f}) {  // above and below the threshold of the sparse kernel
+        config.scan_rules.most_free = most;
         expectEqualsBruteForce(scene_.scan, config, scene_.name + ", threshold and limit, " + mode);
       }
     }
@@ -263,16 +263,16 @@ TEST_P(EveryScene, HitsThatStayInTheirVoxelsEqualBruteForce) {
   const auto classes = reference::tableWithDynamicClass();
   for (const double length : {0.3, 0.2, 0.7}) {
     MapperConfig config = withMode("line");
-    config.scan_limit.static_spread = false;
+    config.scan_rules.static_spread = false;
     config.kernel.length = length;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", static hits stay", classes);
     expectEqualsBruteForce(withSoftLabels(scene_.scan), config, scene_.name + ", soft, static hits stay",
                            classes);
-    config.scan_limit.hits_before_misses = true;
-    config.scan_limit.hits = 0.05;
-    config.scan_limit.free = 1e-3;
-    config.scan_limit.free_threshold = 1.5e-3;
-    config.scan_limit.void_space = 0.5;
+    config.scan_rules.hits_before_misses = true;
+    config.scan_rules.most_hits = 0.05f;
+    config.scan_rules.most_free = 1e-3f;
+    config.scan_rules.free_threshold = 1.5e-3f;
+    config.scan_rules.void_evidence = 0.5f;
     if (scene_.name == "near the sensor") continue;  // nothing is left to clear there
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", static hits stay, rules", classes);
     if (scene_.name == "cluster") continue;  // in blocks that hold hits, nothing exceeds the threshold
@@ -290,7 +290,7 @@ std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
   for (const auto& entry : mapper.map().entries()) {
     const EvidenceUnits* const free = entry.block->evidence(kFreeClass);
     for (int v = 0; free && v < kBlockVoxels; ++v)
-      count += evidenceOf(free[v]) >= config.scan_limit.void_space;
+      count += evidenceOf(free[v]) >= config.scan_rules.void_evidence;
   }
   return count;
 }
@@ -298,13 +298,13 @@ std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
 TEST_P(EveryScene, VoidsEqualBruteForce) {
   for (const std::string mode : {"even", "line"}) {
     MapperConfig config = withMode(mode);
-    config.scan_limit.free = mode == "line" ? 1e-3 : 1e-4;
-    config.scan_limit.void_space = 0.5;
+    config.scan_rules.most_free = mode == "line" ? 1e-3f : 1e-4f;
+    config.scan_rules.void_evidence = 0.5f;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, " + mode);
-    config.scan_limit.free_threshold = 5.0 * config.scan_limit.free;
+    config.scan_rules.free_threshold = 5.0f * config.scan_rules.most_free;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, " + mode);
-    config.scan_limit.free_threshold = 0.0;
-    config.scan_limit.hits_before_misses = true;
+    config.scan_rules.free_threshold = 0.0f;
+    config.scan_rules.hits_before_misses = true;
     config.free_space.extent = FreeSpaceExtent::kMapped;
     if (scene_.name != "near the sensor") {
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
@@ -345,15 +345,15 @@ TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
     }
   }
   MapperConfig config = withMode("line");
-  config.scan_limit.free = 1e-3;
-  config.scan_limit.void_space = 0.5;
+  config.scan_rules.most_free = 1e-3f;
+  config.scan_rules.void_evidence = 0.5f;
   expectEqualsBruteForce(scan, config, "voids among dense beams");
   const std::size_t voids = countVoids(scan, config);
   EXPECT_GT(voids, 0u);
-  config.scan_limit.free_threshold = 1e3;  // above all that beams add
+  config.scan_rules.free_threshold = 1e3f;  // above all that beams add
   expectEqualsBruteForce(scan, config, "voids among dense beams, threshold");
   EXPECT_EQ(countVoids(scan, config), voids);
-  config.scan_limit.free = 0.0;  // nothing says what counts as seen empty
+  config.scan_rules.most_free = ScanRules().most_free;  // nothing says what counts as seen empty
   EXPECT_EQ(countVoids(scan, config), 0u);
 }
 

@@ -105,13 +105,13 @@ std::vector<std::pair<std::string, MapperConfig>> additiveConfigs() {
     config.kernel.type = KernelType::kCounting;
     configs.emplace_back(mode + ", counting", config);
     config.kernel.type = KernelType::kSparse;
-    config.scan_limit.hits_before_misses = true;
-    config.scan_limit.hits = 0.05;
-    config.scan_limit.free = 0.03;
-    config.scan_limit.free_threshold = 0.002;
-    config.scan_limit.void_space = 0.2;
+    config.scan_rules.hits_before_misses = true;
+    config.scan_rules.most_hits = 0.05f;
+    config.scan_rules.most_free = 0.03f;
+    config.scan_rules.free_threshold = 0.002f;
+    config.scan_rules.void_evidence = 0.2f;
     configs.emplace_back(mode + ", with rules and limits", config);
-    config.scan_limit.static_spread = false;
+    config.scan_rules.static_spread = false;
     configs.emplace_back(mode + ", with rules and hits that stay in their voxels", config);
     config.rules.enabled = true;
     configs.emplace_back(mode + ", with looks", config);
@@ -386,7 +386,7 @@ TEST(Laws, AReconfiguredMapperMapsOnAsOneMadeThatWay) {
   const std::vector<Scan> scans = someScans();
   MapperConfig other = configOf("linear");
   other.sensor_model.max_range = 2.0;
-  other.scan_limit.hits_before_misses = true;
+  other.scan_rules.hits_before_misses = true;
   SemanticMapper changed(configOf("line"), reference::smallTable()), made(other, reference::smallTable());
   changed.integrate(scans[0]);
   changed.reset();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "parallel/counter_random.h"
 #include "points/isolated_points.h"
@@ -208,8 +207,8 @@ void ScanReference::setThreshold(double height) {
     break;
   }
   if (!(height > 0.0)) return;
-  config_.scan_limit.free_threshold =
-      0.166 * config_.kernel.scale * config_.kernel.lengthFor(config_.resolution) / height;
+  config_.scan_rules.free_threshold = static_cast<float>(
+      0.166 * config_.kernel.scale * config_.kernel.lengthFor(config_.resolution) / height);
 }
 
 void ScanReference::drawSamples(std::uint64_t stamp) {
@@ -258,7 +257,7 @@ Value ScanReference::pointEvidence(const std::vector<Point>& points, const Voxel
 
 bool ScanReference::spreads(const SemanticClass& c) const {
   if (config_.kernel.type == KernelType::kCounting) return false;
-  return config_.scan_limit.static_spread || c.dynamic || c.unlabelled;
+  return config_.scan_rules.static_spread || c.dynamic || c.unlabelled;
 }
 
 Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c) const {
@@ -324,7 +323,7 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
         if (point.shareOf(c.id) != 0.0) hit |= spreads(c) ? near : inside;
       }
       // Rules that ask for hits count a block that holds one even if its kernel reaches no voxel centre.
-      hit |= config_.scan_limit.asksForHits() && inside;
+      hit |= config_.scan_rules.asksForHits() && inside;
       if (hit) break;
     }
   }
@@ -365,7 +364,7 @@ Value ScanReference::unlimited(const VoxelIndex& voxel, ClassId label) const {
     return hitEvidence(voxel, *std::find_if(classes_.begin(), classes_.end(), is_asked));
   }
   Value value = config_.free_space.mode == "line" ? lineEvidence(voxel) : pointEvidence(samples_, voxel, 255);
-  if (!config_.scan_limit.hits_before_misses) return value;
+  if (!config_.scan_rules.hits_before_misses) return value;
   const Value hits = anyHit(voxel);
   if (hits.slack > 0.0 || (hits.sum != 0.0 && hits.sum < 1e-6 * config_.kernel.scale))
     value.slack += value.sum;
@@ -397,7 +396,8 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
     if (outside <= kClose) holds = std::max(holds, outside < -kClose ? Answer::kYes : Answer::kUndecided);
   }
   const Value free = unlimited(voxel, kFreeClass);
-  const double above = free.sum - config_.scan_limit.free, tolerance = free.tolerance(scale);
+  const double above = free.sum - static_cast<double>(config_.scan_rules.most_free),
+               tolerance = free.tolerance(scale);
   Seen result = {Answer::kNo, Answer::kNo, Answer::kNo};
   const bool is_free = above > tolerance;
   if (close || (!fixed && !may_move && std::abs(above) <= tolerance)) {
@@ -445,27 +445,28 @@ ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
 
 Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {
   Value value = unlimited(voxel, label);
-  const ScanLimitConfig& limit = config_.scan_limit;
+  const ScanRules& rules = config_.scan_rules;
+  const double most_hits = rules.most_hits, most_free = rules.most_free, threshold = rules.free_threshold,
+               of_void = rules.void_evidence;
   if (label == kFreeClass) {
-    const double most = limit.free > 0.0 ? limit.free : std::numeric_limits<double>::infinity();
-    const double all = std::min(value.sum, most);
-    value.sum = std::min(std::max(value.sum - limit.free_threshold, 0.0), most);
-    if (limit.free_threshold > 0.0 && limit.free > 0.0) {  // it does not apply above a crossed voxel
+    const double all = std::min(value.sum, most_free);
+    value.sum = std::min(std::max(value.sum - threshold, 0.0), most_free);
+    if (threshold > 0.0 && std::isfinite(most_free)) {  // it does not apply above a crossed voxel
       const Value below = unlimited({{voxel.x, voxel.y, voxel.z - 1}}, kFreeClass);
       const double tolerance = below.tolerance(config_.kernel.scale);
-      if (std::abs(below.sum - limit.free) <= tolerance) value.slack += all - value.sum;
-      if (below.sum - limit.free > tolerance) value.sum = all;
+      if (std::abs(below.sum - most_free) <= tolerance) value.slack += all - value.sum;
+      if (below.sum - most_free > tolerance) value.sum = all;
     }
-    if (limit.void_space == 0.0 || limit.free == 0.0) return value;
+    if (of_void == 0.0 || !std::isfinite(most_free)) return value;
     const Answer is_void = isVoid(voxel);
-    if (is_void == Answer::kYes) value.sum += limit.void_space;
-    if (is_void == Answer::kUndecided) value.slack += limit.void_space;
+    if (is_void == Answer::kYes) value.sum += of_void;
+    if (is_void == Answer::kUndecided) value.slack += of_void;
     return value;
   }
-  if (limit.hits == 0.0) return value;
+  if (!std::isfinite(most_hits)) return value;
   const Value all = anyHit(voxel);
   if (all.slack > 0.0) value.slack += value.sum;
-  if (all.sum > limit.hits) value.sum *= limit.hits / all.sum;
+  if (all.sum > most_hits) value.sum *= most_hits / all.sum;
   return value;
 }
 

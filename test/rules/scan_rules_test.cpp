@@ -8,7 +8,7 @@
 
 #include "kernel/sparse_kernel.h"
 #include "map/blocks_by_group.h"
-#include "rules/scan_rules.h"
+#include "rules/apply_scan_rules.h"
 #include "update/sum_kernels.h"
 
 namespace bki_mapping {

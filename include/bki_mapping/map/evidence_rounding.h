@@ -1,5 +1,5 @@
-/// @file Evidence in fixed point, and the rounding to it. src/rules/scan_rules.h rounds what the rules of a
-/// scan leave of a sum, and src/update/sum_kernels_inl.h many sums at once, in the same way.
+/// @file Evidence in fixed point, and the rounding to it. src/rules/apply_scan_rules.h rounds what the rules
+/// of a scan leave of a sum, and src/update/sum_kernels_inl.h many sums at once, in the same way.
 #pragma once
 
 #include <algorithm>

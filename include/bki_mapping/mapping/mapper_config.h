@@ -12,6 +12,7 @@
 #include "bki_mapping/kernel/kernel_config.h"
 #include "bki_mapping/rules/rules_config.h"
 #include "bki_mapping/rules/scan_limit_config.h"
+#include "bki_mapping/rules/scan_rules.h"
 
 namespace bki_mapping {
 
@@ -27,6 +28,7 @@ struct MapperConfig {
   KernelConfig kernel;
   FreeSpaceConfig free_space;
   RulesConfig rules;
+  ScanRules scan_rules;  ///< follow from `rules` if these are enabled; no parameters
   ScanLimitConfig scan_limit;
   SensorModelConfig sensor_model;
   bool clear_beyond_max_range = true;  ///< beams of hits beyond max_range clear space up to there
@@ -37,7 +39,7 @@ struct MapperConfig {
 };
 
 /// The settings that apply, which are others than those given if rules.enabled: evidence counts scans, so
-/// that prior, kernel.scale and scan_limit follow from the rules, and down-sampling cells divide a voxel into
+/// that prior, kernel.scale and scan_rules follow from the rules, and down-sampling cells divide a voxel into
 /// whole parts, at least two along each edge, of about downsample_resolution.
 MapperConfig applied(const MapperConfig& config);
 

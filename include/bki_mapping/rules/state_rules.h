@@ -12,7 +12,7 @@
 
 namespace bki_mapping {
 
-/// What a voxel is, given its evidence and that around it: Equations 11 to 12c in docs/method.md. Only (11)
+/// What a voxel is, given its evidence and that around it; docs/method.md has the equations. Only (11)
 /// follows from the paper; by default no other rule applies. A value that does not change: `with...` returns
 /// another one.
 class StateRules {

@@ -78,8 +78,7 @@ enum class BlockFields {
 
 /// Reads all voxels of a block, many times as fast as one by one. States and labels are those of viewVoxel;
 /// the other fields differ from them by at most 1e-6 of their value.
-/// @param map that the block is part of: with StateRules::neighbourhoodRatio, states depend on the blocks
-/// around.
+/// @param map that the block is part of: states may depend on the blocks around it.
 void readBlock(const SemanticMap& map, const StateRules& rules, const BlockIndex& index, const Block& block,
                BlockFields fields, BlockView& view);
 

@@ -1,43 +1,15 @@
-/// @file The rules that are applied to the sums of a scan before they enter the map. (Limits of blocks and
-/// memory: UpdateLimits in update/map_updater.h.)
+/// @file Applies ScanRules to the sums of a scan before they enter the map. (Limits of blocks and memory:
+/// UpdateLimits in update/map_updater.h.)
 #pragma once
 
-#include <cmath>
 #include <cstdint>
-#include <limits>
 
-#include "bki_mapping/core/class_table.h"
-#include "bki_mapping/rules/scan_limit_config.h"
+#include "bki_mapping/rules/scan_rules.h"
 #include "rules/block_sums.h"
 #include "rules/limit_kernels.h"
 #include "rules/void_search.h"
 
 namespace bki_mapping {
-
-/// What one scan may add to a voxel: Equations 14 and 14a in docs/method.md, and which evidence for `free`
-/// counts. The paper has none of these rules; by default none applies. They apply to the whole scan, whatever
-/// kind its evidence is.
-struct ScanRules {
-  ScanRules() = default;
-  ScanRules(const ScanLimitConfig& config, const ClassTable& classes);
-
-  /// A voxel that contains a hit, or to which a hit adds evidence, takes no evidence for `free`.
-  bool hits_before_misses = false;
-  float most_hits = std::numeric_limits<float>::infinity();  ///< for all classes together
-  float most_free = std::numeric_limits<float>::infinity();
-  /// Of evidence for `free`, only what exceeds this counts, before most_free limits it, unless that of the
-  /// voxel below reaches most_free.
-  float free_threshold = 0.0f;
-  float void_evidence = 0.0f;  ///< added to `free` in void voxels (VoidSearch); 0: they count as others do
-  bool keeps_looks = false;    ///< note when the scan looked at which voxels (Looks)
-  ClassSet fixed;              ///< the classes that cannot move
-
-  /// Whether the threshold depends on the voxel below.
-  bool asksBelow() const { return free_threshold > 0.0f && std::isfinite(most_free); }
-  /// More evidence for `free` than this makes no difference.
-  float enoughFree() const { return free_threshold + most_free; }
-  bool seeksVoids() const { return void_evidence > 0.0f || keeps_looks; }
-};
 
 /// Evidence for `free` at the top and bottom of a block, where the threshold depends on a block of another
 /// group.
@@ -58,6 +30,11 @@ void applyToHits(const ScanRules& rules, const LimitKernels& kernels, BlockSums&
 /// whether or not it exceeds the threshold, if voids are sought or the threshold needs them.
 VoxelMask applyToFree(const ScanRules& rules, const LimitKernels& kernels, const VoxelMask& is_protected,
                       std::uint64_t below, BlockSums& free, BlockSeam* seam);
+
+/// ScanRules::free_threshold of a scan: the most that a beam which ends on level ground adds to a voxel whose
+/// centre is in the ground. @param peak, length [m] of the kernel. @param height of the sensor above the
+/// ground [m].
+double groundThreshold(double peak, double length, double height);
 
 /// A sum >= 0 in units, rounded as kernels round sums; larger ones count as the largest.
 EvidenceUnits roundedUnits(float sum);

@@ -1,11 +1,9 @@
-#include "rules/scan_rules.h"
+#include "rules/apply_scan_rules.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-
-#include "rules/class_sets.h"
 
 namespace bki_mapping {
 namespace {
@@ -67,25 +65,6 @@ double groundThreshold(double peak, double length, double height) {
   // The maximum of y k(y) over the height y above the ground: beams have the weight y / height there.
   constexpr double kMost = 0.166;
   return kMost * peak * length / height;
-}
-
-ScanLimitConfig limitsOf(const RulesConfig& rules) {
-  ScanLimitConfig limits;
-  limits.hits_before_misses = true;
-  limits.static_spread = false;
-  limits.hits = RulesConfig::kHit;
-  limits.free = RulesConfig::kCrossing;
-  limits.void_space = rules.emptiness();
-  return limits;
-}
-
-ScanRules::ScanRules(const ScanLimitConfig& config, const ClassTable& classes)
-    : hits_before_misses(config.hits_before_misses),
-      free_threshold(static_cast<float>(config.free_threshold)),
-      void_evidence(static_cast<float>(config.void_space)),
-      fixed(fixedClasses(classes)) {
-  if (config.hits > 0.0) most_hits = static_cast<float>(config.hits);
-  if (config.free > 0.0) most_free = static_cast<float>(config.free);
 }
 
 void applyToHits(const ScanRules& rules, const LimitKernels& kernels, BlockSums& hits,
