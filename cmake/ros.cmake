@@ -13,6 +13,9 @@ set(BKI_MAPPING_ROS_HEADERS
   <Eigen/Geometry> <dynamic_reconfigure/server.h> <memory> <mutex> <ros/ros.h> <sensor_msgs/PointCloud2.h> <string>
   <tf2_ros/buffer.h> <vector> <visualization_msgs/MarkerArray.h>)
 bki_mapping_precompile_files(bki_mapping_ros ${BKI_MAPPING_ROS_HEADERS})
+# What the programs that use these headers have from Boost: GCC would leave the headers unused if definitions differed.
+target_compile_definitions(bki_mapping_ros
+  PUBLIC $<BUILD_INTERFACE:$<TARGET_PROPERTY:Boost::program_options,INTERFACE_COMPILE_DEFINITIONS>>)
 add_dependencies(bki_mapping_ros ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 # Messages first: Ninja 1.11 would generate them after all other libraries, and one processor would wait for their headers.
 add_dependencies(bki_mapping_core ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
