@@ -21,12 +21,19 @@ endfunction()
 
 # Compiles several files as one, which reads their headers once, and optimises those less in which no scan is computed.
 option(BKI_MAPPING_JOIN "Make the first build fast: join files, which makes later ones slower, and optimise some less" OFF)
-option(BKI_MAPPING_JOIN_TESTS "The same for the unit tests of a room, which are then one program" ${BKI_MAPPING_JOIN})
+option(BKI_MAPPING_JOIN_TESTS "Join the unit tests of a room, which are then one program, and the files of the lab and of the Python module"
+  ${BKI_MAPPING_JOIN})
 function(bki_mapping_join_always)
   set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 14)
 endfunction()
 function(bki_mapping_join)
   if(BKI_MAPPING_JOIN)
+    bki_mapping_join_always(${ARGN})
+  endif()
+endfunction()
+# For what is outside of src: the lab and the Python module.
+function(bki_mapping_join_with_tests)
+  if(BKI_MAPPING_JOIN OR BKI_MAPPING_JOIN_TESTS)
     bki_mapping_join_always(${ARGN})
   endif()
 endfunction()
