@@ -141,8 +141,9 @@ bool CorrectedPoses::update(SentenceThrottle::Clock::time_point now) {
     use(*std::exchange(waiting_, nullptr));
   }
   const MapCorrector::Progress progress = corrector_.progress();
-  const bool finished = progress.done && !was_done_;
+  const bool finished = progress.done && !was_done_, done_around = progress.done_around && !was_done_around_;
   was_done_ = progress.done;
+  was_done_around_ = progress.done_around;
   if (finished && throttle_.allow("finished", now)) {
     if (progress.failed == 0) {
       ROS_INFO("All scans are where %s puts them", subscriber_.getTopic().c_str());
@@ -151,7 +152,7 @@ bool CorrectedPoses::update(SentenceThrottle::Clock::time_point now) {
                subscriber_.getTopic().c_str(), progress.fault.c_str());
     }
   }
-  return finished;
+  return finished || done_around;
 }
 
 void CorrectedPoses::fill(MappingStatus& status) const {

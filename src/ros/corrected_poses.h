@@ -42,8 +42,8 @@ class CorrectedPoses {
   void reset() { sensor_frames_.clear(); }
   /// Notes that tf has jumped between the map and a sensor. @param stamp of the first transform after it.
   void noteJump(const ros::Time& stamp);
-  /// Uses the last message, if it is time. @return whether there is news for the status: the last scan has
-  /// been moved, which it also logs.
+  /// Uses the last message, if it is time. @return whether there is news for the status: the map is right,
+  /// which it also logs, or is so around the robot.
   bool update(SentenceThrottle::Clock::time_point now);
   void fill(MappingStatus& status) const;
   /// What became of corrections, for the log; "" if there were none.
@@ -68,7 +68,7 @@ class CorrectedPoses {
   std::vector<std::string> sensor_frames_;
   std::string last_refusal_;
   std::uint64_t refused_ = 0;
-  bool was_done_ = true, said_forgotten_ = false;
+  bool was_done_ = true, was_done_around_ = true, said_forgotten_ = false;
   nav_msgs::PathConstPtr waiting_;            ///< the last message, until it is used
   SentenceThrottle::Clock::time_point used_;  ///< when the last one was
   SentenceThrottle throttle_;
