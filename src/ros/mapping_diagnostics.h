@@ -14,8 +14,8 @@ namespace bki_mapping::ros_interface {
 
 /// Assesses the time between two reports.
 /// - ERROR: clouds were received, and none was integrated.
-/// - WARN: clouds were dropped, mapping is paused or slower than clouds arrive, no cloud was received, the map
-///   stays empty although points are used, or particles or missing returns tell of bad weather.
+/// - WARN: clouds were dropped, mapping is paused or slower than clouds arrive, no cloud was received, the
+///   map stays empty although points are used, or particles or missing returns tell of bad weather.
 /// - The result of judgePoints for the points of integrated clouds.
 Health judge(const MappingStatus& before, const MappingStatus& now, const MapperConfig& config,
              const Health& points = {});
