@@ -48,7 +48,14 @@ class LiveDrive:
     def __init__(self, programs, map_file, parameters):
         devel = pathlib.Path(programs).resolve().parent.parent
         sys.path.insert(0, str(devel / 'lib/python3/dist-packages'))
-        self.processes = []
+        self.processes, self.node = [], None
+        try:
+            self.start(programs, map_file, parameters)
+        except BaseException:
+            self.close()
+            raise
+
+    def start(self, programs, map_file, parameters):
         if 'ROS_MASTER_URI' not in os.environ:
             port = free_port()
             os.environ.update(ROS_MASTER_URI=f'http://localhost:{port}', ROS_HOSTNAME='localhost')
@@ -141,7 +148,7 @@ class LiveDrive:
         self.close()
 
     def close(self):
-        if self.node.poll() is None:
+        if self.node and self.node.poll() is None:
             self.node.kill()
             self.node.wait()
         for process in self.processes:  # roscore, which ends its own processes

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "core/stopwatch.h"
@@ -171,10 +173,16 @@ void MapCorrector::markAll() {
   ++progress_.paths;
   progress_.largest_move = 0.0;
   progress_.done_around = false;
-  moves_before_looks_ = 0;
+  bool more = false;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
+    const bool was_off = journal_.at(n).off;
     mark(journal_.at(n));
+    more = more || (journal_.at(n).off && !was_off);
     progress_.largest_move = std::max(progress_.largest_move, ScanJournal::errorOf(journal_.at(n)));
+  }
+  if (more) {  // what is around the robot comes first again
+    dropLooks();
+    moves_before_looks_ = 0;
   }
   progress_.failed = 0;
   progress_.fault.clear();
@@ -206,7 +214,7 @@ MapCorrector::Progress MapCorrector::progress() const {
   progress.scans = journal_.size();
   progress.bytes = journal_.bytes();
   progress.forgotten = journal_.forgotten();
-  progress.done = progress.to_go == 0 && changed_regions_.empty() && !looks_;
+  progress.done = progress.to_go == 0 && changed_regions_.empty() && !looks_ && !moving_;
   progress.done_around = progress.done_around || progress.done;
   return progress;
 }
@@ -242,6 +250,7 @@ void MapCorrector::finish(const Eigen::Vector3d& robot) {
 template <typename Work>
 void MapCorrector::start(Work work) {
   running_ = true;
+  moving_ = std::is_same_v<Work, Moving>;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     job_ = Job{std::move(work), generation_, ""};
@@ -284,9 +293,10 @@ std::optional<MapCorrector::NextMove> MapCorrector::nextMove(const Eigen::Vector
     if (!scan.isPacked() || !scan.off) continue;
     const double metres = std::min((scan.wanted.translation() - robot).norm(),
                                    (scan.T_map_sensor.translation() - robot).norm());
+    const bool is_around = metres < scan.reach + kAround;
     const double distance = std::floor(metres / kEquallyNear);
-    if (next && distance > nearest) continue;
-    next = {n, metres < scan.reach + kAround};
+    if (next && (next->is_around == is_around ? distance > nearest : next->is_around)) continue;
+    next = {n, is_around};
     nearest = distance;
   }
   return next;
@@ -310,7 +320,8 @@ void MapCorrector::startMoving(Number newest) {
 
 double MapCorrector::distanceTo(const GridIndex& region, const Eigen::Vector3d& robot) const {
   const double edge = Region::kEdge * GridGeometry(config_->resolution).blockSize();
-  return (edge * (Eigen::Array3d(region.x, region.y, region.z) + 0.5).matrix() - robot).norm();
+  const Eigen::Vector3d low = edge * Eigen::Vector3d(region.x, region.y, region.z);
+  return Eigen::AlignedBox3d(low, low + Eigen::Vector3d::Constant(edge)).exteriorDistance(robot);
 }
 
 bool MapCorrector::areLooksDone(const Eigen::Vector3d& robot, double within) const {
@@ -336,10 +347,11 @@ bool MapCorrector::beginLooks(const Eigen::Vector3d& robot, double within) {
   std::map<GridIndex, std::set<Number>> moved;  // scans whose looks are known already
   for (const auto& [distance, region] : nearest) {
     MovedLooks::OfRegion known = moved_looks_.take(region);
+    if (journal_.foreign().count(region) == 0) {
+      (*looks_)[region] = std::move(known.looks);
+      moved[region] = std::move(known.scans);
+    }
     changed_regions_.erase(region);
-    if (journal_.foreign().count(region) > 0) continue;
-    (*looks_)[region] = std::move(known.looks);
-    moved[region] = std::move(known.scans);
   }
   rounds_ = 0;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
@@ -401,6 +413,7 @@ void MapCorrector::dropLooksOf(const std::vector<GridIndex>& regions) {
     changed_regions_.insert(region);
     if (looks_) looks_->erase(region);
   }
+  if (looks_ && looks_->empty()) dropLooks();
 }
 
 void MapCorrector::giveUpLooks(const std::string& fault) {
@@ -502,7 +515,11 @@ std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
     dropLooksOf(journal_.at(number).regions);
     moved_looks_.drop(number, journal_.at(number).regions);
   }
-  moved_looks_.add(std::move(moving.moved->looks), moving.numbers, moving.moved->regions);
+  try {
+    moved_looks_.add(std::move(moving.moved->looks), moving.numbers, moving.moved->regions);
+  } catch (const std::bad_alloc&) {
+    moved_looks_.clear();  // scans are looked through again
+  }
   moves_before_looks_ -= std::min(moves_before_looks_, moving.numbers.size());
   for (std::size_t n = 0; n < moving.numbers.size(); ++n) {
     JournalScan& scan = journal_.at(moving.numbers[n]);
@@ -523,7 +540,7 @@ std::optional<MapCorrector::Job> MapCorrector::takeDone() {
   if (!running_) return std::nullopt;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!job_done_) return std::nullopt;
-  running_ = false;
+  running_ = moving_ = false;
   return std::exchange(job_, std::nullopt);
 }
 

@@ -240,6 +240,7 @@ class MapCorrector {
   std::optional<Job> job_;
   bool job_done_ = false, stop_ = false;
   bool running_ = false;        ///< a job was started and not yet taken; of the mapper's thread
+  bool moving_ = false;         ///< and it moves scans
   bool alone_at_work_ = false;  ///< jobs are done by the mapper's thread, in finish()
   std::thread thread_;
 };
