@@ -130,8 +130,8 @@ class MapCorrector {
     std::uint64_t failed = 0;     ///< scans that cannot be moved to where they belong
     double largest_move = 0.0;    ///< of a point of a scan, by the last path [m]
     double scan_ms = 0.0;         ///< time of the thread for a scan, in the last moves [ms]
-    bool done_around = true;      ///< whether that holds within kAround of the robot
     bool done = true;             ///< whether the map is that of the corrected poses
+    bool done_around = true;      ///< whether it is so within kAround of the robot
     std::string fault;            ///< why the last failed scan cannot be moved
   };
   Progress progress() const;
