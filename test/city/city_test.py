@@ -20,7 +20,7 @@ import numpy as np
 import psutil
 from bki_mapping.city import report, work
 from bki_mapping.city.description import Bag, CityError, Drive, read_city
-from bki_mapping.city.plan import pieces_of, sums_of
+from bki_mapping.city.plan import has_same_poses, pieces_of, sums_of
 
 
 class Made(MadeCity):
@@ -102,6 +102,40 @@ class Made(MadeCity):
         whole = [piece.file for piece in pieces_of(read_city(self.describe(['d1'])), drive)]
         corrected.write_text('0 0 0 0 0 0 0 1\n')
         self.assertFalse({*whole} & {piece.file for piece in pieces_of(read_city(self.describe(['d1'])), drive)})
+
+    def test_poses_that_are_replaced_while_pieces_are_mapped(self):
+        """No piece is kept under the key of other poses: the city of either poses is right afterwards."""
+        drive, moved = self.folder / 'replaced', self.folder / 'moved.txt'
+        shutil.copytree(self.folder / 'd1', drive)
+        first = (drive / 'poses.txt').read_text()
+        rows = [[float(word) for word in line.split()] for line in first.splitlines()]
+        moved.write_text(''.join(' '.join(map(str, [*row[:3], row[3] + 1.0, *row[4:]])) + '\n' for row in rows))
+        programs = self.folder / 'replacing'
+        programs.mkdir()
+        for name in ('merge_maps', 'inspect_map'):
+            (programs / name).symlink_to(BIN / name)
+        (programs / 'map_sequence').write_text(f'#!/bin/sh\n{BIN}/map_sequence "$@" || exit\n'
+                                               f'case "$*" in *--drive*replaced*) cp {moved} {drive}/poses.txt;; esac\n')
+        (programs / 'map_sequence').chmod(0o755)
+        city = self.describe(['replaced', 'd2'])
+        pieces_before = pieces_of(read_city(city), read_city(city).drives[1])
+        self.assertTrue(all(map(has_same_poses, pieces_before)))
+        text = self.finish(self.start(city, '--workers', '1', '--no-picture', programs=programs), 1)
+        self.assertIn(f"drive 'replaced' is left out: {drive}/poses.txt was changed after map_city had read it; "
+                      'run the same command with --resume', text)
+        self.assertFalse(any(map(has_same_poses, pieces_before)))
+        self.expect_equal(['d2'], least=2)
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
+        self.expect_equal(['replaced', 'd2'])
+        (drive / 'poses.txt').write_text(first)
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
+        self.expect_equal(['d1', 'd2'])
+        # Stamped poses count by the time of their file.
+        (drive / 'poses.txt').write_text('0 0 0 0 0 0 0 1\n')
+        piece = pieces_of(read_city(city), read_city(city).drives[1])[0]
+        self.assertTrue(has_same_poses(piece))
+        os.utime(drive / 'poses.txt', (1, 1))
+        self.assertFalse(has_same_poses(piece))
 
     def test_a_broken_drive_is_named_and_left_out(self):
         broken = self.folder / 'broken'

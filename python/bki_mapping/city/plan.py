@@ -19,6 +19,7 @@ class Piece(NamedTuple):
     first: int  # number of the first scan
     scans: int
     file: str  # below the folder of the city
+    poses: str  # digest of what its key has of the file of poses; '' of a bag
 
     @property
     def id(self) -> str:
@@ -59,6 +60,19 @@ def matrices_in(path: pathlib.Path) -> Optional[List[str]]:
     return lines if all(len(line.split()) in (0, 12, 16) for line in lines) else None
 
 
+def poses_in_key(drive: Drive, rows: Optional[List[str]], numbers: Iterable[int]) -> List:
+    """What the key of a piece has of the file of poses. rows: matrices_in the file. numbers: of the scans."""
+    if rows is None:
+        return [str(drive.poses), stamps_of([drive.poses])]
+    return [rows[n] if n < len(rows) else '' for n in numbers]
+
+
+def has_same_poses(piece: Piece) -> bool:
+    """Whether the file of poses is, for the scans of a piece of a sequence, still as its key says."""
+    numbers = [number for number in scans_of(piece.drive) if number >= piece.first][:piece.scans]
+    return digest(poses_in_key(piece.drive, matrices_in(piece.drive.poses), numbers)) == piece.poses
+
+
 def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     """identity: what the programs say of themselves, because other versions may make other pieces. Raises CityError if the
     drive has no scans."""
@@ -67,7 +81,7 @@ def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     if drive.bag:
         source = [str(drive.bag.path), drive.bag[1:], stamps_of([drive.bag.path])]
         counts = {first: min(city.piece_scans, drive.clouds - first) for first in range(0, drive.clouds, city.piece_scans)}
-        return [piece_of(drive, first, count, source, settings, count) for first, count in counts.items()]
+        return [piece_of(drive, first, count, '', source, settings, count) for first, count in counts.items()]
     files = scans_of(drive)
     numbers = list(files)
     shared = [*filter(None, [drive.poses_in]), stamps_of([drive.folder / 'calib.txt', drive.folder / 'times.txt'])]
@@ -76,15 +90,16 @@ def pieces_of(city: City, drive: Drive, identity: str = '') -> List[Piece]:
     for begin in range(0, len(numbers), city.piece_scans):
         some = numbers[begin:begin + city.piece_scans]
         scans = stamps_of(files[number] for number in some)
-        poses = [str(drive.poses), stamps_of([drive.poses])] if rows is None else [rows[n] if n < len(rows) else '' for n in some]
+        poses = poses_in_key(drive, rows, some)
         labels = stamps_of(drive.folder / drive.labels / f'{files[number].stem}.label' for number in some)
-        pieces.append(piece_of(drive, some[0], len(some), str(drive.folder), drive.labels, shared, settings, scans, labels, poses))
+        pieces.append(piece_of(drive, some[0], len(some), digest(poses), str(drive.folder), drive.labels, shared, settings, scans,
+                               labels, poses))
     return pieces
 
 
-def piece_of(drive: Drive, first, scans, *parts) -> Piece:
+def piece_of(drive: Drive, first, scans, poses, *parts) -> Piece:
     """parts: what the content depends on, beside the drive's name."""
-    return Piece(drive, first, scans, f'pieces/{drive.name}/{first:06d}-{digest(drive.name, *parts)}.bkm')
+    return Piece(drive, first, scans, f'pieces/{drive.name}/{first:06d}-{digest(drive.name, *parts)}.bkm', poses)
 
 
 def account_of(piece_file: str) -> str:

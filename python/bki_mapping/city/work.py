@@ -19,8 +19,9 @@ import uuid
 from typing import NamedTuple
 
 from bki_mapping.city import plan
+from bki_mapping.city.description import CityError
 
-VERSION = 5  # of the tasks: a worker whose modules have another cannot do them
+VERSION = 6  # of the tasks: a worker whose modules have another cannot do them
 STOPPED = 130  # status of programs that SIGTERM or SIGINT has ended early
 FRAME = 'map'  # of the maps of map_sequence, with which those of bags are added
 TRIES = 3  # of a program that a signal ends, as when memory is short
@@ -125,8 +126,8 @@ def task(do):
         try:
             prepare(setup)
             found = do(setup, *arguments)
-        except Fault as fault:
-            found = {'fault': str(fault), 'of_worker': fault.of_worker}
+        except (Fault, CityError) as fault:
+            found = {'fault': str(fault), 'of_worker': isinstance(fault, Fault) and fault.of_worker}
         except OSError as error:  # such as a full disk; programs read the drives, so it is not about one of them
             found = {'fault': f'{error} on {socket.gethostname()}', 'of_worker': True}
         return dict(found, seconds=time.time() - begin)
@@ -266,7 +267,7 @@ def map_piece(setup, piece):
             path.unlink()
         try:
             ran = produce(setup, piece.file, lambda own: (map_bag if drive.bag else map_sequence)(setup, piece, own))
-        except Fault as fault:
+        except (Fault, CityError) as fault:
             if not drive.folder.exists():
                 raise unseen(drive.folder) from None
             raise fault
@@ -299,7 +300,10 @@ def map_sequence(setup, piece, own):
         arguments += ['--poses', drive.poses]
         if drive.poses_in:
             arguments += ['--poses-in', drive.poses_in]
-    return run(setup, 'map_sequence', arguments + of_piece(setup, piece, own), log_of_piece(piece))
+    ran = run(setup, 'map_sequence', arguments + of_piece(setup, piece, own), log_of_piece(piece))
+    if not plan.has_same_poses(piece):
+        raise Fault(f'{drive.poses} was changed after map_city had read it; run the same command with --resume')
+    return ran
 
 
 def map_bag(setup, piece, own):
