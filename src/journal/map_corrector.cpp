@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -15,29 +14,17 @@
 namespace bki_mapping {
 namespace {
 
-/// Scans that are packed, or looked through, at once.
-constexpr std::size_t kScansAtOnce = 4;
+/// Scans that are packed at once.
+constexpr std::size_t kPackedAtOnce = 4;
 /// Scans that are moved at once. More share the work of changing blocks, but hold up the mapper for longer
 /// when their difference is added.
 constexpr std::size_t kMovesAtOnce = 2;
 /// Scans of equal priority [m]: of those within this distance of each other, the newest are moved first.
 constexpr double kEquallyNear = 20.0;
-/// Regions whose looks are made at once: few, so that they need little memory.
-constexpr std::size_t kRegionsAtOnce = 256;
 /// Scans that may wait for being packed: a raw one takes ten times the memory.
 constexpr std::size_t kMostUnpacked = 20;
-/// Rounds after which the mapper's thread looks through the last scans itself, because more keep coming.
-constexpr int kPatience = 5;
-/// Time for replacing looks, before scans come first [ms].
-constexpr double kLooksMs = 3.0;
 /// Errors below are rounding [m].
 constexpr double kNoError = 1e-9;
-
-/// Whether any region is one of those of the looks.
-bool anyIn(const LooksByRegion& looks, const std::vector<GridIndex>& regions) {
-  return std::any_of(regions.begin(), regions.end(),
-                     [&](const GridIndex& region) { return looks.count(region) > 0; });
-}
 
 /// Equal, or both not a number.
 bool sameNumber(double a, double b) {
@@ -52,6 +39,7 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
       map_(std::move(map)),
       config_(std::make_shared<const MapperConfig>(config)),
       journal_(settings.memory, map_.fetch != nullptr),
+      looks_(config, journal_),
       mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
   if (!(settings_.quantum > 0.0)) settings_.quantum = usualQuantum(config.resolution);
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
@@ -100,11 +88,10 @@ void MapCorrector::addScan(SensorScan scan, std::size_t sensor, const Eigen::Iso
   entry.reach = reachOf(scan, config_->sensor_model);
   entry.regions = regionsOf(touched);
   entry.scan = std::make_shared<const SensorScan>(std::move(scan));
-  const bool seen = looks_ && anyIn(*looks_, entry.regions);
   const Number number = journal_.add(std::move(entry));
   unpacked_.push_back(number);
   changes_.added.push_back(number);
-  if (seen) to_look_.push_back(number);
+  looks_.noteAdded(number);
 }
 
 void MapCorrector::restore(JournalScan scan) {
@@ -121,8 +108,7 @@ void MapCorrector::reconfigure(const MapperConfig& config) {
 void MapCorrector::noteCleared(const Eigen::AlignedBox3d& box) {
   journal_.noteCleared(box);
   ++generation_;
-  dropLooks();
-  moved_looks_.clear();
+  looks_.noteCleared();
 }
 
 void MapCorrector::noteForeign(const std::vector<GridIndex>& regions) {
@@ -133,9 +119,7 @@ void MapCorrector::reset() {
   journal_.clear();
   changes_ = {};
   unpacked_.clear();
-  dropLooks();
-  moved_looks_.clear();
-  changed_regions_.clear();
+  looks_.reset();
   ++generation_;
   alone_ = false;
   progress_.to_go = progress_.failed = 0;
@@ -180,10 +164,7 @@ void MapCorrector::markAll() {
     more = more || (journal_.at(n).off && !was_off);
     progress_.largest_move = std::max(progress_.largest_move, ScanJournal::errorOf(journal_.at(n)));
   }
-  if (more) {  // what is around the robot comes first again
-    dropLooks();
-    moves_before_looks_ = 0;
-  }
+  if (more) looks_.noteCorrected();  // what is around the robot comes first again
   progress_.failed = 0;
   progress_.fault.clear();
   countToGo();
@@ -214,7 +195,7 @@ MapCorrector::Progress MapCorrector::progress() const {
   progress.scans = journal_.size();
   progress.bytes = journal_.bytes();
   progress.forgotten = journal_.forgotten();
-  progress.done = progress.to_go == 0 && changed_regions_.empty() && !looks_ && !moving_;
+  progress.done = progress.to_go == 0 && looks_.areDone() && !moving_;
   progress.done_around = progress.done_around || progress.done;
   return progress;
 }
@@ -224,8 +205,8 @@ std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot) {
   if (auto done = takeDone()) changed = take(*done);
   if (unpacked_.size() > kMostUnpacked) packNext();
   try {
-    if (isIdle() && looks_ && to_look_.empty()) {
-      const std::vector<GridIndex> looked_at = replaceLooks();
+    if (isIdle() && looks_.areMade()) {
+      const std::vector<GridIndex> looked_at = looks_.putInto(map_.replace_looks);
       changed.insert(changed.end(), looked_at.begin(), looked_at.end());
     }
     if (isIdle()) startNext(robot);
@@ -263,18 +244,17 @@ void MapCorrector::start(Work work) {
 void MapCorrector::startNext(const Eigen::Vector3d& robot) {
   if (startPacking()) return;
   const std::optional<NextMove> next = nextMove(robot);
-  progress_.done_around = !(next && next->is_around) && areLooksDone(robot, kAround);
+  progress_.done_around = !(next && next->is_around) && looks_.areDone(robot, kAround);
   if (!next && progress_.to_go > 0) countToGo();  // some have been forgotten
   if (!next && progress_.to_go == 0) startLooking(robot, std::numeric_limits<double>::infinity());
   if (!next || (!next->is_around && startLooking(robot, kAround))) return;
-  const bool replaces_looks = looks_ && to_look_.empty();
-  if ((replaces_looks && !next->is_around) || (map_.ready && !map_.ready())) return;
+  if ((looks_.areMade() && !next->is_around) || (map_.ready && !map_.ready())) return;
   startMoving(next->number);
 }
 
 bool MapCorrector::startPacking() {
   Packing packing;
-  while (!unpacked_.empty() && packing.scans.size() < kScansAtOnce) {
+  while (!unpacked_.empty() && packing.scans.size() < kPackedAtOnce) {
     const Number number = unpacked_.front();
     unpacked_.pop_front();
     if (journal_.has(number)) packing.scans.emplace_back(number, journal_.at(number).scan);
@@ -318,139 +298,28 @@ void MapCorrector::startMoving(Number newest) {
   start(std::move(moving));
 }
 
-double MapCorrector::distanceTo(const GridIndex& region, const Eigen::Vector3d& robot) const {
-  const double edge = Region::kEdge * GridGeometry(config_->resolution).blockSize();
-  const Eigen::Vector3d low = edge * Eigen::Vector3d(region.x, region.y, region.z);
-  return Eigen::AlignedBox3d(low, low + Eigen::Vector3d::Constant(edge)).exteriorDistance(robot);
-}
-
-bool MapCorrector::areLooksDone(const Eigen::Vector3d& robot, double within) const {
-  const auto is_near = [&](const GridIndex& region) { return distanceTo(region, robot) <= within; };
-  if (looks_ &&
-      std::any_of(looks_->begin(), looks_->end(), [&](const auto& of) { return is_near(of.first); })) {
-    return false;
-  }
-  return std::none_of(changed_regions_.begin(), changed_regions_.end(), is_near);
-}
-
-bool MapCorrector::beginLooks(const Eigen::Vector3d& robot, double within) {
-  std::vector<std::pair<double, GridIndex>> nearest;
-  for (const GridIndex& region : changed_regions_) {
-    const double distance = distanceTo(region, robot);
-    if (distance <= within) nearest.emplace_back(distance, region);
-  }
-  if (nearest.empty()) return false;
-  const std::size_t count = std::min(kRegionsAtOnce, nearest.size());
-  std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count), nearest.end());
-  nearest.resize(count);
-  looks_ = std::make_shared<LooksByRegion>();
-  std::map<GridIndex, std::set<Number>> moved;  // scans whose looks are known already
-  for (const auto& [distance, region] : nearest) {
-    MovedLooks::OfRegion known = moved_looks_.take(region);
-    if (journal_.foreign().count(region) == 0) {
-      (*looks_)[region] = std::move(known.looks);
-      moved[region] = std::move(known.scans);
-    }
-    changed_regions_.erase(region);
-  }
-  rounds_ = 0;
-  for (Number n = journal_.begin(); n < journal_.end(); ++n) {
-    const std::vector<GridIndex>& regions = journal_.at(n).regions;
-    const bool is_missing = std::any_of(regions.begin(), regions.end(), [&](const GridIndex& region) {
-      const auto known = moved.find(region);
-      return known != moved.end() && known->second.count(n) == 0;
-    });
-    if (is_missing) to_look_.push_back(n);
-  }
-  moves_before_looks_ = to_look_.size();
-  return true;
-}
-
 bool MapCorrector::startLooking(const Eigen::Vector3d& robot, double within) {
-  if (changed_regions_.empty() && !looks_) return false;
-  if (!config_->rules.enabled || !config_->rules.latest) {
-    changed_regions_.clear();  // there are no looks
-    return false;
-  }
-  const bool is_time = progress_.to_go == 0 || moves_before_looks_ == 0;
-  if (!looks_ && (!is_time || !beginLooks(robot, within))) return false;
-  const bool in_memory =
-      !to_look_.empty() && journal_.has(to_look_.front()) && journal_.at(to_look_.front()).packed;
-  if (in_memory && to_look_.size() <= kScansAtOnce && ++rounds_ > kPatience) {
-    lookAtNext();
-    return false;
-  }
-  Looking looking{{}, looks_};
-  for (; !to_look_.empty() && looking.scans.size() < kScansAtOnce; to_look_.pop_front()) {
-    if (!journal_.has(to_look_.front()) || !journal_.at(to_look_.front()).isKept()) continue;
-    if (!journal_.at(to_look_.front()).isPacked()) break;
-    looking.scans.push_back(journal_.placed(to_look_.front()));
-  }
-  if (looking.scans.empty()) return false;
-  start(std::move(looking));
+  std::optional<Looking> looking = looks_.next(robot, within, progress_.to_go == 0, *mover_);
+  if (!looking) return false;
+  start(std::move(*looking));
   return true;
-}
-
-void MapCorrector::lookAtNext() {
-  if (to_look_.empty()) return;
-  const Number number = to_look_.front();
-  if (journal_.has(number) && journal_.at(number).isKept()) {
-    if (!journal_.at(number).isPacked()) return;
-    mover_->addLooks(journal_.placed(number), *looks_);
-  }
-  to_look_.pop_front();
-}
-
-void MapCorrector::dropLooks() {
-  if (!looks_) return;
-  for (const auto& [region, looks] : *looks_) changed_regions_.insert(region);
-  looks_ = nullptr;
-  to_look_.clear();
-}
-
-void MapCorrector::dropLooksOf(const std::vector<GridIndex>& regions) {
-  for (const GridIndex& region : regions) {
-    changed_regions_.insert(region);
-    if (looks_) looks_->erase(region);
-  }
-  if (looks_ && looks_->empty()) dropLooks();
-}
-
-void MapCorrector::giveUpLooks(const std::string& fault) {
-  progress_.fault = fault;
-  if (!looks_) return;
-  std::vector<GridIndex> regions;
-  for (const auto& [region, looks] : *looks_) regions.push_back(region);
-  journal_.noteForeign(regions);
-  looks_ = nullptr;
-  to_look_.clear();
 }
 
 void MapCorrector::takeLooks(const Job& job, const Looking& looking) {
   if (job.fault.empty() || job.generation != generation_) return;
   if (job.unreadable) leaveWhereItIs(looking.scans[looking.done].number, job.fault);
-  if (job.unreadable) return dropLooks();
+  if (job.unreadable) return looks_.restart();
   giveUpLooks(job.fault);
+}
+
+void MapCorrector::giveUpLooks(const std::string& fault) {
+  progress_.fault = fault;
+  journal_.noteForeign(looks_.giveUp());
 }
 
 void MapCorrector::leaveWhereItIs(Number number, const std::string& fault) {
   progress_.fault = fault;
   journal_.leave(number);
-}
-
-std::vector<GridIndex> MapCorrector::replaceLooks() {
-  std::vector<GridIndex> changed;
-  Stopwatch watch;
-  for (double ms = 0.0; !looks_->empty() && ms < kLooksMs; ms += watch.lap()) {
-    const auto first = looks_->begin();
-    if (journal_.foreign().count(first->first) == 0) {
-      const std::vector<GridIndex> blocks = map_.replace_looks(first->first, first->second);
-      changed.insert(changed.end(), blocks.begin(), blocks.end());
-    }
-    looks_->erase(first);
-  }
-  if (looks_->empty()) looks_ = nullptr;
-  return changed;
 }
 
 std::vector<GridIndex> MapCorrector::take(Job& job) {
@@ -511,23 +380,13 @@ std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
     countToGo();
     return changed;
   }
-  for (const Number number : moving.numbers) {
-    dropLooksOf(journal_.at(number).regions);
-    moved_looks_.drop(number, journal_.at(number).regions);
-  }
-  try {
-    moved_looks_.add(std::move(moving.moved->looks), moving.numbers, moving.moved->regions);
-  } catch (const std::bad_alloc&) {
-    moved_looks_.clear();  // scans are looked through again
-  }
-  moves_before_looks_ -= std::min(moves_before_looks_, moving.numbers.size());
+  looks_.noteMoved(moving.numbers, *moving.moved);
   for (std::size_t n = 0; n < moving.numbers.size(); ++n) {
     JournalScan& scan = journal_.at(moving.numbers[n]);
     scan.T_map_sensor = moving.moves[n].to;
     changes_.moved.insert(moving.numbers[n]);
     mark(scan);
     scan.regions = std::move(moving.moved->regions[n]);
-    dropLooksOf(scan.regions);
   }
   alone_ = false;
   progress_.moved += moving.numbers.size();

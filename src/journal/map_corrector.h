@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "journal/moved_looks.h"
+#include "journal/corrected_looks.h"
 #include "journal/scan_journal.h"
 #include "journal/scan_mover.h"
 
@@ -36,10 +36,9 @@ struct CorrectedMap {
 ///
 /// Looks (rules/latest) cannot be subtracted. While scans move, a block keeps the looks at the old poses
 /// beside those at the new ones; when no scan near the robot is left to be moved, the looks of the changed
-/// regions there are made anew, and when none is left at all, those of the others. They come from the moves,
-/// if all scans of a region have moved (MovedLooks); others are looked through again. Where the map has
-/// evidence that is of no scan of the journal, from another map or a forgotten scan, the old looks stay; and
-/// where a box was cleared, intervals of looks may differ from those of a map made afresh.
+/// regions there are made anew, and when none is left at all, those of the others (CorrectedLooks). Where the
+/// map has evidence that is of no scan of the journal, from another map or a forgotten scan, the old looks
+/// stay; and where a box was cleared, intervals of looks may differ from those of a map made afresh.
 ///
 /// Not thread-safe; for the thread of the mapper.
 class MapCorrector {
@@ -153,11 +152,7 @@ class MapCorrector {
     std::optional<ScanMover::Moved> moved;
     double ms = 0.0;
   };
-  struct Looking {
-    std::vector<PlacedJournalScan> scans;
-    std::shared_ptr<LooksByRegion> to;
-    std::size_t done = 0;  ///< scans
-  };
+  using Looking = CorrectedLooks::Batch;
   struct Job {
     std::variant<Packing, Moving, Looking> work;
     std::uint64_t generation = 0;
@@ -194,19 +189,8 @@ class MapCorrector {
   void startMoving(Number newest);
   /// @param within only of regions within this distance of the robot [m].
   bool startLooking(const Eigen::Vector3d& robot, double within);
-  /// @return whether there are regions whose looks are to be made.
-  bool beginLooks(const Eigen::Vector3d& robot, double within);
-  double distanceTo(const GridIndex& region, const Eigen::Vector3d& robot) const;
-  bool areLooksDone(const Eigen::Vector3d& robot, double within) const;
-  /// Looks through one of the last scans in this thread.
-  void lookAtNext();
-  /// What has been made of the looks is out of date: all of it, or that of some regions.
-  void dropLooks();
-  void dropLooksOf(const std::vector<GridIndex>& regions);
   /// Gives up the looks that are being made: the old ones stay.
   void giveUpLooks(const std::string& fault);
-  /// Replaces the looks of some regions, which takes a moment.
-  std::vector<GridIndex> replaceLooks();
   /// Marks all scans after new poses were set.
   void markAll();
   /// Marks a scan as to be moved, or not, by where it is.
@@ -219,16 +203,7 @@ class MapCorrector {
   ScanJournal journal_;
   Changes changes_;
   std::deque<Number> unpacked_;
-  std::set<GridIndex> changed_regions_;  ///< whose looks must be made anew, without those of looks_
-  /// The looks of changed regions as far as they have been made; nullptr: none are being made. The thread
-  /// changes the looks, this one the set of regions, while the thread is idle.
-  std::shared_ptr<LooksByRegion> looks_;
-  std::deque<Number> to_look_;  ///< scans for looks_
-  MovedLooks moved_looks_;      ///< of regions in changed_regions_
-  /// Scans that are to be moved before looks around the robot are made again: else, on a robot that drives
-  /// on, those would take all the time.
-  std::size_t moves_before_looks_ = 0;
-  int rounds_ = 0;      ///< of jobs for the last few scans of looks_
+  CorrectedLooks looks_;
   bool alone_ = false;  ///< moves one scan at a time, because several have failed
   Progress progress_;
   std::uint64_t generation_ = 0;  ///< of what results of jobs may be added to the map
