@@ -29,10 +29,11 @@ bool anyIn(const LooksByRegion& looks, const std::vector<GridIndex>& regions) {
 
 }  // namespace
 
-CorrectedLooks::CorrectedLooks(const MapperConfig& config, const ScanJournal& journal)
+CorrectedLooks::CorrectedLooks(const MapperConfig& config, const ScanJournal& journal, std::size_t memory)
     : journal_(journal),
       edge_(Region::kEdge * GridGeometry(config.resolution).blockSize()),
-      has_looks_(config.rules.enabled && config.rules.latest) {}
+      has_looks_(config.rules.enabled && config.rules.latest),
+      moved_looks_(memory) {}
 
 void CorrectedLooks::noteAdded(Number scan) {
   if (looks_ && anyIn(*looks_, journal_.at(scan).regions)) to_look_.push_back(scan);

@@ -28,8 +28,9 @@ class CorrectedLooks {
  public:
   using Number = ScanJournal::Number;
 
-  /// @param config of the map. @param journal its scans; must outlive this.
-  CorrectedLooks(const MapperConfig& config, const ScanJournal& journal);
+  /// @param config of the map. @param journal its scans; must outlive this. @param memory limit of MovedLooks
+  /// [bytes].
+  CorrectedLooks(const MapperConfig& config, const ScanJournal& journal, std::size_t memory);
 
   /// Notes a scan that has come into the map, and into the journal.
   void noteAdded(Number scan);

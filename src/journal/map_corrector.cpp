@@ -39,7 +39,7 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
       map_(std::move(map)),
       config_(std::make_shared<const MapperConfig>(config)),
       journal_(settings.memory, map_.fetch != nullptr),
-      looks_(config, journal_),
+      looks_(config, journal_, settings.looks_memory),
       mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
   if (!(settings_.quantum > 0.0)) settings_.quantum = usualQuantum(config.resolution);
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;

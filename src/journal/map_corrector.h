@@ -47,6 +47,7 @@ class MapCorrector {
     double quantum = 0.0;     ///< to which points are rounded in the sensor's frame [m]; 0: usualQuantum()
     double tolerance = -1.0;  ///< scans that no point of which is farther off stay [m]; < 0: resolution / 10
     std::size_t memory = 0;   ///< of the packed scans in memory [bytes]; 0: no limit
+    std::size_t looks_memory = MovedLooks::kMostBytes;  ///< limit of MovedLooks [bytes]
   };
 
   /// 1 cm; with a resolution below 0.3 m, a hundredth of it, since rounding costs accuracy by their ratio

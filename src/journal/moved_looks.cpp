@@ -22,6 +22,7 @@ void MovedLooks::drop(Number scan, const std::vector<GridIndex>& regions) {
 
 void MovedLooks::add(LooksByRegion looks, const std::vector<Number>& scans,
                      const std::vector<std::vector<GridIndex>>& regions) {
+  if (bytes_ / 2 >= most_bytes_) return;
   for (std::size_t n = 0; n < scans.size(); ++n) {
     for (const GridIndex& region : regions[n]) {
       if (bytes_ < most_bytes_ || regions_.count(region) > 0) regions_[region].scans.insert(scans[n]);

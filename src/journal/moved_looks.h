@@ -22,7 +22,8 @@ class MovedLooks {
   };
 
   static constexpr std::size_t kMostBytes = 256 << 20;
-  /// @param bytes limit; regions that do not fit are left out.
+  /// @param bytes limit: once the looks take as much, those of other regions are left out, and at twice the
+  /// limit those of all. 0 keeps none.
   explicit MovedLooks(std::size_t bytes = kMostBytes) : most_bytes_(bytes) {}
 
   /// Forgets the regions with looks of a scan, which is about to leave them. @param regions that it touches.
@@ -33,6 +34,8 @@ class MovedLooks {
   /// Takes out what is known of a region; nothing, if that is unknown.
   OfRegion take(const GridIndex& region);
   void clear();
+
+  std::size_t bytes() const { return bytes_; }  ///< of the looks; their containers take a tenth more
 
  private:
   std::size_t most_bytes_, bytes_ = 0;

@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <random>
 
 #include "free_space/free_space_model.h"
 #include "journal/random_motion.h"
+#include "journal/scan_codec.h"
 #include "reference/content.h"
 #include "reference/scenes.h"
 
@@ -18,8 +20,11 @@ using Keyframes = std::vector<StampedMotion>;
 /// A mapper with a corrector, and what the law demands of its map.
 class Corrected {
  public:
-  explicit Corrected(const MapperConfig& config, MapCorrector::Settings settings = exactSettings())
+  /// @param in_file whether a map file has the scans, too.
+  explicit Corrected(const MapperConfig& config, MapCorrector::Settings settings = exactSettings(),
+                     bool in_file = false)
       : config_(config),
+        in_file_(in_file),
         mapper_(config, reference::tableWithDynamicClass()),
         corrector_(config, reference::tableWithDynamicClass(), settings,
                    {[this](SemanticMap difference) {
@@ -30,12 +35,18 @@ class Corrected {
                     },
                     [this](const GridIndex& region, const LooksByBlock& looks) {
                       return mapper_.replaceLooks(region, looks);
-                    }}) {}
+                    },
+                    {},
+                    in_file ? [this](std::uint64_t number) {
+                      ++fetched_;
+                      return packScan(scans_[number]);
+                    } : ScanMover::Fetch()}) {}
 
   void add(const Scan& scan, const Eigen::Isometry3d& pose, const Eigen::Isometry3d& odometry) {
     const RoundedScan rounded = corrector_.round(scan, pose);
     mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
     corrector_.addScan(rounded.scan, 0, rounded.T_map_sensor, odometry, mapper_.touchedBlocks());
+    if (in_file_) corrector_.noteStored(scans_.size());
     scans_.push_back(rounded.scan);
     poses_.push_back(rounded.T_map_sensor);
     odometry_.push_back({scan.stamp, odometry});
@@ -65,6 +76,8 @@ class Corrected {
   void finish() { corrector_.finish(Eigen::Vector3d::Zero()); }
 
   MapperConfig config_;
+  bool in_file_;
+  std::atomic<std::size_t> fetched_ = 0;  ///< scans, from the file
   SemanticMapper mapper_;
   MapCorrector corrector_;
   std::vector<SensorScan> scans_;
@@ -92,40 +105,42 @@ std::vector<std::pair<std::string, MapperConfig>> configs() {
 }
 
 /// Random scans, paths, and moments at which the corrector may work; scans come late, and out of order.
-TEST(MapCorrector, TheMapIsThatOfTheCorrectedPoses) {
-  for (const auto& [name, config] : configs()) {
-    std::mt19937 random(11);
-    Corrected map(config);
-    std::uint64_t stamp = 1'000'000'000;
-    Eigen::Isometry3d drift = Eigen::Isometry3d::Identity();
-    for (int step = 0; step < 40; ++step) {
-      if (random() % 8) {
-        stamp += 70'000'000 + random() % 300'000'000;
-        if (random() % 6 == 0) drift = drift * randomMotion(random, 0.3, 0.05);
-        Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
-        truth.translation() = Eigen::Vector3d(0.1 * step - 2.0, 0.3 * std::sin(step), 0.0);
-        const Eigen::Isometry3d pose = drift * truth;
-        const std::uint64_t late = random() % 5 ? stamp : stamp - 60'000'000;
-        map.add(roomScan(truth, late, random), pose, pose);
-      } else if (!map.scans_.empty()) {
-        Keyframes keyframes;
-        for (std::size_t n = random() % 3; n < map.scans_.size(); n += 1 + random() % 4) {
-          keyframes.push_back(
-              {map.scans_[n].stamp, randomMotion(random, 0.5, 0.1) * map.odometry_[n].motion});
-        }
-        map.correct(keyframes);
+void expectTheMapOfTheCorrectedPoses(const std::string& name, const MapperConfig& config,
+                                     const MapCorrector::Settings& settings = exactSettings()) {
+  std::mt19937 random(11);
+  Corrected map(config, settings);
+  std::uint64_t stamp = 1'000'000'000;
+  Eigen::Isometry3d drift = Eigen::Isometry3d::Identity();
+  for (int step = 0; step < 40; ++step) {
+    if (random() % 8) {
+      stamp += 70'000'000 + random() % 300'000'000;
+      if (random() % 6 == 0) drift = drift * randomMotion(random, 0.3, 0.05);
+      Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
+      truth.translation() = Eigen::Vector3d(0.1 * step - 2.0, 0.3 * std::sin(step), 0.0);
+      const Eigen::Isometry3d pose = drift * truth;
+      const std::uint64_t late = random() % 5 ? stamp : stamp - 60'000'000;
+      map.add(roomScan(truth, late, random), pose, pose);
+    } else if (!map.scans_.empty()) {
+      Keyframes keyframes;
+      for (std::size_t n = random() % 3; n < map.scans_.size(); n += 1 + random() % 4) {
+        keyframes.push_back({map.scans_[n].stamp, randomMotion(random, 0.5, 0.1) * map.odometry_[n].motion});
       }
-      if (random() % 2) map.corrector_.update(Eigen::Vector3d::Zero());
+      map.correct(keyframes);
     }
-    map.finish();
-    const MapCorrector::Progress progress = map.corrector_.progress();
-    EXPECT_TRUE(progress.done);
-    EXPECT_EQ(progress.failed, 0u) << progress.fault;
-    EXPECT_GT(progress.moved, 10u) << name;
-    EXPECT_EQ(progress.scans, map.scans_.size());
-    EXPECT_TRUE(map.content() == map.wanted(random)) << name;
-    EXPECT_EQ(map.mapper_.mapBytes(), map.mapper_.map().bytes());
+    if (random() % 2) map.corrector_.update(Eigen::Vector3d::Zero());
   }
+  map.finish();
+  const MapCorrector::Progress progress = map.corrector_.progress();
+  EXPECT_TRUE(progress.done);
+  EXPECT_EQ(progress.failed, 0u) << progress.fault;
+  EXPECT_GT(progress.moved, 10u) << name;
+  EXPECT_EQ(progress.scans, map.scans_.size());
+  EXPECT_TRUE(map.content() == map.wanted(random)) << name;
+  EXPECT_EQ(map.mapper_.mapBytes(), map.mapper_.map().bytes());
+}
+
+TEST(MapCorrector, TheMapIsThatOfTheCorrectedPoses) {
+  for (const auto& [name, config] : configs()) expectTheMapOfTheCorrectedPoses(name, config);
 }
 
 /// Poses a to d of a straight way, and a path that moves them to the left by a metre each.
@@ -179,14 +194,21 @@ TEST(MapCorrector, EachScanIsInTheMapOnceAtAnyMoment) {
   EXPECT_GT(between, 0u);
 }
 
-TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
-  constexpr double kStep = 10.0;  // between scans that see 8 m far [m]
-  std::mt19937 random(17);
-  Corrected map(withRules());
+TEST(MapCorrector, TheMemoryForLooksChangesNoBit) {
+  for (const std::size_t bytes : {0, 1, 200'000}) {
+    MapCorrector::Settings settings = exactSettings();
+    settings.looks_memory = bytes;
+    expectTheMapOfTheCorrectedPoses(std::to_string(bytes) + " bytes for looks", withRules(), settings);
+  }
+}
+
+/// Adds scans that see 8 m far, 10 m from each other.
+/// @return poses for them, moved to the left by a metre.
+Keyframes addStreet(Corrected& map, std::size_t count, std::mt19937& random) {
   Keyframes moved;
-  for (std::size_t n = 0; n < 30; ++n) {
+  for (std::size_t n = 0; n < count; ++n) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.translation().x() = kStep * static_cast<double>(n);
+    pose.translation().x() = 10.0 * static_cast<double>(n);
     const std::uint64_t stamp = 1'000'000'000 + 400'000'000 * n;
     Scan scan = roomScan(Eigen::Isometry3d::Identity(), stamp, random);
     scan.origin = pose.translation();
@@ -194,6 +216,36 @@ TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
     pose.translation().y() = 1.0;
     moved.push_back({stamp, pose});
   }
+  return moved;
+}
+
+/// Scans whose looks are not kept are read again, and looked through.
+TEST(MapCorrector, WithLessMemoryForLooksMoreScansAreLookedThrough) {
+  constexpr std::size_t kScans = 24;
+  const auto lookedThrough = [&](std::size_t bytes) {
+    MapCorrector::Settings settings = exactSettings();
+    settings.memory = 1;
+    settings.looks_memory = bytes;
+    std::mt19937 random(21);
+    Corrected map(withRules(), settings, true);
+    const Keyframes moved = addStreet(map, kScans, random);
+    map.finish();  // packs
+    map.correct(moved);
+    map.finish();
+    EXPECT_EQ(map.corrector_.progress().moved, kScans);
+    EXPECT_TRUE(map.content() == map.wanted(random)) << bytes;
+    return map.fetched_.load();
+  };
+  const std::size_t all = lookedThrough(0), some = lookedThrough(50'000);
+  EXPECT_GE(all, 2 * (kScans - 1));  // to be moved, and to be looked through; the last one is in memory
+  EXPECT_LT(some, all);
+  EXPECT_LT(lookedThrough(MovedLooks::kMostBytes), some);
+}
+
+TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
+  std::mt19937 random(17);
+  Corrected map(withRules());
+  const Keyframes moved = addStreet(map, 30, random);
   map.finish();  // packs
   EXPECT_TRUE(map.corrector_.progress().done_around);
   map.correct(moved);
