@@ -242,6 +242,44 @@ TEST(MapCorrector, WithLessMemoryForLooksMoreScansAreLookedThrough) {
   EXPECT_LT(lookedThrough(MovedLooks::kMostBytes), some);
 }
 
+/// Another path comes while scans far from the robot move, or when all have moved and the looks there are
+/// made.
+TEST(MapCorrector, APathThatComesBeforeFarLooksAreMadeWins) {
+  constexpr std::size_t kScans = 16;
+  std::size_t while_looking = 0;
+  for (const std::size_t bytes : {std::size_t{0}, MovedLooks::kMostBytes}) {
+    for (const auto& [moves, updates] : {std::pair(8, 0), {12, 0}, {16, 0}, {16, 1}, {16, 2}, {16, 4}}) {
+      MapCorrector::Settings settings = exactSettings();
+      settings.looks_memory = bytes;
+      std::mt19937 random(22);
+      Corrected map(withRules(), settings);
+      const Keyframes first = addStreet(map, kScans, random);
+      map.finish();  // packs
+      map.correct(first);
+      const Eigen::Vector3d robot = first.back().motion.translation();
+      const auto update = [&] {
+        map.corrector_.update(robot);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      };
+      while (map.corrector_.progress().moved < static_cast<std::size_t>(moves)) update();
+      for (int n = 0; n < updates; ++n) update();
+      const MapCorrector::Progress progress = map.corrector_.progress();
+      while_looking += progress.to_go == 0 && !progress.done;
+      Keyframes second;
+      for (std::size_t n = 0; n < first.size(); ++n) {  // some stay
+        second.push_back(first[n]);
+        if (n % 3 > 0) second.back().motion.translation().y() -= 1.7;
+      }
+      map.correct(second);
+      map.corrector_.finish(robot);
+      ASSERT_TRUE(map.corrector_.progress().done);
+      ASSERT_TRUE(map.content() == map.wanted(random))
+          << bytes << " bytes, after " << moves << " moves and " << updates << " updates";
+    }
+  }
+  EXPECT_GT(while_looking, 2u);
+}
+
 TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
   std::mt19937 random(17);
   Corrected map(withRules());
