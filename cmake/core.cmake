@@ -119,8 +119,8 @@ endif()
 
 # Scans as they were recorded, which follow corrected poses.
 bki_mapping_core_room(journal SOURCES
-    corrected_file.cpp corrected_looks.cpp corrected_path.cpp file_correction.cpp journal_output.cpp journal_writer.cpp kept_scans.cpp
-    map_corrector.cpp moved_looks.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp scan_mover.cpp scan_poses.cpp sensor_scan.cpp
-    stored_journal.cpp stored_settings.cpp
+    byte_planes.cpp corrected_file.cpp corrected_looks.cpp corrected_path.cpp file_correction.cpp journal_output.cpp journal_writer.cpp
+    kept_scans.cpp map_corrector.cpp moved_looks.cpp point_list.cpp point_order.cpp rigid_motion.cpp scan_codec.cpp scan_journal.cpp
+    scan_mover.cpp scan_poses.cpp sensor_scan.cpp stored_journal.cpp stored_settings.cpp
   LINK bki_mapping_sequence bki_mapping_store)
 target_link_libraries(bki_mapping_journal PRIVATE ZLIB::ZLIB)

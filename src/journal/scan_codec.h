@@ -15,8 +15,8 @@ class ScanDamaged : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Packs a scan. Neighbouring points of a lidar differ little, so differences are packed: 1.5 bytes a point
-/// of 64 rows at a quantum of 1 cm.
+/// Packs a scan: what is packed is how far each point is from where the one before in its row lets it be
+/// expected, 1.1 bytes a point of a lidar at a quantum of 1 cm.
 std::string packScan(const SensorScan& scan);
 
 /// Unpacks a scan. Takes memory in proportion to the bytes, whatever they say.

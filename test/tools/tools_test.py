@@ -3,6 +3,7 @@
 import array
 import contextlib
 import csv
+import io
 import itertools
 import json
 import math
@@ -55,17 +56,39 @@ def touched_tiles(packed):
 def unpacked(content):
     """The hits of a packed scan in quanta, and their labels."""
     begin, flags = struct.unpack_from('<II', content)
-    assert (begin, flags) == (0x31534b42, 0), 'only raw labels'
+    assert (begin, flags) == (0x32534b42, 0), 'only raw labels'
     hits, shares, directions, size = struct.unpack_from('<4I', content, 48)
-    assert (shares, size) == (0, len(content) - 64)
-    planes = zlib.decompress(content[64:])
-    assert len(planes) == 16 * hits + 12 * directions
+    assert (shares, directions, size) == (0, 0, len(content) - 96)
+    c, s, along_ray, by_rows, *widths, label_width, unused = struct.unpack_from('<2i6BH', content, 64)
+    assert unused == 0
+    stream = io.BytesIO(zlib.decompress(content[96:]))
 
-    def numbers(first):
-        each = [planes[(first + n) * hits:(first + n + 1) * hits] for n in range(4)]
-        return [a | b << 8 | c << 16 | d << 24 for a, b, c, d in zip(*each)]
-    axes = [itertools.accumulate(map(signed, numbers(4 * axis))) for axis in range(3)]
-    return list(zip(*axes)), numbers(12)
+    def numbers(planes):
+        each = [stream.read(hits) for _ in range(planes)]
+        return [sum(plane[n] << 8 * byte for byte, plane in enumerate(each)) for n in range(hits)]
+    rows = [sum_ % 256 for sum_ in itertools.accumulate(numbers(1 if by_rows else 0))]
+    order = sorted(range(hits), key=lambda n: rows[n])
+    first, low, second, third = (numbers(planes) for planes in (widths[0], 1, *widths[1:]))
+    points, labels = [None] * hits, [None] * hits
+    point = (0, 0, 0)
+    for n, *errors in zip(order, first, (l & 15 | e << 4 for l, e in zip(low, second)), (l >> 4 | e << 4 for l, e in zip(low, third))):
+        x, y, z = point
+        near = (c * x - s * y, s * x + c * y, 2**20 * z)
+        axes = sorted(range(3), key=lambda axis: -abs(near[axis])) if along_ray else [0, 1, 2]
+        axes = axes[:1] + sorted(axes[1:])
+        point = [None] * 3
+        for axis, error in zip(axes, errors):
+            if along_ray and axis != axes[0]:
+                of_ray = near[axes[0]]
+                guess = int(point[axes[0]] / of_ray * float(256 * near[axis])) + 128 >> 8 if of_ray else 0
+            else:
+                guess = near[axis] + 2**19 >> 20
+            point[axis] = guess + signed(error)
+        points[n] = tuple(point)
+    for n, label in zip(order, numbers(label_width)):
+        labels[n] = label
+    assert not stream.read()
+    return points, labels
 
 
 class Tools(ProgramTest):
