@@ -7,10 +7,8 @@ bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
 set_source_files_properties(lab/evaluation/octomap_mapper.cpp PROPERTIES COMPILE_DEFINITIONS NDEBUG SKIP_PRECOMPILE_HEADERS ON)
-bki_mapping_join_with_tests(bki_mapping_evaluation)
-if(NOT BKI_MAPPING_JOIN AND NOT BKI_MAPPING_JOIN_TESTS)
-  bki_mapping_precompile(bki_mapping_evaluation REUSE bki_mapping_settings)
-endif()
+bki_mapping_join(bki_mapping_evaluation)
+bki_mapping_precompile_files(bki_mapping_evaluation REUSE bki_mapping_settings)
 
 bki_mapping_program(lab/tools simulate_city bki_mapping_simulation)
 bki_mapping_program(lab/tools evaluate_map bki_mapping_evaluation pcl_filters)

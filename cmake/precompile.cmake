@@ -19,22 +19,11 @@ function(bki_mapping_precompile target)
   endif()
 endfunction()
 
-# Compiles several files as one, which reads their headers once, and optimises those less in which no scan is computed.
-option(BKI_MAPPING_JOIN "Make the first build fast: join files, which makes later ones slower, and optimise some less" OFF)
-option(BKI_MAPPING_JOIN_TESTS "Join the unit tests of a room, which are then one program, and the files of the lab and of the Python module"
-  ${BKI_MAPPING_JOIN})
-function(bki_mapping_join_always)
-  set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 14)
-endfunction()
+# Compiles several files as one, which reads their headers once.
+option(BKI_MAPPING_JOIN "Make the first build fast, and later ones slower: join files, and the unit tests of a room" OFF)
 function(bki_mapping_join)
   if(BKI_MAPPING_JOIN)
-    bki_mapping_join_always(${ARGN})
-  endif()
-endfunction()
-# For what is outside of src: the lab and the Python module.
-function(bki_mapping_join_with_tests)
-  if(BKI_MAPPING_JOIN OR BKI_MAPPING_JOIN_TESTS)
-    bki_mapping_join_always(${ARGN})
+    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 14)
   endif()
 endfunction()
 
@@ -46,18 +35,19 @@ function(bki_mapping_precompile_files target)
   endif()
 endfunction()
 
-# Joined, targets in which no scan is computed are compiled with -Og, which takes four fifths of the time of -O1. They may use
-# precompiled headers only of each other. export_map then takes half more processor time than with -O3; mapping takes as long as
-# before.
+# Compiles targets in which no scan is computed with -Og, which takes four fifths of the time of -O1. They may use precompiled
+# headers only of each other. Programs then take more processor time than with -O3: export_map half more, simulate_drive several
+# times as much, so that tests take longer than is saved. Mapping takes as long as before.
+option(BKI_MAPPING_LIGHT "Make the build fast: optimise less where no scan is computed" OFF)
 function(bki_mapping_light)
-  if(BKI_MAPPING_JOIN)
+  if(BKI_MAPPING_LIGHT)
     foreach(target ${ARGN})
       target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Og>)
     endforeach()
   endif()
 endfunction()
 
-# Joined: GCC looks for garbage from 128 MiB of memory on, in vain: it needs at most 1.7 GiB for any file.
+# Joined: GCC looks for garbage from 128 MiB of memory on, in vain: it needs at most 2.3 GiB for any file.
 if(BKI_MAPPING_JOIN AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options("SHELL:--param ggc-min-heapsize=1048576")
 endif()

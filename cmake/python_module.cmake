@@ -58,12 +58,10 @@ pybind11_add_module(bki_mapping_python MODULE NO_EXTRAS
 target_link_libraries(bki_mapping_python PRIVATE bki_mapping_city bki_mapping_export bki_mapping_journal)
 target_compile_options(bki_mapping_python PRIVATE -O1)  # the work is done in the libraries
 bki_mapping_warnings(bki_mapping_python)
-bki_mapping_join_with_tests(bki_mapping_python)
+bki_mapping_join(bki_mapping_python)
 bki_mapping_light(bki_mapping_python)
-if(NOT BKI_MAPPING_JOIN_TESTS)
-  bki_mapping_precompile_files(bki_mapping_python
-    <Eigen/Geometry> <map> <memory> <pybind11/numpy.h> <pybind11/pybind11.h> <pybind11/stl.h> <string> <vector>)
-endif()
+bki_mapping_precompile_files(bki_mapping_python
+  <Eigen/Geometry> <map> <memory> <pybind11/numpy.h> <pybind11/pybind11.h> <pybind11/stl.h> <string> <vector>)
 file(RELATIVE_PATH to_libraries /prefix/${BKI_MAPPING_PYTHON_DESTINATION} /prefix/${BKI_MAPPING_LIB_DESTINATION})
 set_target_properties(bki_mapping_python PROPERTIES OUTPUT_NAME _core CXX_VISIBILITY_PRESET hidden
   LIBRARY_OUTPUT_DIRECTORY ${BKI_MAPPING_PYTHON_BUILD} INSTALL_RPATH "$ORIGIN/${to_libraries}")

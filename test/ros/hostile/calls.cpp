@@ -1,7 +1,6 @@
 #include <sys/stat.h>
 
 #include <filesystem>
-#include <limits>
 #include <stdexcept>
 
 #include "free_space/free_space_model.h"
@@ -11,9 +10,6 @@ namespace bki_mapping::hostile {
 namespace {
 
 using dynamic_reconfigure::Config;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 void set(Config& config, const std::string& name, double value) {
   config.doubles.emplace_back();

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "kinds.h"
 
@@ -11,8 +10,6 @@ namespace {
 using sensor_msgs::PointCloud2;
 using sensor_msgs::PointField;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kMax = 0xffffffffu;
 
 std::size_t sizeOf(std::uint8_t datatype) {
@@ -273,7 +270,7 @@ std::vector<CloudKind> fieldKinds() {
   };
 }
 
-std::vector<CloudKind> valueKinds() {
+std::vector<CloudKind> cloudValueKinds() {
   const auto scattered = [](const std::vector<double>& values) {
     return [values](PointCloud2& c, Dice& dice) { scatter(c, dice, [&] { return dice.oneOf(values); }); };
   };
@@ -451,7 +448,7 @@ std::vector<CloudKind> labelKinds() {
   };
 }
 
-std::vector<CloudKind> timeKinds() {
+std::vector<CloudKind> cloudTimeKinds() {
   return {
       kind(
           "time/odd", "times of points that are NaN, infinite or years",
@@ -553,8 +550,8 @@ std::vector<CloudKind> headerKinds() {
 const std::vector<CloudKind>& cloudKinds() {
   static const std::vector<CloudKind> kinds = [] {
     std::vector<CloudKind> all;
-    for (const auto& part :
-         {honestKinds(), sizeKinds(), fieldKinds(), valueKinds(), labelKinds(), timeKinds(), headerKinds()}) {
+    for (const auto& part : {honestKinds(), sizeKinds(), fieldKinds(), cloudValueKinds(), labelKinds(),
+                             cloudTimeKinds(), headerKinds()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

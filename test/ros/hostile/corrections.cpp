@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "kinds.h"
 
@@ -8,9 +7,6 @@ namespace bki_mapping::hostile {
 namespace {
 
 using nav_msgs::Path;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 /// Poses near those of the last clouds, as a SLAM system would send them.
 Path honestPath(const ros::Time& stamp, Dice& dice) {

@@ -7,15 +7,11 @@
 #include <bki_mapping/QueryPoints.h>
 #include <ros/service.h>
 
-#include <limits>
-
 #include "kinds.h"
 
 namespace bki_mapping::hostile {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kFar = 1e6;  ///< the edge of a cube with more than 1e9 voxels [m]
 
 template <typename Message = geometry_msgs::Point>

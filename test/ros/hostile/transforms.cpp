@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 
 #include "kinds.h"
 
@@ -9,9 +8,6 @@ namespace {
 using geometry_msgs::TransformStamped;
 using Message = TransformKind::Message;
 using Messages = std::vector<Message>;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 ros::Time shifted(const ros::Time& stamp, double seconds) {
   return stamp + ros::Duration(seconds);
@@ -32,7 +28,7 @@ TransformKind one(const std::string& name, const std::string& sent, const Answer
           }};
 }
 
-std::vector<TransformKind> valueKinds() {
+std::vector<TransformKind> transformValueKinds() {
   return {
       one("tf/honest", "an honest transform", {"mapped"}, [](TransformStamped&, Dice&) {}),
       one("tf/translation_nan", "a translation that is NaN", {"bad transform"},
@@ -149,7 +145,7 @@ std::vector<TransformKind> treeKinds() {
   };
 }
 
-std::vector<TransformKind> timeKinds() {
+std::vector<TransformKind> transformTimeKinds() {
   return {
       one("tf/stamp_0", "a stamp of 0", {"transform late", "mapped"},
           [](TransformStamped& t, Dice&) { t.header.stamp = ros::Time(); }),
@@ -229,7 +225,7 @@ std::vector<TransformKind> timeKinds() {
 const std::vector<TransformKind>& transformKinds() {
   static const std::vector<TransformKind> kinds = [] {
     std::vector<TransformKind> all;
-    for (const auto& part : {valueKinds(), treeKinds(), timeKinds()}) {
+    for (const auto& part : {transformValueKinds(), treeKinds(), transformTimeKinds()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;
