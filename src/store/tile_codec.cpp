@@ -211,7 +211,7 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
     const bool marked = block->occlusion().any();
     if (planes == 0 && !marked) continue;
     if (marked) appendMask(marks_, block->occlusion());
-    const std::size_t looks = keeps_looks_ ? block->looks().all().size() : 0;
+    const std::size_t looks = keeps_looks_ ? block->looks().size() : 0;
     if (looks > 0) takeLooks(block->looks());
     numbers_ += static_cast<char>(number & 0xff);
     numbers_ += static_cast<char>(number >> 8);
@@ -403,7 +403,7 @@ void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
     const std::size_t flags = at(list, 3 * blocks + b);
     if (flags >> 1 > 0) {
       const Looks looks = looksAt(next_look, flags >> 1);
-      block.looks().reserve(looks.all().size());
+      block.looks().reserve(looks);
       block.looks().add(looks);
     }
     if ((flags & kMarked) != 0) {
