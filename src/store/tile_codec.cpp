@@ -3,9 +3,12 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <new>
 #include <stdexcept>
+
+#include "map/voxel_mask.h"
 
 namespace bki_mapping {
 namespace {
@@ -38,20 +41,15 @@ const Bytef* bytesOf(const std::string& text) {
   return reinterpret_cast<const Bytef*>(text.data());
 }
 
-void appendMask(std::string& bytes, const Block::Occlusion& marks) {
-  for (std::size_t v = 0; v < kBlockVoxels; v += 8) {
-    unsigned byte = 0;
-    for (unsigned bit = 0; bit < 8; ++bit) byte |= static_cast<unsigned>(marks[v + bit]) << bit;
-    bytes += static_cast<char>(byte);
-  }
+void appendMask(std::string& bytes, const VoxelMask& mask) {
+  const LayerBits bits = bitsOf(mask);
+  bytes.append(reinterpret_cast<const char*>(bits.data()), sizeof bits);
 }
 
-Block::Occlusion readMask(const char* bytes) {
-  Block::Occlusion marks;
-  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-    marks[v] = (static_cast<unsigned char>(bytes[v / 8]) >> v % 8 & 1) != 0;
-  }
-  return marks;
+VoxelMask readMask(const char* bytes) {
+  LayerBits bits;
+  std::memcpy(bits.data(), bytes, sizeof bits);
+  return maskOf(bits);
 }
 
 /// Fills a plane with values at the voxels of a mask, and with 0 elsewhere. @return the next unused value.
@@ -70,8 +68,7 @@ const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, Ev
 /// The streams of zlib, which take a quarter of a megabyte to set up.
 struct TileCodec::Zlib {
   Zlib() {
-    // Only runs of equal bytes repeat here; a search for longer matches costs time and gains nothing.
-    if (deflateInit2(&packing, 1, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
+    if (deflateInit2(&packing, kLevel, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
       throw std::bad_alloc();
     }
     if (inflateInit(&unpacking) != Z_OK) {
@@ -86,6 +83,22 @@ struct TileCodec::Zlib {
   Zlib(const Zlib&) = delete;
   Zlib& operator=(const Zlib&) = delete;
 
+  /// Compresses a section. @return the bytes that it takes; 0 if there is no room for them.
+  std::size_t pack(const std::string& bytes, Section section, Bytef* to, std::size_t room) {
+    deflateReset(&packing);
+    packing.avail_in = 0;  // older versions of zlib flush when parameters change
+    packing.next_out = to;
+    packing.avail_out = static_cast<uInt>(room);
+    // Of evidence, only runs of equal bytes repeat; a search for longer matches costs time and gains nothing.
+    // Of looks, whole masks do: beams reach a place alike in many intervals.
+    const bool is_looks = section == kLooks;
+    deflateParams(&packing, is_looks ? kLevelOfLooks : kLevel, is_looks ? Z_DEFAULT_STRATEGY : Z_RLE);
+    packing.next_in = const_cast<Bytef*>(bytesOf(bytes));
+    packing.avail_in = static_cast<uInt>(bytes.size());
+    return deflate(&packing, Z_FINISH) == Z_STREAM_END ? packing.total_out : 0;
+  }
+
+  static constexpr int kLevel = 1, kLevelOfLooks = 4;
   z_stream packing{}, unpacking{};
 };
 
@@ -173,16 +186,11 @@ std::size_t TileCodec::appendPacked(Section section) {
   const std::string& bytes = sections_[section];
   const std::size_t before = packed_.size();
   if (section != kList && !bytes.empty()) {
-    z_stream& stream = zlib_->packing;
-    deflateReset(&stream);
-    packed_.resize(before + bytes.size() - 1);  // room for a stream that is shorter than the section itself
-    stream.next_in = const_cast<Bytef*>(bytesOf(bytes));
-    stream.avail_in = static_cast<uInt>(bytes.size());
-    stream.next_out = bytesOf(packed_) + before;
-    stream.avail_out = static_cast<uInt>(bytes.size() - 1);
-    if (deflate(&stream, Z_FINISH) == Z_STREAM_END) {
-      packed_.resize(before + stream.total_out);
-      return stream.total_out;
+    const std::size_t room = bytes.size() - 1;  // for a stream that is shorter than the section itself
+    packed_.resize(before + room);
+    if (const std::size_t size = zlib_->pack(bytes, section, bytesOf(packed_) + before, room); size > 0) {
+      packed_.resize(before + size);
+      return size;
     }
     packed_.resize(before);
   }
