@@ -57,16 +57,15 @@ struct Looks::Packed {
     std::copy(high.begin(), high.end(), std::copy(low.begin(), low.end(), bits.begin()));
     return bits;
   }
-  /// The strongest sights of two looks, at the time of the first. Takes no more words than the two.
-  static Packed join(const StoredLook& a, const StoredLook& b) {
-    const Bits of_a = a.words(), of_b = b.words();
+  /// The strongest sights of two looks; no more words than the two have.
+  static Bits join(const Bits& a, const Bits& b) {
     Bits bits;
     for (std::size_t low = 0, high = kBlockEdge; low < kBlockEdge; ++low, ++high) {
-      const std::uint64_t hit = (of_a[low] & of_a[high]) | (of_b[low] & of_b[high]);
-      bits[high] = of_a[high] | of_b[high];
-      bits[low] = hit | ((of_a[low] | of_b[low]) & ~bits[high]);
+      const std::uint64_t hit = (a[low] & a[high]) | (b[low] & b[high]);
+      bits[high] = a[high] | b[high];
+      bits[low] = hit | ((a[low] | b[low]) & ~bits[high]);
     }
-    return {a.begin(), a.level(), bits};
+    return bits;
   }
 
   std::array<std::uint64_t, StoredLook::kMostWords> words;
@@ -98,7 +97,7 @@ void Looks::replace(std::size_t position, std::size_t count, const Packed& look)
   const auto rest = std::copy_n(look.words.begin(), common, begin);
   if (count > common) {
     words_.erase(rest, begin + static_cast<std::ptrdiff_t>(count));
-  } else {
+  } else if (look.size > common) {
     words_.insert(rest, look.words.begin() + common, look.words.begin() + look.size);
   }
 }
@@ -121,7 +120,7 @@ void Looks::coarsen() {
     const unsigned level = levelAt(newest, look.begin());
     const std::uint64_t begin = look.begin() >> level << level;
     if (end > 0 && before.begin() == begin && before.level() == level) {
-      const Packed joined = Packed::join(before, look);
+      const Packed joined(begin, level, Packed::join(before.words(), look.words()));
       end = last + joined.size;
       std::copy_n(joined.words.begin(), joined.size, words + last);
       continue;
@@ -136,14 +135,14 @@ void Looks::coarsen() {
 }
 
 void Looks::add(const Look& look) {
-  if (look.seen().none()) return;
-  const Packed packed(look);
+  const Packed::Bits bits = Packed::bitsOf(look);
+  if (std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return word == 0; })) return;
   if (!empty() && begin()->begin() == look.begin_ && look.level_ == 0) {
     const StoredLook latest = *begin();
-    replace(0, latest.size(), Packed::join(latest, StoredLook(packed.words.data())));
+    replace(0, latest.size(), Packed(look.begin_, 0, Packed::join(latest.words(), bits)));
     return;
   }
-  insert(packed);
+  insert(Packed(look.begin_, look.level_, bits));
   coarsen();
 }
 

@@ -182,6 +182,9 @@ class Looks {
   }
   void clear() noexcept { words_.clear(); }
 
+  /// Prefetches the latest look for writing.
+  void prefetch() const { __builtin_prefetch(words_.data(), 1); }
+
   bool operator==(const Looks& other) const { return words_ == other.words_; }
   std::size_t bytes() const { return words_.capacity() * sizeof(std::uint64_t); }
 
