@@ -13,8 +13,8 @@ def read_planes(file, part=0):
     as an array [z, y, x]."""
     database = sqlite3.connect(pathlib.Path(file).absolute().as_uri() + '?mode=ro', uri=True)
     (application,), (version,) = (database.execute(f'PRAGMA {name}').fetchone() for name in ('application_id', 'user_version'))
-    if application != 0x424b494d or version not in (1, 2, 3, 4):
-        raise ValueError(f'{file} is not a map file of version 1 to 4')
+    if application != 0x424b494d or version not in (1, 2, 3, 4, 5):
+        raise ValueError(f'{file} is not a map file of version 1 to 5')
     exponent, = database.execute('SELECT unit_exponent FROM map').fetchone()
     for z, y, x, blocks, planes, content in database.execute(
             'SELECT z, y, x, blocks, planes, content FROM tile WHERE part = ? ORDER BY z, y, x', (part,)):
@@ -25,7 +25,7 @@ def read_planes(file, part=0):
             data = content[position:position + lengths[number]]
             position += lengths[number]
             return numpy.frombuffer(data if len(data) == size else zlib.decompress(data), numpy.uint8)
-        listed = section(0, int(lengths[0]))  # ends with the levels of the looks
+        listed = section(0, int(lengths[0]))  # in versions 3 and 4, it ends with the levels of the looks
         numbers = listed[:2 * blocks].view('<u2').astype(int)  # signed: the index of a tile may be negative
         counts, marked = listed[2 * blocks:3 * blocks], listed[3 * blocks:4 * blocks] & 1
         masks = numpy.unpackbits(section(1, 64 * (int(marked.sum()) + planes)), bitorder='little').reshape(-1, 512)

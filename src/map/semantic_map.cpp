@@ -199,7 +199,7 @@ void SemanticMap::add(const SemanticMap& other) {
     for (const Entry& entry : other.entries()) {
       Block& block = getOrAllocate(entry.index);
       block.reserve(block.newClassesOf(*entry.block));
-      block.looks().reserve(entry.block->looks().all().size());
+      block.looks().reserve(entry.block->looks());
     }
   } catch (...) {
     for (const Entry& entry : other.entries()) {

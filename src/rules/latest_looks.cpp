@@ -8,21 +8,19 @@
 namespace bki_mapping {
 namespace {
 
-using LatestFirst = std::vector<Look>::const_reverse_iterator;
-
 /// The latest look of the visit before that of a look, or the end.
-LatestFirst visitBefore(LatestFirst look, LatestFirst end) {
-  for (; look != end; ++look) {
-    const LatestFirst before = look + 1;
-    if (before != end && before->level() >= kVisitLevel && before->level() >= look->level() + kVisitLevels)
-      return before;
+Looks::Iterator visitBefore(Looks::Iterator look, Looks::Iterator end) {
+  while (look != end) {
+    const unsigned level = look->level();
+    ++look;
+    if (look != end && look->level() >= kVisitLevel && look->level() >= level + kVisitLevels) return look;
   }
   return end;
 }
 
 /// Whether an earlier visit saw the voxel without a hit, so that its evidence for free is out of date.
-bool wasFreeBefore(LatestFirst hit, LatestFirst end, std::size_t offset) {
-  return std::any_of(visitBefore(hit, end), end, [&](const Look& look) {
+bool wasFreeBefore(Looks::Iterator hit, Looks::Iterator end, std::size_t offset) {
+  return std::any_of(visitBefore(hit, end), end, [&](const StoredLook& look) {
     const Sight sight = look.at(offset);
     return sight == Sight::kCrossed || sight == Sight::kVoid;
   });
@@ -43,37 +41,35 @@ std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t
 }  // namespace
 
 std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave) {
-  const auto& all = looks.all();
+  const Looks::Iterator end = looks.end();
   std::uint64_t crossed = 0;  // since the last hit, at most [ticks]
   int voids = 0;
-  auto look = all.rbegin();
-  for (; look != all.rend() && look->at(offset) != Sight::kHit; ++look) {
+  Looks::Iterator look = looks.begin();
+  for (; look != end; ++look) {
     const Sight sight = look->at(offset);
+    if (sight == Sight::kHit) break;
     if (sight != Sight::kNothing) crossed += look->length();
     voids += sight == Sight::kVoid;
   }
-  if (look == all.rend()) return kNotOverruled;
+  if (look == end) return kNotOverruled;
   if (crossed == 0) {
-    const bool has_stayed =
-        stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, all.rend(), offset));
+    const bool has_stayed = stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, end, offset));
     return look->level() == 0 || has_stayed ? kKept : kNotOverruled;
   }
   if (voids >= kVoidsToClear) return kCleared;
-  if (can_leave && crossed >= kCrossedToClear && visitBefore(all.rbegin(), all.rend()) <= look)
-    return kCleared;
+  if (can_leave && crossed >= kCrossedToClear && visitBefore(looks.begin(), end) <= look) return kCleared;
   return kNotOverruled;
 }
 
 bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled) {
-  const auto& all = block.looks().all();
-  Look::Voxels ever_hit, just_hit;
-  for (const Look& look : all) ever_hit |= look.hit();
-  if (ever_hit.none()) return false;
-  Look::Voxels undecided = ever_hit;
-  for (auto look = all.rbegin(); look != all.rend() && undecided.any(); ++look) {
-    if (look->level() == 0) just_hit |= undecided & look->hit();
-    undecided &= ~look->seen();
+  Look::Voxels ever_hit, just_hit, seen;
+  for (const StoredLook& stored : block.looks()) {
+    const Look look = stored.unpacked();
+    ever_hit |= look.hit();
+    if (look.level() == 0) just_hit |= look.hit() & ~seen;
+    seen |= look.seen();
   }
+  if (ever_hit.none()) return false;
   bool decides = false;
   const LayerBits hit = bitsOf(ever_hit);
   for (std::size_t layer = 0; layer < hit.size(); ++layer) {

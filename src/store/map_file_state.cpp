@@ -45,7 +45,7 @@ void MapFile::State::checkTotals() const {
 }
 
 TileCodec& MapFile::State::tileCodec() {
-  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes, version >= kFirstVersionWithLooks);
+  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes, looksLayoutOf(version));
   return *codec_;
 }
 

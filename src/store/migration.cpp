@@ -8,6 +8,8 @@
 #include "core/atomic_file.h"
 #include "store/records.h"
 #include "store/schema.h"
+#include "store/tile_codec.h"
+#include "store/tile_rows.h"
 
 namespace bki_mapping {
 namespace {
@@ -33,10 +35,39 @@ void toVersion4(Database& database) {
   writeTotals(database, 4, totals);
 }
 
+/// Tiles hold looks in another layout.
+void toVersion5(Database& database) {
+  Totals totals = readTotals(database, 4);
+  std::int64_t checksums = 0;
+  MapInfo info;
+  TableRow table;
+  readMapRow(database, 4, info, table);
+  info.classes = std::make_shared<const ClassTable>(
+      table.name, readClasses(database, totals.classes, checksums), table.label_mask);
+  TileCodec before(*info.classes, looksLayoutOf(4)), after(*info.classes, looksLayoutOf(5));
+  const GridIndex low{-kMostTileIndex, -kMostTileIndex, -kMostTileIndex},
+      high{kMostTileIndex, kMostTileIndex, kMostTileIndex};
+  for (const int part : readTileParts(database)) {
+    for (const TileEntry& entry : readTileRange(database, low, high, part)) {
+      const TileKey key{entry.index, part};
+      SemanticMap tile = info.emptyMap();
+      readTile(database, key, [&](const TileEntry&, const Statement::Bytes& content) {
+        const std::string fault = before.unpack(key, entry, content.data, content.size);
+        if (!fault.empty()) throw damaged(database.name(), nameOfTile(key) + ": " + fault);
+        before.addTo(tile, key);
+      });
+      eraseTile(database, key, totals);
+      insertTile(database, key, after.pack(tile, key), after.packed(), totals);
+    }
+  }
+  writeTotals(database, 5, totals);
+}
+
 /// All steps up to kFormatVersion. Whoever adds a version adds the step that leads to it, and a file of the
 /// previous version in test/store/data.
 const std::vector<MigrationStep>& allSteps() {
-  static const std::vector<MigrationStep> steps = {{1, toVersion2}, {2, toVersion3}, {3, toVersion4}};
+  static const std::vector<MigrationStep> steps = {
+      {1, toVersion2}, {2, toVersion3}, {3, toVersion4}, {4, toVersion5}};
   return steps;
 }
 

@@ -9,9 +9,11 @@ namespace bki_mapping {
 
 /// "BKIM", the application_id in the header of the file.
 constexpr std::int64_t kApplicationId = 0x424b494d;
-constexpr std::int64_t kFormatVersion = 4;
+constexpr std::int64_t kFormatVersion = 5;
 /// Before it, tiles have no looks (bki_mapping/map/looks.h).
 constexpr std::int64_t kFirstVersionWithLooks = 3;
+/// Before it, tiles hold looks with two bits for each voxel.
+constexpr std::int64_t kFirstVersionWithLookRows = 5;
 /// Before it, files have no journal (bki_mapping/store/scan_record.h).
 constexpr std::int64_t kFirstVersionWithJournal = 4;
 

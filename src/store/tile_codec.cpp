@@ -3,9 +3,15 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <new>
+#include <numeric>
 #include <stdexcept>
+#include <utility>
+
+#include "map/voxel_mask.h"
+#include "store/schema.h"
 
 namespace bki_mapping {
 namespace {
@@ -38,20 +44,15 @@ const Bytef* bytesOf(const std::string& text) {
   return reinterpret_cast<const Bytef*>(text.data());
 }
 
-void appendMask(std::string& bytes, const Block::Occlusion& marks) {
-  for (std::size_t v = 0; v < kBlockVoxels; v += 8) {
-    unsigned byte = 0;
-    for (unsigned bit = 0; bit < 8; ++bit) byte |= static_cast<unsigned>(marks[v + bit]) << bit;
-    bytes += static_cast<char>(byte);
-  }
+void appendMask(std::string& bytes, const VoxelMask& mask) {
+  const LayerBits bits = bitsOf(mask);
+  bytes.append(reinterpret_cast<const char*>(bits.data()), sizeof bits);
 }
 
-Block::Occlusion readMask(const char* bytes) {
-  Block::Occlusion marks;
-  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-    marks[v] = (static_cast<unsigned char>(bytes[v / 8]) >> v % 8 & 1) != 0;
-  }
-  return marks;
+VoxelMask readMask(const char* bytes) {
+  LayerBits bits;
+  std::memcpy(bits.data(), bytes, sizeof bits);
+  return maskOf(bits);
 }
 
 /// Fills a plane with values at the voxels of a mask, and with 0 elsewhere. @return the next unused value.
@@ -67,11 +68,15 @@ const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, Ev
 
 }  // namespace
 
+LooksLayout looksLayoutOf(std::int64_t version) {
+  if (version < kFirstVersionWithLooks) return LooksLayout::kNone;
+  return version < kFirstVersionWithLookRows ? LooksLayout::kMasks : LooksLayout::kRows;
+}
+
 /// The streams of zlib, which take a quarter of a megabyte to set up.
 struct TileCodec::Zlib {
   Zlib() {
-    // Only runs of equal bytes repeat here; a search for longer matches costs time and gains nothing.
-    if (deflateInit2(&packing, 1, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
+    if (deflateInit2(&packing, kLevel, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) {
       throw std::bad_alloc();
     }
     if (inflateInit(&unpacking) != Z_OK) {
@@ -86,11 +91,27 @@ struct TileCodec::Zlib {
   Zlib(const Zlib&) = delete;
   Zlib& operator=(const Zlib&) = delete;
 
+  /// Compresses a section. @return the bytes that it takes; 0 if there is no room for them.
+  std::size_t pack(const std::string& bytes, Section section, Bytef* to, std::size_t room) {
+    deflateReset(&packing);
+    packing.avail_in = 0;  // older versions of zlib flush when parameters change
+    packing.next_out = to;
+    packing.avail_out = static_cast<uInt>(room);
+    // Of evidence, only runs of equal bytes repeat; a search for longer matches costs time and gains nothing.
+    // Of looks, whole masks do: beams reach a place alike in many intervals.
+    const bool is_looks = section >= kLooks;
+    deflateParams(&packing, is_looks ? kLevelOfLooks : kLevel, is_looks ? Z_DEFAULT_STRATEGY : Z_RLE);
+    packing.next_in = const_cast<Bytef*>(bytesOf(bytes));
+    packing.avail_in = static_cast<uInt>(bytes.size());
+    return deflate(&packing, Z_FINISH) == Z_STREAM_END ? packing.total_out : 0;
+  }
+
+  static constexpr int kLevel = 1, kLevelOfLooks = 4;
   z_stream packing{}, unpacking{};
 };
 
-TileCodec::TileCodec(const ClassTable& classes, bool keeps_looks)
-    : keeps_looks_(keeps_looks), zlib_(std::make_unique<Zlib>()) {
+TileCodec::TileCodec(const ClassTable& classes, LooksLayout layout)
+    : layout_(layout), zlib_(std::make_unique<Zlib>()) {
   for (const SemanticClass& c : classes.classes()) allowed_[c.id] = true;
   allowed_[kFreeClass] = true;
 }
@@ -102,7 +123,9 @@ void TileCodec::clear() {
                              &evidence_masks_, &begins_, &look_masks_}) {
     piece->clear();
   }
-  looks_ = 0;
+  look_rows_.clear();
+  look_counts_.clear();
+  looks_.clear();
   values_.clear();
   packed_.clear();
   blocks_ = 0;
@@ -129,7 +152,7 @@ bool TileCodec::takePlane(const EvidenceUnits* units) {
   return after != before;
 }
 
-void TileCodec::takeLooks(const Looks& looks) {
+void TileCodec::takeMasks(const Looks& looks) {
   for (const Look& look : looks.all()) {
     levels_ += static_cast<char>(look.level());
     for (unsigned shift = 0; shift < 8 * kBeginBytes; shift += 8) {
@@ -173,16 +196,11 @@ std::size_t TileCodec::appendPacked(Section section) {
   const std::string& bytes = sections_[section];
   const std::size_t before = packed_.size();
   if (section != kList && !bytes.empty()) {
-    z_stream& stream = zlib_->packing;
-    deflateReset(&stream);
-    packed_.resize(before + bytes.size() - 1);  // room for a stream that is shorter than the section itself
-    stream.next_in = const_cast<Bytef*>(bytesOf(bytes));
-    stream.avail_in = static_cast<uInt>(bytes.size());
-    stream.next_out = bytesOf(packed_) + before;
-    stream.avail_out = static_cast<uInt>(bytes.size() - 1);
-    if (deflate(&stream, Z_FINISH) == Z_STREAM_END) {
-      packed_.resize(before + stream.total_out);
-      return stream.total_out;
+    const std::size_t room = bytes.size() - 1;  // for a stream that is shorter than the section itself
+    packed_.resize(before + room);
+    if (const std::size_t size = zlib_->pack(bytes, section, bytesOf(packed_) + before, room); size > 0) {
+      packed_.resize(before + size);
+      return size;
     }
     packed_.resize(before);
   }
@@ -211,8 +229,9 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
     const bool marked = block->occlusion().any();
     if (planes == 0 && !marked) continue;
     if (marked) appendMask(marks_, block->occlusion());
-    const std::size_t looks = keeps_looks_ ? block->looks().all().size() : 0;
-    if (looks > 0) takeLooks(block->looks());
+    const std::size_t looks = layout_ == LooksLayout::kNone ? 0 : block->looks().size();
+    if (looks > 0 && layout_ == LooksLayout::kMasks) takeMasks(block->looks());
+    if (looks > 0 && layout_ == LooksLayout::kRows) look_rows_.add(block->looks());
     numbers_ += static_cast<char>(number & 0xff);
     numbers_ += static_cast<char>(number >> 8);
     plane_counts_ += static_cast<char>(planes);
@@ -223,7 +242,11 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
   if (entry.blocks == 0) return entry;
   sections_[kList] = numbers_ + plane_counts_ + flags_ + classes_ + levels_;
   sections_[kMasks] = marks_ + evidence_masks_;
-  sections_[kLooks] = begins_ + look_masks_;
+  LookSections rows = look_rows_.finish();
+  sections_[kLooks] = begins_ + look_masks_ + rows.heads;
+  sections_[kSeen] = std::move(rows.seen);
+  sections_[kVoids] = std::move(rows.voids);
+  sections_[kHits] = std::move(rows.hits);
   splitValues();
   entry.checksum = checksum(key, entry);
   packed_.assign(kLooks * kLengthBytes, '\0');
@@ -236,30 +259,33 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
   for (std::size_t section = 0; section < kLooks; ++section) {
     append(static_cast<Section>(section), section * kLengthBytes);
   }
-  if (!sections_[kLooks].empty()) {
+  if (sections_[kLooks].empty()) return entry;
+  for (std::size_t section = kLooks; section < endOfSections(); ++section) {
     const std::size_t length_at = packed_.size();
     packed_.append(kLengthBytes, '\0');
-    append(kLooks, length_at);
+    append(static_cast<Section>(section), length_at);
   }
   return entry;
 }
 
-std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked, std::size_t& looks) const {
+std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked) {
   const std::string& list = sections_[kList];
   const auto blocks = static_cast<std::size_t>(entry.blocks);
   const std::size_t end_of_classes = 4 * blocks + static_cast<std::size_t>(entry.planes);
   std::size_t next_class = 4 * blocks;
   int last_number = -1;
-  marked = looks = 0;
+  marked = 0;
+  std::size_t levels = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     const int number = at(list, 2 * b) | at(list, 2 * b + 1) << 8;
     if (number <= last_number || number >= Region::kBlocks) return "its blocks are out of order";
     last_number = number;
     const std::size_t planes = at(list, 2 * blocks + b), flags = at(list, 3 * blocks + b);
     if (planes + (flags & kMarked) == 0) return "a block is empty";
-    if (flags > kMarked && !keeps_looks_) return "a flag is not known";
+    if (flags > kMarked && layout_ == LooksLayout::kNone) return "a flag is not known";
     marked += flags & kMarked;
-    looks += flags >> 1;
+    if (flags > kMarked) look_counts_.push_back(flags >> 1);
+    if (layout_ == LooksLayout::kMasks) levels += flags >> 1;
     if (planes > end_of_classes - next_class) return "planes are missing";
     for (std::size_t p = next_class; p < next_class + planes; ++p) {
       if (p > next_class && at(list, p) <= at(list, p - 1)) return "its planes are out of order";
@@ -268,30 +294,38 @@ std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked, st
     next_class += planes;
   }
   if (next_class < end_of_classes) return "planes are left over";
-  return end_of_classes + looks == list.size() ? "" : "it has another number of looks";
+  return end_of_classes + levels == list.size() ? "" : "it has another number of looks";
 }
 
-Looks TileCodec::looksAt(std::size_t& next, std::size_t count) const {
+Looks TileCodec::masksAt(std::size_t& next, std::size_t count) const {
   const std::string &list = sections_[kList], &section = sections_[kLooks];
-  const std::size_t first_level = list.size() - looks_;
+  const std::size_t all = section.size() / kLookBytes, first_level = list.size() - all;
   Looks looks;
-  looks.reserve(count);
   for (const std::size_t end = next + count; next < end; ++next) {
     std::uint64_t begin = 0;
     for (std::size_t i = 0; i < kBeginBytes; ++i) {
       begin |= std::uint64_t{at(section, next * kBeginBytes + i)} << 8 * i;
     }
-    const char* const masks = section.data() + looks_ * kBeginBytes + 2 * kMaskBytes * next;
+    const char* const masks = section.data() + all * kBeginBytes + 2 * kMaskBytes * next;
     looks.append(Look(begin, at(list, first_level + next), readMask(masks), readMask(masks + kMaskBytes)));
   }
   return looks;
 }
 
-std::string TileCodec::checkLooks(const TileEntry& entry, std::size_t looks) const {
-  const auto blocks = static_cast<std::size_t>(entry.blocks);
+std::string TileCodec::readLooks() {
+  LookRowsReader rows(look_counts_, sections_[kLooks], sections_[kSeen], sections_[kVoids], sections_[kHits]);
   std::size_t next = 0;
-  for (std::size_t b = 0; b < blocks && next < looks; ++b) {
-    if (!looksAt(next, at(sections_[kList], 3 * blocks + b) >> 1).isCanonical()) return "its looks are wrong";
+  for (const std::size_t count : look_counts_) {
+    Looks looks;
+    bool is_right = true;
+    if (layout_ == LooksLayout::kRows) {
+      is_right = rows.read(looks);
+    } else {
+      looks = masksAt(next, count);
+    }
+    if (!is_right || !looks.isCanonical()) return "its looks are wrong";
+    looks.shrink();
+    looks_.push_back(std::move(looks));
   }
   return "";
 }
@@ -333,11 +367,12 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
 
   if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
   const std::size_t blocks = static_cast<std::size_t>(entry.blocks),
-                    least = 4 * blocks + static_cast<std::size_t>(entry.planes), listed = read32(bytes);
-  if (listed < least || listed > least + kMostLooks * blocks) return "a length is wrong";
+                    least = 4 * blocks + static_cast<std::size_t>(entry.planes), listed = read32(bytes),
+                    most_levels = layout_ == LooksLayout::kRows ? 0 : kMostLooks * blocks;
+  if (listed < least || listed > least + most_levels) return "a length is wrong";
   std::string fault = take(kList, listed);
-  std::size_t marked = 0, looks = 0;
-  if (fault.empty()) fault = checkList(entry, marked, looks);
+  std::size_t marked = 0;
+  if (fault.empty()) fault = checkList(entry, marked);
   if (fault.empty()) fault = take(kMasks, kMaskBytes * (marked + static_cast<std::size_t>(entry.planes)));
   if (!fault.empty()) return fault;
   std::size_t values = 0;
@@ -352,13 +387,24 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
   for (std::size_t section = kByte0; section < kLooks && fault.empty(); ++section) {
     fault = take(static_cast<Section>(section), values);
   }
-  sections_[kLooks].clear();
-  if (fault.empty() && looks > 0) {
+  for (const Section section : {kLooks, kSeen, kVoids, kHits}) sections_[section].clear();
+  const auto takeNext = [&](Section section, std::size_t wanted) -> std::string {
     if (left < kLengthBytes) return "it is too short";
     const std::size_t length = read32(next);
     next += kLengthBytes;
     left -= kLengthBytes;
-    fault = takeOf(kLooks, length, kLookBytes * looks);
+    return takeOf(section, length, wanted);
+  };
+  if (fault.empty() && !look_counts_.empty() && layout_ == LooksLayout::kMasks) {
+    fault = takeNext(kLooks,
+                     kLookBytes * std::accumulate(look_counts_.begin(), look_counts_.end(), std::size_t{0}));
+  } else if (fault.empty() && !look_counts_.empty()) {
+    const LookRowsReader rows(look_counts_, sections_[kLooks], sections_[kSeen], sections_[kVoids],
+                              sections_[kHits]);
+    fault = takeNext(kLooks, LookRowsReader::bytesOfHeads(look_counts_));
+    if (fault.empty()) fault = takeNext(kSeen, rows.bytesOfSeen());
+    if (fault.empty()) fault = takeNext(kVoids, rows.bytesOfVoids());
+    if (fault.empty()) fault = takeNext(kHits, rows.bytesOfHits());
   }
   if (!fault.empty()) return fault;
   if (left > 0) return "bytes are left over";
@@ -369,8 +415,7 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     if (value == 0 || value == kLeast) return "a value is out of range";
   }
   blocks_ = entry.blocks;
-  looks_ = looks;
-  return checkLooks(entry, looks);
+  return readLooks();
 }
 
 void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
@@ -382,7 +427,7 @@ void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
   const char *marks = masks.data(), *mask = marks + kMaskBytes * marked;
   const std::uint32_t* value = values_.data();
   std::array<EvidenceUnits, kBlockVoxels> plane;
-  std::size_t next_class = 4 * blocks, next_look = 0;
+  std::size_t next_class = 4 * blocks, next_looks = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     const BlockIndex index = region.blockIndex(at(list, 2 * b) | at(list, 2 * b + 1) << 8);
     const bool is_new = !map.find(index);
@@ -401,9 +446,9 @@ void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {
       }
     }
     const std::size_t flags = at(list, 3 * blocks + b);
-    if (flags >> 1 > 0) {
-      const Looks looks = looksAt(next_look, flags >> 1);
-      block.looks().reserve(looks.all().size());
+    if (flags > kMarked) {
+      const Looks& looks = looks_[next_looks++];
+      block.looks().reserve(looks);
       block.looks().add(looks);
     }
     if ((flags & kMarked) != 0) {

@@ -10,14 +10,24 @@
 
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/map_file.h"
+#include "store/look_rows.h"
 
 namespace bki_mapping {
+
+/// How tiles hold looks.
+enum class LooksLayout {
+  kNone,   ///< not at all: before version 3 of map files
+  kMasks,  ///< with two bits for each voxel: in versions 3 and 4
+  kRows,   ///< without rows of voxels that nobody saw
+};
+
+/// @param version of a map file.
+LooksLayout looksLayoutOf(std::int64_t version);
 
 /// Packs and unpacks tiles. Keeps its working memory from tile to tile. Not thread-safe.
 class TileCodec {
  public:
-  /// @param classes of the map. @param keeps_looks false for files of versions before 3, which have no looks.
-  explicit TileCodec(const ClassTable& classes, bool keeps_looks = true);
+  explicit TileCodec(const ClassTable& classes, LooksLayout layout = LooksLayout::kRows);
   ~TileCodec();
   TileCodec(const TileCodec&) = delete;
   TileCodec& operator=(const TileCodec&) = delete;
@@ -41,13 +51,16 @@ class TileCodec {
  private:
   /// The sections of the content, each compressed by itself.
   enum Section : std::size_t {
-    kList,   ///< for each block its number (2 bytes), number of planes, and flags; then classes, then levels
+    kList,   ///< for each block its number (2 bytes), number of planes, and flags; then classes
     kMasks,  ///< 512 bits for the marks of each block that has any; then for each plane, where evidence is
     kByte0,  ///< the lowest byte of each evidence other than 0
     kByte1,
     kByte2,
     kByte3,
-    kLooks,  ///< only if a block has looks: the begin of each (8 bytes), then 2 x 512 bits for each
+    kLooks,  ///< LookSections, only if a block has looks; kMasks: begins and masks, and levels in the list
+    kSeen,
+    kVoids,
+    kHits,
     kSections
   };
   struct Zlib;
@@ -60,25 +73,29 @@ class TileCodec {
   std::uint32_t checksum(const TileKey& key, const TileEntry& entry) const;
   /// @return the length of the section in the content.
   std::size_t appendPacked(Section section);
-  void takeLooks(const Looks& looks);
-  /// Checks the list. @param[out] marked number of blocks with occlusion marks. @param[out] looks number of
-  /// looks.
-  std::string checkList(const TileEntry& entry, std::size_t& marked, std::size_t& looks) const;
-  /// Checks kLooks: each block must have the intervals that its latest one demands.
-  std::string checkLooks(const TileEntry& entry, std::size_t looks) const;
-  /// Reads the looks of a block. @param[in,out] next position of its first one; then of the next block's.
-  Looks looksAt(std::size_t& next, std::size_t count) const;
+  void takeMasks(const Looks& looks);
+  /// Checks the list, and reads look_counts_ from it. @param[out] marked number of blocks with occlusion
+  /// marks.
+  std::string checkList(const TileEntry& entry, std::size_t& marked);
+  /// The sections of the layout.
+  std::size_t endOfSections() const { return layout_ == LooksLayout::kRows ? kSections : kSeen; }
+  /// Reads the looks of all blocks that have any; these must have the intervals that their latest demands.
+  std::string readLooks();
+  /// Reads looks from masks. @param[in,out] next position of the first one; then of the one after the last.
+  Looks masksAt(std::size_t& next, std::size_t count) const;
 
-  bool keeps_looks_;
+  LooksLayout layout_;
   std::bitset<256> allowed_;  ///< the class ids that planes may have
   std::array<std::string, kSections> sections_;
   std::string packed_, bytes_;
   // Parts of kList and kMasks:
   std::string numbers_, plane_counts_, flags_, classes_, levels_, marks_, evidence_masks_;
-  std::string begins_, look_masks_;    ///< parts of kLooks
-  std::size_t looks_ = 0;              ///< number of looks that unpack() has read
-  std::vector<std::uint32_t> values_;  ///< evidence other than 0, plane after plane
-  int blocks_ = 0;                     ///< number of blocks that unpack() has read
+  std::string begins_, look_masks_;  ///< parts of kLooks with kMasks
+  LookRowsWriter look_rows_;
+  std::vector<std::size_t> look_counts_;  ///< of the blocks that have looks
+  std::vector<Looks> looks_;              ///< that unpack() has read, of these blocks
+  std::vector<std::uint32_t> values_;     ///< evidence other than 0, plane after plane
+  int blocks_ = 0;                        ///< number of blocks that unpack() has read
   std::unique_ptr<Zlib> zlib_;
 };
 

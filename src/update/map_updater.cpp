@@ -260,7 +260,10 @@ void MapUpdater::addVoids(const Group& group, EvidenceUnits units, std::size_t w
 }
 
 void MapUpdater::addLooks(const Group& group, bool voids_add) noexcept {
-  for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
+  const std::size_t end = by_group_.end(group.position);
+  for (std::size_t j = by_group_.begin(group.position); j != end; ++j) {
+    if (end - j > kAhead) __builtin_prefetch(&jobs_[j + kAhead].block->looks());
+    if (end - j > kAhead / 2) jobs_[j + kAhead / 2].block->looks().prefetch();
     const SeenVoxels& seen = voids_.at(j);
     // A block exists where scans add evidence: whether others have done so must make no difference to this
     // one.

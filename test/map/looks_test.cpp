@@ -119,6 +119,55 @@ TEST(Looks, AddAllocatesNothingAfterReserve) {
   }
 }
 
+TEST(Looks, AreStoredWithoutTheLayersThatNobodySaw) {
+  Looks looks;
+  Look::Voxels low, high;
+  low[3] = low[63] = low[64 * 7 + 5] = high[64 * 7 + 5] = true;
+  looks.add(Look(1000, 0, low, high));
+  looks.add(Look(1001, 0, low, high));
+  looks.shrink();
+  EXPECT_EQ(looks.bytes(), 2 * (1 + 3) * sizeof(std::uint64_t));
+  for (const StoredLook& look : looks) {
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      ASSERT_EQ(look.at(v), v == 3 || v == 63 ? Sight::kCrossed
+                            : v == 64 * 7 + 5 ? Sight::kHit
+                                              : Sight::kNothing)
+          << v;
+    }
+  }
+}
+
+TEST(Looks, StoreAllLevelsAndTimesOfAnyStamp) {
+  Look::Voxels all;
+  all.set();
+  const std::uint64_t latest = Look::tickOf(~std::uint64_t{0});
+  Looks looks;
+  looks.add(Look(0, 0, all, all));
+  looks.add(Look(latest, 0, all, {}));
+  EXPECT_TRUE(looks.isCanonical());
+  EXPECT_TRUE(looks.all() == (std::vector<Look>{Look(0, 35, all, all), Look(latest, 0, all, {})}));
+}
+
+TEST(Looks, KeepLittleOfTheMemoryThatTheyNoLongerNeed) {
+  std::mt19937_64 random(4);
+  Looks looks;
+  std::uint64_t tick = 1 << 20;
+  for (int round = 0; round < 20; ++round) {
+    for (const SeenScan& scan : randomScans(1 + random() % 10, 2, random)) {
+      Look::Voxels hit;
+      hit[random() % kBlockVoxels] = true;
+      tick += 1 + random() % 300;
+      looks.reserveTick(tick);
+      looks.add(round % 2 == 0 ? Look(tick, scan.look().low(), scan.look().high(), {})
+                               : Look(tick, {}, {}, hit));
+    }
+    const Looks before = looks;
+    looks.reserveTick(++tick);
+    EXPECT_TRUE(looks == before);
+    EXPECT_LE(looks.bytes(), before.bytes() + (17 + 16) * sizeof(std::uint64_t));
+  }
+}
+
 TEST(Looks, ForgetNothingButTheErasedVoxels) {
   std::mt19937_64 random(3);
   std::vector<SeenScan> scans = randomScans(20, 4, random);

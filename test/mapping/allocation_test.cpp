@@ -4,6 +4,7 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -126,6 +127,28 @@ TEST(Allocation, NoneInTheSteadyStateWithRules) {
     for (int time = 0; time < 3; ++time) mapper.integrate(scan);
     for (int time = 0; time < 5; ++time) EXPECT_EQ(allocationsOf(mapper, scan), 0u) << height;
   }
+}
+
+TEST(Allocation, NoneInTheSteadyStateWhileTimePasses) {
+  Scan scan = everywhere();
+  MapperConfig config;
+  config.free_space.extent = FreeSpaceExtent::kObserved;
+  config.rules.enabled = config.rules.latest = true;
+  config.sensor_model.height = 1.7;
+  config.threads = 1;
+  SemanticMapper mapper(config, reference::tableWithDynamicClass());
+  const auto allocationsAt = [&](std::uint64_t tick) {
+    scan.stamp = ((std::uint64_t{1} << 30) + tick) << Look::kTickBits;
+    return allocationsOf(mapper, scan);
+  };
+  // Whenever a time is twice as long as before, there is one more look.
+  for (std::uint64_t tick = 0; tick < 70; ++tick) allocationsAt(tick);
+  for (std::uint64_t tick = 70; tick < 120; ++tick) EXPECT_EQ(allocationsAt(tick), 0u) << tick;
+  std::size_t most_looks = 0;
+  for (const auto& [index, block] : mapper.map().entries()) {
+    most_looks = std::max(most_looks, block->looks().size());
+  }
+  EXPECT_GT(most_looks, 5u);
 }
 
 TEST(Allocation, NoneInTheSteadyStateOfTwoThreads) {

@@ -93,8 +93,9 @@ TEST(LatestLooks, WhatAnEarlierVisitHitIsClearedSooner) {
 
 /// The definition in docs/method.md, voxel by voxel and look by look.
 std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool can_leave) {
+  const std::vector<Look> all = looks.all();
   std::vector<std::pair<Sight, Look>> seen;  // from the latest
-  for (auto look = looks.all().rbegin(); look != looks.all().rend(); ++look) {
+  for (auto look = all.rbegin(); look != all.rend(); ++look) {
     if (look->at(voxel) != Sight::kNothing) seen.emplace_back(look->at(voxel), *look);
   }
   std::size_t last_hit = 0;
@@ -103,7 +104,6 @@ std::int32_t slowVerdict(const Looks& looks, std::size_t voxel, Stay stay, bool 
   const Look& hit_look = seen[last_hit].second;
   // The begins of visits, from the latest to the earliest.
   std::vector<std::uint64_t> begins;
-  const auto& all = looks.all();
   for (std::size_t n = all.size() - 1; n > 0; --n) {
     if (all[n - 1].length() >= 1024 && all[n - 1].length() >= 8 * all[n].length())
       begins.push_back(all[n].begin());

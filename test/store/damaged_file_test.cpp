@@ -57,7 +57,7 @@ class Original {
 
 /// One page for each table.
 std::string smallFile() {
-  return readFile(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_4.bkm");
+  return readFile(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_5.bkm");
 }
 
 /// Trees of several pages, and pages that are free.

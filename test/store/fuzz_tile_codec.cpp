@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "store/counted_memory.h"
 #include "store/map_maker.h"
@@ -58,24 +59,35 @@ std::string deflated(const std::string& bytes) {
 
 /// @param compressed a bit for each section. @param[out] checksum of the content, as entry.checksum should
 /// be.
-std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size_t compressed) {
+std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size_t compressed,
+                   LooksLayout layout) {
   const auto blocks = static_cast<std::size_t>(entry.blocks), planes = static_cast<std::size_t>(entry.planes);
-  std::array<std::string, 7> sections;
+  std::array<std::string, 10> sections;
   sections[0] = bytes.string(4 * blocks + planes);
   std::size_t marked = 0, looks = 0;
+  std::vector<std::size_t> counts;
   for (std::size_t b = 3 * blocks; b < 4 * blocks; ++b) {
     const auto flags = static_cast<unsigned char>(sections[0][b]);
     marked += flags & 1u;
     looks += flags >> 1;
+    if (flags > 1) counts.push_back(flags >> 1);
   }
-  sections[0] += bytes.string(looks);
+  if (layout == LooksLayout::kMasks) sections[0] += bytes.string(looks);
   sections[1] = bytes.string(64 * (marked + planes));
   std::size_t values = 0;
   for (std::size_t b = 64 * marked; b < sections[1].size(); ++b) {
     values += static_cast<std::size_t>(__builtin_popcount(static_cast<unsigned char>(sections[1][b])));
   }
   for (std::size_t s = 2; s < 6; ++s) sections[s] = bytes.string(values);
-  sections[6] = bytes.string(looks * (8 + 2 * 64));
+  if (layout == LooksLayout::kMasks) {
+    sections[6] = bytes.string(looks * (8 + 2 * 64));
+  } else {
+    const LookRowsReader rows(counts, sections[6], sections[7], sections[8], sections[9]);
+    sections[6] = bytes.string(LookRowsReader::bytesOfHeads(counts));
+    sections[7] = bytes.string(rows.bytesOfSeen());
+    sections[8] = bytes.string(rows.bytesOfVoids());
+    sections[9] = bytes.string(rows.bytesOfHits());
+  }
   uLong checksum = 0;
   for (const int number : {key.part, key.index.x, key.index.y, key.index.z, entry.blocks, entry.planes}) {
     checksum = crc32(checksum, reinterpret_cast<const Bytef*>(&number), 4);
@@ -83,9 +95,9 @@ std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size
   std::string head, body;
   for (std::size_t s = 0; s < sections.size(); ++s) {
     std::string& section = sections[s];
-    if (s == 6 && looks == 0) break;
+    if ((s == 6 && looks == 0) || (s == 7 && layout == LooksLayout::kMasks)) break;
     checksum = crc32_z(checksum, reinterpret_cast<const Bytef*>(section.data()), section.size());
-    if (s > 0 && (compressed >> s & 1) != 0) {
+    if (s > 0 && (compressed >> std::min<std::size_t>(s, 6) & 1) != 0) {
       std::string packed = deflated(section);
       if (packed.size() < section.size()) section = std::move(packed);
     }
@@ -97,11 +109,7 @@ std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size
   return head + body;
 }
 
-}  // namespace
-}  // namespace bki_mapping
-
-extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
-  using namespace bki_mapping;
+void test(const unsigned char* data, std::size_t size, LooksLayout layout) {
   static const MapInfo info = infoOf();
   Bytes bytes(data, size);
   const TileKey key{{-1, 0, 2}, 1};
@@ -110,16 +118,16 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   const bool is_framed = (kind & 0x80) != 0;
   entry.blocks = static_cast<int>(bytes.number(2) % (is_framed ? 16 : 1024));
   entry.planes = static_cast<int>(bytes.number(3) % (is_framed ? 32 : 1 << 18));
-  if (is_framed && entry.blocks == 0) return 0;
-  const std::string content = is_framed ? framed(bytes, key, entry, kind) : bytes.rest();
+  if (is_framed && entry.blocks == 0) return;
+  const std::string content = is_framed ? framed(bytes, key, entry, kind, layout) : bytes.rest();
 
   const PeakMemory memory;
-  TileCodec codec(*info.classes);
+  TileCodec codec(*info.classes, layout);
   const std::string fault =
       codec.unpack(key, entry, reinterpret_cast<const unsigned char*>(content.data()), content.size());
   require(memory.bytes() < static_cast<std::ptrdiff_t>(500'000 + TileCodec::kMemoryPerByte * content.size()),
           std::to_string(memory.bytes()) + " bytes of memory for " + std::to_string(content.size()));
-  if (!fault.empty()) return 0;
+  if (!fault.empty()) return;
   SemanticMap map = info.emptyMap(), sum = randomMap(1, 5, 2);
   codec.addTo(map, key);
   codec.addTo(sum, key);
@@ -129,5 +137,15 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   require(
       codec.unpack(key, again, reinterpret_cast<const unsigned char*>(packed.data()), packed.size()).empty(),
       "a tile that was written cannot be read");
+}
+
+}  // namespace
+}  // namespace bki_mapping
+
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
+  using bki_mapping::LooksLayout;
+  for (const LooksLayout layout : {LooksLayout::kMasks, LooksLayout::kRows}) {
+    bki_mapping::test(data, size, layout);
+  }
   return 0;
 }

@@ -17,7 +17,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_4.bkm";
+const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_5.bkm";
 
 class HostileFile : public testing::Test {
  protected:

@@ -578,7 +578,7 @@ TEST_F(MapMerge, MovesLooksWithTheirVoxels) {
       const VoxelIndex from = transform.sourceOf(GridGeometry::voxelOf(index, v));
       const Block* const source = before.find(GridGeometry::blockOf(from));
       if (!source || source->looks().empty()) continue;
-      const Look& latest = source->looks().all().back();
+      const Look latest = source->looks().all().back();
       const Sight sight = latest.at(static_cast<std::size_t>(GridGeometry::offsetInBlock(from)));
       const auto& looks = moved->looks().all();
       const auto interval = std::find_if(looks.begin(), looks.end(), [&](const Look& look) {

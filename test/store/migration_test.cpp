@@ -11,6 +11,7 @@
 #include "store/file_content.h"
 #include "store/map_maker.h"
 #include "store/schema.h"
+#include "store/tile_codec.h"
 #include "temporary_folder.h"
 
 namespace bki_mapping {
@@ -65,6 +66,10 @@ TEST_P(MigrationFrom, CopiesAll) {
     for (const TileEntry& tile : copy.tiles(part)) copy.addTileTo(b, {tile.index, part});
     EXPECT_GT(a.size(), 0u);
     EXPECT_TRUE(reference::contentOf(a) == reference::contentOf(b));
+    TileCodec codec(*copy.info().classes);
+    for (const TileEntry& tile : copy.tiles(part)) {
+      EXPECT_TRUE(codec.pack(a, {tile.index, part}) == tile) << "as this version writes it";
+    }
   }
   EXPECT_EQ(folder.fileCount(), 1u);
 }

@@ -13,7 +13,7 @@ SOURCE = os.environ['BKI_MAPPING_SOURCE_DIR']
 sys.path.insert(0, os.path.join(SOURCE, 'scripts'))
 import read_map  # noqa: E402
 
-FILES = [os.path.join(SOURCE, 'test', 'store', 'data', f'version_{version}.bkm') for version in (1, 2, 3, 4)]
+FILES = [os.path.join(SOURCE, 'test', 'store', 'data', f'version_{version}.bkm') for version in (1, 2, 3, 4, 5)]
 UNITS = 65536  # in 1 of evidence
 
 
@@ -51,8 +51,8 @@ class ReadMap(unittest.TestCase):
             shutil.copyfile(FILES[-1], path)
             with open(path, 'r+b') as file:
                 file.seek(63)
-                file.write(b'\5')
-            with self.assertRaisesRegex(ValueError, 'is not a map file of version 1 to 4'):
+                file.write(b'\6')
+            with self.assertRaisesRegex(ValueError, 'is not a map file of version 1 to 5'):
                 list(read_map.read_planes(path))
 
     def test_as_a_program(self):

@@ -14,8 +14,8 @@
 namespace bki_mapping {
 namespace {
 
-/// The last one, the looks, is left out if it is empty.
-using Sections = std::array<std::string, 7>;
+/// Those from the seventh on, the looks, are left out if that is empty.
+using Sections = std::array<std::string, 10>;
 
 std::string deflated(const std::string& bytes) {
   uLongf size = compressBound(bytes.size());
@@ -32,13 +32,16 @@ std::string lengthOf(const std::string& section) {
   return bytes;
 }
 
-std::string joined(const Sections& sections) {
+/// @param last section that may be there.
+std::string joined(const Sections& sections, std::size_t last) {
   std::string lengths, content;
   for (std::size_t s = 0; s < 6; ++s) {
     lengths += lengthOf(sections[s]);
     content += sections[s];
   }
-  return lengths + content + (sections[6].empty() ? "" : lengthOf(sections[6]) + sections[6]);
+  for (std::size_t s = 6; s <= last && !sections[6].empty(); ++s)
+    content += lengthOf(sections[s]) + sections[s];
+  return lengths + content;
 }
 
 /// docs/map_file.md. @param sections not compressed.
@@ -57,7 +60,8 @@ std::uint32_t checksumOf(const TileKey& key, const TileEntry& entry, const Secti
 /// voxel 8.
 class TileCodecTest : public testing::Test {
  protected:
-  TileCodecTest() {
+  explicit TileCodecTest(LooksLayout layout = LooksLayout::kRows)
+      : codec_(*infoOf().classes, layout), last_section_(layout == LooksLayout::kRows ? 9 : 6) {
     sections_[0] = std::string("\0\0\xff\1\0\2\1\0", 8) + "\x28\xff";
     sections_[1].resize(3 * 64);
     sections_[1][5] = '\3';
@@ -70,15 +74,17 @@ class TileCodecTest : public testing::Test {
   /// What is wrong with sections that are neither compressed nor of another size.
   std::string fault() {
     entry_.checksum = checksumOf(kKey, entry_, sections_);
-    return fault(joined(sections_));
+    return fault(joined());
   }
+  std::string joined() const { return bki_mapping::joined(sections_, last_section_); }
   std::string fault(const std::string& content) {
     return codec_.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()),
                          content.size());
   }
 
   const TileKey kKey{{2, -1, 0}, 3};
-  TileCodec codec_{*infoOf().classes};
+  TileCodec codec_;
+  std::size_t last_section_;
   Sections sections_;
   TileEntry entry_{kKey.index, 2, 2, 0};
 };
@@ -150,7 +156,7 @@ TEST_F(TileCodecTest, RefusesAnythingElse) {
     sections_[section].pop_back();
     EXPECT_NE(fault(), "") << section;
     sections_[section] = good[section] + '\0';
-    EXPECT_EQ(fault(), section == 0 ? "it has another number of looks" : "a length is wrong") << section;
+    EXPECT_EQ(fault(), "a length is wrong") << section;
   }
   sections_ = good;
   entry_.blocks = 0;
@@ -160,9 +166,9 @@ TEST_F(TileCodecTest, RefusesAnythingElse) {
   EXPECT_EQ(fault(), "a length is wrong");
   entry_.planes = 2;
   ASSERT_EQ(fault(), "");
-  EXPECT_EQ(fault(joined(sections_) + "x"), "bytes are left over");
-  EXPECT_EQ(fault(joined(sections_).substr(0, 23)), "it is too short");
-  EXPECT_EQ(fault(joined(sections_).substr(0, 200)), "a length is wrong");
+  EXPECT_EQ(fault(joined() + "x"), "bytes are left over");
+  EXPECT_EQ(fault(joined().substr(0, 23)), "it is too short");
+  EXPECT_EQ(fault(joined().substr(0, 200)), "a length is wrong");
 }
 
 TEST_F(TileCodecTest, RefusesStreamsOfAnotherSize) {
@@ -170,20 +176,20 @@ TEST_F(TileCodecTest, RefusesStreamsOfAnotherSize) {
   sections_[1] = deflated(good[1]);
   ASSERT_LT(sections_[1].size(), good[1].size());
   entry_.checksum = checksumOf(kKey, entry_, good);
-  EXPECT_EQ(fault(joined(sections_)), "");
+  EXPECT_EQ(fault(joined()), "");
   const std::string streams[] = {deflated(good[1] + "x"), deflated(good[1].substr(1)), sections_[1] + "x",
                                  sections_[1].substr(0, sections_[1].size() - 1), std::string(50, 'x')};
   for (const std::string& stream : streams) {
     sections_[1] = stream;
-    EXPECT_EQ(fault(joined(sections_)), "it cannot be decompressed") << stream.size();
+    EXPECT_EQ(fault(joined()), "it cannot be decompressed") << stream.size();
   }
 }
 
-/// The sections with two looks at block 511, in ticks 0x0102030000 to 0x010203ffff (level 16), and
-/// 0x0102048765.
+/// The sections of versions 3 and 4 with two looks at block 511, in ticks 0x0102030000 to 0x010203ffff (level
+/// 16), and 0x0102048765.
 class LooksInTile : public TileCodecTest {
  protected:
-  LooksInTile() {
+  LooksInTile() : TileCodecTest(LooksLayout::kMasks) {
     sections_[0] = std::string("\0\0\xff\1\0\2\1\4", 8) + "\x28\xff" + std::string("\x10\0", 2);
     std::string& looks = sections_[6];
     looks = std::string("\0\0\3\2\1\0\0\0", 8) + std::string("\x65\x87\4\2\1\0\0\0", 8);
@@ -243,7 +249,7 @@ TEST_F(LooksInTile, AreWrittenAsSpecified) {
   sections_[0][7] = '\0';
   sections_[0].resize(10);
   sections_[6].clear();
-  TileCodec without(*infoOf().classes, false);
+  TileCodec without(*infoOf().classes, LooksLayout::kNone);
   EXPECT_EQ(without.pack(map, kKey).checksum, checksumOf(kKey, entry, sections_));
   for (const auto& [index, block] : sortedBlocks(map)) map.getOrAllocate(index).looks().clear();
   EXPECT_TRUE(codec_.pack(map, kKey) == without.pack(map, kKey));
@@ -344,25 +350,25 @@ TEST_F(LooksInTile, AreRefusedInOtherNumbers) {
   sections_[6].clear();
   EXPECT_EQ(fault(), "it is too short");
   sections_ = good;
-  EXPECT_EQ(fault(joined(sections_) + "x"), "bytes are left over");
-  EXPECT_EQ(fault(joined(sections_).substr(0, joined(sections_).size() - 1)), "a length is wrong");
+  EXPECT_EQ(fault(joined() + "x"), "bytes are left over");
+  EXPECT_EQ(fault(joined().substr(0, joined().size() - 1)), "a length is wrong");
   sections_[0][7] = '\0';
   sections_[0].resize(10);
   EXPECT_EQ(fault(), "bytes are left over");
   sections_ = good;
   ASSERT_EQ(fault(), "");
-  const std::string content = joined(sections_);
+  const std::string content = joined();
   for (const std::size_t end : {content.size() - good[6].size() - 1, content.size() - good[6].size() - 4}) {
     EXPECT_EQ(fault(content.substr(0, end)), "it is too short") << end;
   }
   sections_[6][kMasks + 2] = '\1';
-  EXPECT_EQ(fault(joined(sections_)), "its checksum is wrong");
+  EXPECT_EQ(fault(joined()), "its checksum is wrong");
 }
 
 TEST_F(LooksInTile, AreRefusedInFilesThatKeepNone) {
   entry_.checksum = checksumOf(kKey, entry_, sections_);
-  const std::string content = joined(sections_);
-  TileCodec codec(*infoOf().classes, false);
+  const std::string content = joined();
+  TileCodec codec(*infoOf().classes, LooksLayout::kNone);
   EXPECT_EQ(
       codec.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()), content.size()),
       "a flag is not known");
@@ -377,17 +383,177 @@ TEST_F(LooksInTile, TakeNoMemoryForClaims) {
   for (std::size_t section = 2; section < 6; ++section) sections_[section].clear();
   sections_[6] = "x";
   entry_ = {kKey.index, 512, 0, 0};
-  const std::string content = joined(sections_);
+  const std::string content = joined();
   {
     const PeakMemory memory;
     EXPECT_EQ(fault(content), "a length is wrong");
     EXPECT_LT(memory.bytes(), 300'000);
   }
   sections_[6] = deflated(std::string(127 * 512 * 136, '\0'));
-  const std::string zeros = joined(sections_);
+  const std::string zeros = joined();
   const PeakMemory memory;
   EXPECT_EQ(fault(zeros), "its checksum is wrong");
   EXPECT_LT(memory.bytes(), static_cast<std::ptrdiff_t>(500'000 + TileCodec::kMemoryPerByte * zeros.size()));
+}
+
+/// The same looks without the rows that nobody saw.
+class LookRowsInTile : public TileCodecTest {
+ protected:
+  LookRowsInTile() {
+    sections_[0] = std::string("\0\0\xff\1\0\2\1\4", 8) + "\x28\xff";
+    sections_[6] = std::string("\x65\x87\4\2\1\0\0\0", 8)  // the latest
+                   + std::string("\2\0\0\0\0\0\0\x80", 8)  // rows 1 and 63 were seen
+                   + std::string("\2\0\0\0\0\0\0\0", 8)    // row 1 was hit
+                   + std::string("\x21\0", 2);             // level 16, the interval before; and the latest
+    sections_[7] = std::string("\7\0\0\x80", 4);           // voxels 8 to 10, and voxel 511
+    sections_[8] = std::string("\4\0", 2);                 // voxel 10
+    sections_[9] = "\2";                                   // voxel 9
+  }
+  std::string faultWith(std::size_t section, std::size_t position, const std::string& bytes) {
+    const Sections good = sections_;
+    sections_[section].replace(position, bytes.size(), bytes);
+    const std::string found = fault();
+    sections_ = good;
+    return found;
+  }
+};
+
+TEST_F(LookRowsInTile, AreReadAsSpecified) {
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  EXPECT_TRUE(map.find({{16, -8, 0}})->looks().empty());
+  EXPECT_EQ(map.find({{16, -8, 0}})->occlusion().count(), 2u);
+  Look::Voxels crossed, voids, hit, last;
+  crossed[8] = hit[9] = voids[10] = last[511] = true;
+  const std::vector<Look> expected = {Look(0x0102030000u, 16, crossed | hit, voids | hit),
+                                      Look(0x0102048765u, last, {}, {})};
+  EXPECT_EQ(map.find({{23, -1, 7}})->looks().all(), expected);
+  codec_.addTo(map, kKey);  // the same again
+  EXPECT_EQ(map.find({{23, -1, 7}})->looks().all(), expected);
+}
+
+TEST_F(LookRowsInTile, AreWrittenAsSpecified) {
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  const TileEntry entry = codec_.pack(map, kKey);
+  EXPECT_EQ(entry.checksum, checksumOf(kKey, entry, sections_));
+  const std::string packed = codec_.packed();
+  entry_ = entry;
+  EXPECT_EQ(fault(packed), "");
+  sections_[0][7] = '\0';
+  for (std::size_t section = 6; section < sections_.size(); ++section) sections_[section].clear();
+  TileCodec without(*infoOf().classes, LooksLayout::kNone);
+  EXPECT_EQ(without.pack(map, kKey).checksum, checksumOf(kKey, entry, sections_));
+}
+
+TEST_F(LookRowsInTile, AreAllKept) {
+  SemanticMap map = infoOf().emptyMap();
+  Look::Voxels some, other;
+  some[77] = other[78] = other[500] = true;
+  constexpr std::uint64_t kLatest = Look::tickOf(~std::uint64_t{0});
+  for (const int x : {16, 18}) {
+    Block& block = map.getOrAllocate({{x, -8, 0}});
+    block.setOcclusion(some);
+    for (unsigned level = 0; level < 36; ++level) {  // as many as there can be
+      const std::uint64_t interval = kLatest >> level;
+      block.looks().add(Look(interval << level, some, other, {}));
+      block.looks().add(Look((interval - 1) << level, some, some, level == 7 ? other : Look::Voxels()));
+    }
+    EXPECT_GT(block.looks().size(), 36u);
+    some = ~some;
+  }
+  map.getOrAllocate({{17, -8, 0}}).setOcclusion(other);  // without looks
+  entry_ = codec_.pack(map, kKey);
+  const std::string packed = codec_.packed();
+  ASSERT_EQ(fault(packed), "");
+  SemanticMap copy = infoOf().emptyMap();
+  codec_.addTo(copy, kKey);
+  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+}
+
+TEST_F(LookRowsInTile, AreRefusedIfNoMapWritesThem) {
+  ASSERT_EQ(fault(), "");
+  const std::string wrong = "its looks are wrong", length = "a length is wrong";
+  EXPECT_EQ(faultWith(6, 24, "\x20"), wrong) << "coarser than its age demands";
+  EXPECT_EQ(faultWith(6, 24, "\x7e"), wrong) << "longer than time";
+  EXPECT_EQ(faultWith(6, 24, "\xff"), wrong) << "likewise";
+  EXPECT_EQ(faultWith(6, 24, std::string(1, '\0')), wrong) << "twice the same time";
+  EXPECT_EQ(faultWith(6, 25, "\1"), wrong) << "not the latest";
+  EXPECT_EQ(faultWith(6, 25, "\2"), wrong) << "the latest is longer than a tick";
+  EXPECT_EQ(faultWith(6, 24, std::string("\0\x21", 2)), wrong) << "out of order";
+  EXPECT_EQ(faultWith(6, 0, std::string(8, '\xff')), wrong) << "beyond all stamps";
+  EXPECT_EQ(faultWith(6, 0, std::string(8, '\0')), wrong) << "the other is before all stamps";
+  EXPECT_EQ(faultWith(6, 8, "\3"), "it cannot be decompressed") << "another row was seen";
+  EXPECT_EQ(faultWith(6, 16, "\3"), wrong) << "a row that nobody saw was hit";
+  EXPECT_EQ(faultWith(6, 16, std::string(1, '\0')), length) << "none was hit";
+  EXPECT_EQ(faultWith(7, 0, std::string(1, '\0')), length) << "no row of the first was seen";
+  EXPECT_EQ(faultWith(7, 0, "\3"), wrong) << "void and not seen";
+  EXPECT_EQ(faultWith(7, 0, "\5"), wrong) << "hit and not seen";
+  EXPECT_EQ(faultWith(8, 0, "\6"), wrong) << "hit and void";
+  EXPECT_EQ(faultWith(9, 0, std::string(1, '\0')), wrong) << "nothing was hit";
+  // Rows that no look has seen.
+  const Sections good = sections_;
+  sections_[6][8] = '\6';
+  sections_[7] = std::string("\7\0\0\0\0\x80", 6);
+  EXPECT_EQ(fault(), wrong);
+  sections_ = good;
+  sections_[6][16 + 7] = '\x80';
+  sections_[9] = std::string("\2\0", 2);
+  EXPECT_EQ(fault(), wrong);
+}
+
+TEST_F(LookRowsInTile, AreRefusedInOtherNumbers) {
+  const Sections good = sections_;
+  EXPECT_NE(faultWith(0, 7, "\2"), "");
+  EXPECT_EQ(faultWith(0, 7, "\6"), "it cannot be decompressed");
+  sections_[0] += '\0';
+  EXPECT_EQ(fault(), "a length is wrong") << "versions 3 and 4 have levels there";
+  for (std::size_t section = 6; section < sections_.size(); ++section) {
+    sections_ = good;
+    sections_[section] += "x";
+    EXPECT_EQ(fault(), "a length is wrong") << section;
+    sections_[section] = good[section].substr(1);
+    EXPECT_NE(fault(), "") << section;
+  }
+  sections_ = good;
+  entry_.checksum = checksumOf(kKey, entry_, sections_);
+  const std::string content = joined();
+  EXPECT_EQ(fault(content), "");
+  EXPECT_EQ(fault(content + "x"), "bytes are left over");
+  std::size_t end = content.size();
+  for (std::size_t section = 9; section >= 6; --section) {
+    end -= good[section].size();
+    EXPECT_EQ(fault(content.substr(0, end - 1)), "it is too short") << section;
+    end -= 4;
+    EXPECT_EQ(fault(content.substr(0, end)), "it is too short") << section;
+  }
+  sections_[8][1] = '\x80';
+  EXPECT_EQ(fault(joined()), "its checksum is wrong");
+}
+
+// Whoever claims much must send much.
+TEST_F(LookRowsInTile, TakeNoMemoryForClaims) {
+  std::string numbers, heads;
+  for (int b = 0; b < 512; ++b) numbers += {static_cast<char>(b & 0xff), static_cast<char>(b >> 8)};
+  sections_[0] = numbers + std::string(512, '\0') + std::string(512, '\xff');
+  sections_[1] = std::string(512 * 64, '\xff');
+  for (std::size_t section = 2; section < 6; ++section) sections_[section].clear();
+  sections_[6] = deflated(std::string(512 * 24 + 127 * 512, '\xff'));
+  sections_[7] = "x";
+  entry_ = {kKey.index, 512, 0, 0};
+  const std::string content = joined();
+  {
+    const PeakMemory memory;
+    EXPECT_EQ(fault(content), "a length is wrong");
+    EXPECT_LT(memory.bytes(), 400'000);
+  }
+  sections_[7] = sections_[8] = sections_[9] = deflated(std::string(127 * 512 * 64, '\xff'));
+  const std::string ones = joined();
+  const PeakMemory memory;
+  EXPECT_EQ(fault(ones), "its checksum is wrong");
+  EXPECT_LT(memory.bytes(), static_cast<std::ptrdiff_t>(500'000 + TileCodec::kMemoryPerByte * ones.size()));
 }
 
 // Whoever claims much must send much.
@@ -399,7 +565,7 @@ TEST_F(TileCodecTest, TakesNoMemoryForClaims) {
   sections_[1] = deflated(std::string(1536 * 64, '\xff'));
   for (std::size_t section = 2; section < 6; ++section) sections_[section] = "x";
   entry_ = {kKey.index, 512, 1536, 0};
-  const std::string content = joined(sections_);
+  const std::string content = joined();
   const PeakMemory memory;
   EXPECT_EQ(fault(content), "a length is wrong");
   EXPECT_LT(memory.bytes(), 200'000);

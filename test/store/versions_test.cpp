@@ -284,12 +284,12 @@ TEST(NewerVersion, IsRefused) {
   const std::string path = folder / "map.bkm";
   std::filesystem::copy_file(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm", path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\5');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\6');
   for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
     EXPECT_EQ(
         sentenceOf([&] { MapFile(path, access); }),
         path +
-            " was written by a newer version of bki_mapping (format 5, this one knows formats up to 4); "
+            " was written by a newer version of bki_mapping (format 6, this one knows formats up to 5); "
             "use that version or a later one");
   }
 }

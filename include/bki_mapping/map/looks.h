@@ -2,10 +2,11 @@
 /// in time.
 #pragma once
 
-#include <algorithm>
+#include <array>
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <unordered_map>
 #include <vector>
 
@@ -59,45 +60,110 @@ class Look {
 
  private:
   friend class Looks;
-  void join(const Look& other) {
-    const Voxels hit_in_any = hit() | other.hit(), high = high_ | other.high_;
-    low_ = hit_in_any | ((low_ | other.low_) & ~high);
-    high_ = high;
-  }
 
   std::uint64_t begin_ = 0;
   unsigned level_ = 0;
   Voxels low_, high_;
 };
 
+/// A look as a map stores it: a head, and the words that are not 0. A word has one of the bits of Sight for
+/// each voxel of a layer along z. Two in three are 0, because few beams reach into a block in an interval.
+class StoredLook {
+ public:
+  explicit StoredLook(const std::uint64_t* head) : head_(head) {}
+
+  std::uint64_t begin() const { return *head_ >> Look::kTickBits; }  ///< [ticks]
+  unsigned level() const { return static_cast<unsigned>(*head_ >> kLevelShift & 63); }
+  std::uint64_t length() const { return std::uint64_t{1} << level(); }  ///< [ticks]
+  bool hasSeen() const { return (*head_ & kPresent) != 0; }
+  Sight at(std::size_t offset) const {
+    const std::size_t layer = offset / kLayerVoxels, bit = offset % kLayerVoxels;
+    return static_cast<Sight>((wordOf(layer) >> bit & 1) + 2 * (wordOf(kBlockEdge + layer) >> bit & 1));
+  }
+  Look unpacked() const;
+
+ private:
+  friend class Looks;
+  /// The low bits of all layers, then the high ones.
+  using Words = std::array<std::uint64_t, 2 * kBlockEdge>;
+  static constexpr std::size_t kLayerVoxels = kBlockEdge * kBlockEdge;
+  static constexpr std::size_t kMostWords = 1 + 2 * kBlockEdge;  ///< with the head
+  // The head is the stamp at which the look begins; its bits below a tick are the number of words that
+  // follow, the level, and a bit for each of Words that says whether it follows.
+  static constexpr unsigned kCountShift = 22, kLevelShift = 16;
+  static constexpr std::uint64_t kPresent = 0xffff;
+
+  std::size_t size() const { return 1 + (*head_ >> kCountShift & 31); }  ///< [words], with the head
+  Words words() const;
+  /// The head of a look that has seen the same at another time.
+  std::uint64_t headAt(std::uint64_t begin, unsigned level) const {
+    constexpr std::uint64_t kRest = kPresent | std::uint64_t{31} << kCountShift;
+    return begin << Look::kTickBits | std::uint64_t{level} << kLevelShift | (*head_ & kRest);
+  }
+  std::uint64_t wordOf(std::size_t n) const {
+    const std::uint64_t bit = std::uint64_t{1} << n;
+    if ((*head_ & bit) == 0) return 0;
+    return head_[1 + __builtin_popcountll(*head_ & kPresent & (bit - 1))];
+  }
+
+  const std::uint64_t* head_;
+};
+
 /// The looks at a block: fine intervals for the latest time, coarser ones before. The older an interval, the
 /// longer: 2^level ticks, at multiples of its length, with the smallest level at which the interval is the
 /// latest one's or the one before. So they depend on nothing but the set of scans: neither on their order nor
-/// on how maps were merged. Their number grows with the logarithm of the time.
+/// on how maps were merged. Their number grows with the logarithm of the time. Each has seen something; the
+/// latest alone may not, after erase(), because its time determines the intervals of the others.
 class Looks {
  public:
-  /// By rising time. Each has seen something; the latest alone may not, after erase(), because its time
-  /// determines the intervals of the others.
-  const std::vector<Look>& all() const { return looks_; }
-  bool empty() const { return looks_.empty(); }
+  class Iterator {
+   public:
+    using iterator_category = std::forward_iterator_tag;
+    using value_type = StoredLook;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const StoredLook*;
+    using reference = const StoredLook&;
+
+    explicit Iterator(const std::uint64_t* head) : look_(head) {}
+    reference operator*() const { return look_; }
+    pointer operator->() const { return &look_; }
+    Iterator& operator++() {
+      look_ = StoredLook(look_.head_ + look_.size());
+      return *this;
+    }
+    bool operator==(const Iterator& other) const { return look_.head_ == other.look_.head_; }
+    bool operator!=(const Iterator& other) const { return look_.head_ != other.look_.head_; }
+    bool operator<=(const Iterator& other) const { return look_.head_ <= other.look_.head_; }
+
+   private:
+    StoredLook look_;
+  };
+
+  /// The latest look comes first.
+  Iterator begin() const { return Iterator(words_.data()); }
+  Iterator end() const { return Iterator(words_.data() + words_.size()); }
+  bool empty() const { return words_.empty(); }
+  std::size_t size() const { return static_cast<std::size_t>(std::distance(begin(), end())); }
+  /// Copies of all looks, by rising time.
+  std::vector<Look> all() const;
 
   /// Allocates memory for further looks.
-  void reserve(std::size_t further) { looks_.reserve(looks_.size() + further); }
-  /// Allocates memory for what a scan sees, if its tick is not the latest already.
-  void reserveTick(std::uint64_t tick) {
-    if (looks_.empty() || looks_.back().begin_ != tick) reserve(1);
-  }
+  void reserve(std::size_t further) { words_.reserve(words_.size() + further * StoredLook::kMostWords); }
+  /// Allocates memory for the looks of another map.
+  void reserve(const Looks& other) { words_.reserve(words_.size() + other.words_.size()); }
+  /// Allocates memory for what a scan sees. Returns what many looks took before they were joined.
+  void reserveTick(std::uint64_t tick);
   void shrink() noexcept {
-    if (looks_.capacity() > looks_.size()) looks_.shrink_to_fit();
+    if (words_.capacity() > words_.size()) words_.shrink_to_fit();
   }
   /// Adds what scans of an interval saw; nothing is kept of one that saw nothing. Allocates nothing after
   /// reserve(1).
   void add(const Look& look);
-  /// Adds the looks of another map at the same block. Allocates nothing after reserve(other.all().size()).
+  /// Adds the looks of another map at the same block. Allocates nothing after reserve(other).
   void add(const Looks& other);
   /// Adds a look from a file after all others; isCanonical() says whether it may be there.
-  void append(const Look& look) { looks_.push_back(look); }
-  /// Whether the intervals are those that the latest one demands, and all() holds of them.
+  void append(const Look& look);
+  /// Whether the intervals are those that the latest one demands, and have seen what they must.
   bool isCanonical() const;
   /// Forgets what was seen of some voxels. The rest keeps its intervals as long as any is left.
   void erase(const Look::Voxels& voxels);
@@ -107,16 +173,20 @@ class Looks {
   /// Moves what was seen to other voxels. @param move called as move(mask), changes a mask.
   template <typename Move>
   void moveVoxels(Move&& move) {
-    for (Look& look : looks_) {
+    std::vector<Look> looks = all();
+    for (Look& look : looks) {
       move(look.low_);
       move(look.high_);
     }
-    dropEmpty();
+    keep(looks);
   }
-  void clear() noexcept { looks_ = {}; }
+  void clear() noexcept { words_.clear(); }
 
-  bool operator==(const Looks& other) const { return looks_ == other.looks_; }
-  std::size_t bytes() const { return looks_.capacity() * sizeof(Look); }
+  /// Prefetches the latest look for writing.
+  void prefetch() const { __builtin_prefetch(words_.data(), 1); }
+
+  bool operator==(const Looks& other) const { return words_ == other.words_; }
+  std::size_t bytes() const { return words_.capacity() * sizeof(std::uint64_t); }
 
   /// The level of the interval of a tick. @param newest tick, not before it.
   static unsigned levelAt(std::uint64_t newest, std::uint64_t tick) {
@@ -126,13 +196,17 @@ class Looks {
   }
 
  private:
-  void insert(const Look& look);
-  /// Drops looks that have seen nothing, except the latest.
-  void dropEmpty();
+  struct Packed;
+
+  /// Replaces `count` words from a position on.
+  void replace(std::size_t position, std::size_t count, const Packed& look);
+  void insert(const Packed& look);
+  /// Keeps looks, given by rising time, that have seen something, and the latest if any has.
+  void keep(const std::vector<Look>& looks);
   /// Joins intervals as their ages demand.
   void coarsen();
 
-  std::vector<Look> looks_;
+  std::vector<std::uint64_t> words_;  ///< of all looks, the latest first
 };
 
 /// The looks at some blocks, by their index.
