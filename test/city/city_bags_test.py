@@ -63,7 +63,7 @@ class Bags(MadeCity):
 
     def describe_drives(self, *drives, **more):
         path = self.describe([])
-        path.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 2, 'drives': drives, **more}))
+        path.write_text(json.dumps({'piece_scans': 2, 'region_tiles': 3, 'drives': drives, **more}))
         return path
 
     def test_bags_are_drives(self):

@@ -64,7 +64,7 @@ class MadeCity(unittest.TestCase):
 
     def describe(self, names, **more):
         path = self.folder / f'{self.id().split(".")[-1]}.yaml'
-        text = {'drives': [{'sequence': name} for name in names], 'piece_scans': 2, 'region_tiles': 2, **more}
+        text = {'drives': [{'sequence': name} for name in names], 'piece_scans': 2, 'region_tiles': 3, **more}
         path.write_text(json.dumps(text))  # JSON is YAML
         return path
 
