@@ -13,15 +13,29 @@
 namespace bki_mapping {
 namespace {
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// What becomes of points with a label.
+struct ClassOfLabel {
+  ClassId id = 0;
+  bool airborne = false, ground = false;
+};
+
 /// Looks up the classes of labels; remembers the last one, since neighbouring points often share a label.
 class ClassFinder {
  public:
   ClassFinder(const ClassTable& classes, LabelValues values, const MapperConfig& config)
-      : classes_(classes), values_(values), config_(config) {}
+      : classes_(classes), values_(values), config_(config) {
+    for (const SemanticClass& c : classes.classes()) {
+      airborne_[c.id] = c.airborne;
+      ground_[c.id] = c.ground;
+    }
+  }
 
-  /// The class of a label; no value if hits with this label are skipped, which it counts.
-  std::optional<ClassId> classOf(std::uint32_t label, PointCounts& counts) {
-    if (knows_last_ && label == last_label_) return last_class_;
+  /// The class of a label; nullptr if hits with this label are skipped, which it counts. Valid until the next
+  /// call.
+  const ClassOfLabel* find(std::uint32_t label, PointCounts& counts) {
+    if (knows_last_ && label == last_label_) return &last_;
     std::optional<ClassId> id = classes_.classOf(label, values_);
     knows_last_ = false;
     const bool listed = id.has_value();
@@ -30,42 +44,50 @@ class ClassFinder {
       if (config_.unknown_labels == UnknownLabels::kUnlabelled) id = classes_.unlabelled();
       if (!id) {
         ++counts.unknown_label;
-        return std::nullopt;
+        return nullptr;
       }
     }
     if (config_.unlabelled_points == UnlabelledPoints::kIgnore && id == classes_.unlabelled()) {
       ++counts.unlabelled;
-      return std::nullopt;
+      return nullptr;
     }
-    if (listed) {
-      knows_last_ = true;
-      last_label_ = label;
-      last_class_ = *id;
-    }
-    return id;
+    knows_last_ = listed;
+    last_label_ = label;
+    last_ = {*id, airborne_[*id], ground_[*id]};
+    return &last_;
   }
 
  private:
   const ClassTable& classes_;
   LabelValues values_;
   const MapperConfig& config_;
-  // The last label, if it is in the class table and its hits are used:
-  bool knows_last_ = false;
+  ClassSet airborne_, ground_;
+  bool knows_last_ = false;  ///< the last label is in the class table, and its hits are used
   std::uint32_t last_label_ = 0;
-  ClassId last_class_ = 0;
+  ClassOfLabel last_;
 };
+
+/// The nearest float that is not below a number, or not above it.
+float roundedUp(double number) {
+  const auto nearest = static_cast<float>(number);
+  return static_cast<double>(nearest) < number ? std::nextafter(nearest, kInfinity) : nearest;
+}
+float roundedDown(double number) {
+  return -roundedUp(-number);
+}
 
 /// The ranges that hits can have.
 class RangeLimits {
  public:
   /// @param none_at_max whether points at max_range mean that their beam had no return.
   RangeLimits(const SensorModelConfig& sensor, bool none_at_max)
-      : sensor_(sensor), reach_(sensor.reach()), none_at_max_(none_at_max) {}
+      : sensor_(sensor),
+        least_(std::max(kSensorRadius, roundedUp(sensor.min_range))),
+        most_(roundedDown(sensor.reach())),
+        none_at_max_(none_at_max) {}
 
   /// Whether a point at this range can be a hit; false for NaN and infinity.
-  bool contains(float range) const {
-    return range >= kSensorRadius && range >= sensor_.min_range && range <= reach_ && !isAtMax(range);
-  }
+  bool contains(float range) const { return range >= least_ && range <= most_ && !isAtMax(range); }
   bool isAtMax(float range) const { return none_at_max_ && isAtMaxRange(sensor_, range); }
   /// Counts a point that cannot be a hit under its reason. @return whether its beam is free up to max_range.
   bool countOutside(const Eigen::Vector3f& point, float range, PointCounts& counts) const {
@@ -87,12 +109,19 @@ class RangeLimits {
 
  private:
   const SensorModelConfig& sensor_;
-  double reach_;
+  float least_, most_;
   bool none_at_max_;
 };
 
 bool areShares(const ClassShare* begin, const ClassShare* end) {
   return std::all_of(begin, end, [](const ClassShare& s) { return isProbability(s.share); });
+}
+
+/// The position of a range >= 0 in a histogram. (Converting to an unsigned number takes several
+/// instructions.)
+std::size_t metreOf(float range) {
+  constexpr auto kLast = static_cast<float>(RangeHistogram().size() - 1);
+  return static_cast<std::size_t>(static_cast<std::int32_t>(std::min(range, kLast)));
 }
 
 /// The range within which half of the points are [m]. @param points number of them; 0 gives 0.
@@ -128,11 +157,6 @@ void ScanPreprocessor::sortPoints(const ScanView& scan, const ClassTable& classe
   const SensorModelConfig& sensor = scan.sensor_model ? *scan.sensor_model : config_.sensor_model;
   const RangeLimits limits(sensor, scan.no_returns_at_max_range);
   ClassFinder finder(classes, scan.labels_are_ids ? LabelValues::kId : config_.label_values, config_);
-  ClassSet airborne, ground;
-  for (const SemanticClass& c : classes.classes()) {
-    airborne[c.id] = c.airborne;
-    ground[c.id] = c.ground;
-  }
   PointCounts counts;
   counts.points = last - first;
   for (std::size_t i = first; i < last; ++i) {
@@ -147,18 +171,17 @@ void ScanPreprocessor::sortPoints(const ScanView& scan, const ClassTable& classe
       ++counts.outside_map;
     } else if (scan.soft && !areShares(scan.soft->begin(i), scan.soft->end(i))) {
       ++counts.not_finite;
-    } else if (const auto id = finder.classOf(scan.labels[i], counts)) {
+    } else if (const ClassOfLabel* const found = finder.find(scan.labels[i], counts)) {
       const bool is_alone = isolated_ && (*isolated_)[i];
-      const bool is_airborne = airborne[*id];
-      if (is_airborne || (is_alone && !ground[*id])) {
-        ++(is_airborne ? counts.airborne : counts.isolated);
+      if (found->airborne || (is_alone && !found->ground)) {
+        ++(found->airborne ? counts.airborne : counts.isolated);
         into.cut.add(point, kFreeClass);
         continue;
       }
       ++counts.used;
-      ++into.ranges[std::min(static_cast<std::size_t>(range), into.ranges.size() - 1)];
-      into.hits.add(point, *id);
-      if (scan.soft) into.used.push_back({static_cast<std::uint32_t>(i), *id});
+      ++into.ranges[metreOf(range)];
+      into.hits.add(point, found->id);
+      if (scan.soft) into.used.push_back({static_cast<std::uint32_t>(i), found->id});
     }
   }
   into.counts = counts;
