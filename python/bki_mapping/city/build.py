@@ -31,6 +31,8 @@ def dask_client(workers=0, scheduler=None):
     """A Dask cluster: the scheduler at an address, or one on this machine with a number of workers."""
     try:
         import dask
+        # Workers are copies of a process that has loaded Dask: each would take a second to load it. Read on import.
+        dask.config.set({'distributed.worker.multiprocessing-method': 'forkserver'})
         import distributed
     except ImportError:
         raise CityError('map_city needs Dask; install python3-distributed') from None
