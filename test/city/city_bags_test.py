@@ -71,7 +71,7 @@ class Bags(MadeCity):
         poses = self.write_bag(path, 'd2')
         bag = {'bag': 'monday.bag', 'cloud_topic': '/points', 'frame': 'city'}
         city = self.describe_drives({'sequence': 'd1'}, bag)
-        text = self.finish(self.start(city, '--workers', '2'))
+        text = self.finish(self.start(city, '--workers', '2', '--no-picture'))
         self.assertIn(f"drive 'monday': 1 of {SCANS} clouds are left out: 1 transform late", text)
         self.assertIn('dropped the cloud of /points of time 104.000: the latest of the transforms', text)
         index = json.loads((self.output / 'index.json').read_text())
@@ -88,10 +88,10 @@ class Bags(MadeCity):
         whole = tiles_of(self.folder / 'both.bkm')
         self.expect_equal([], whole=whole)
         # Nothing is mapped again, unless the account of a piece is lost.
-        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
         self.assertIn('| map pieces | 6 | 0 | 0.0 |', (self.output / 'report.md').read_text())
         (self.output / drive['pieces'][1]['file']).with_suffix('.json').unlink()
-        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
         self.assertIn('| map pieces | 6 | 1 | ', (self.output / 'report.md').read_text())
         # Or is empty or cut, as after a loss of power. Bags that an earlier version has converted go, and others stay.
         for name in (f'bags/d-{"0" * 16}/bag.json', 'bags/mine.bag'):
@@ -101,19 +101,19 @@ class Bags(MadeCity):
             account = (self.output / drive['pieces'][number]['file']).with_suffix('.json')
             account.write_text(account.read_text()[:left])
         self.assertEqual(report.way_of(drive, self.output).shape, (0, 3))
-        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
         self.assertIn('| map pieces | 6 | 2 | ', (self.output / 'report.md').read_text())
         self.assertEqual(list((self.output / 'bags').iterdir()), [self.output / 'bags/mine.bag'])
         numpy.testing.assert_allclose(report.way_of(drive, self.output), poses[:SCANS - 1, :, 3], atol=1e-6)
         self.expect_equal([], whole=whole)
         self.assertEqual([path for path in self.output.rglob('.*') if path.name != '.run'], [], 'nothing is left over')
         # Other pieces make the same city; without labels, it is that of such a map.
-        self.finish(self.start(self.describe_drives({'sequence': 'd1'}, bag, piece_scans=3), '--workers', '2', '--resume'))
+        self.finish(self.start(self.describe_drives({'sequence': 'd1'}, bag, piece_scans=3), '--workers', '2', '--no-picture', '--resume'))
         self.expect_equal([], whole=whole)
         program('map_bag', path, '--cloud-topic', '/points', '--frame', 'city', '--set', 'label_field=', '--classes', 'occupancy',
                 '--output', self.folder / 'unlabelled.bkm')
         city = self.describe_drives({**bag, 'labelled': False}, classes='occupancy')
-        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
         self.expect_equal([], whole=tiles_of(self.folder / 'unlabelled.bkm'))
 
     def test_only_what_earlier_versions_wrote_leaves_the_folder_of_bags(self):
@@ -155,7 +155,7 @@ class Bags(MadeCity):
             'garbage': ({'bag': 'garbage.bag', **good}, 'run: rosbag reindex'),
             'missing': ({'bag': 'missing.bag', **good}, 'missing.bag does not exist')}
         city = self.describe_drives({'sequence': 'd1'}, *({**bag, 'name': name} for name, (bag, _) in wrong.items()))
-        text = self.finish(self.start(city, '--workers', '2'), 1)
+        text = self.finish(self.start(city, '--workers', '2', '--no-picture'), 1)
         left_out = dict(line[len("drive '"):].split("' is left out: ", 1) for line in text.splitlines()
                         if "' is left out: " in line)
         self.assertEqual(set(left_out), set(wrong))

@@ -68,11 +68,12 @@ class Made(MadeCity):
 
         # A drive that comes and goes changes only the regions that it touches.
         before = {region['file'] for region in index['regions']}
-        self.finish(self.start(city, '--workers', '2', '--resume', '--without', 'd6'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume', '--without', 'd6'))
         index = self.expect_equal(names[:-1])
         same = before & {region['file'] for region in index['regions']}
         self.assertTrue(0 < len(same) < len(before))
-        self.finish(self.start(self.describe(names[:-1]), '--workers', '2', '--resume', '--add', str(self.folder / 'd6')))
+        self.finish(self.start(self.describe(names[:-1]), '--workers', '2', '--no-picture', '--resume', '--add',
+                               str(self.folder / 'd6')))
         self.assertEqual({region['file'] for region in self.expect_equal(names)['regions']}, before)
 
     def test_corrected_poses_change_what_they_touch(self):
@@ -143,7 +144,7 @@ class Made(MadeCity):
         with open(broken / 'velodyne/000003.bin', 'ab') as file:
             file.write(b'x')
         city = self.describe(['d1', 'broken', 'd3', 'd1', 'missing'])
-        text = self.finish(self.start(city, '--workers', '2'), 1)
+        text = self.finish(self.start(city, '--workers', '2', '--no-picture'), 1)
         self.assertRegex(text, r"drive 'broken' is left out: map_sequence: .*000003\.bin")
         self.assertRegex(text, r"drive 'missing' is left out: .*missing holds no scans")
         index = self.expect_equal(['d1', 'd3'])
@@ -159,7 +160,7 @@ class Made(MadeCity):
             (programs / name).symlink_to(BIN / name)
 
         def fails(sentence):
-            text = self.finish(self.start(city, '--workers', '2', '--resume', programs=programs), 1)
+            text = self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume', programs=programs), 1)
             self.assertRegex(text, rf'map_city: .*{sentence}')
             self.assertIn('--resume once this is mended', text)
             self.assertNotIn('is left out', text)
@@ -182,7 +183,7 @@ class Made(MadeCity):
         fails(rf'merge_maps cannot be started on {host} \(Permission denied\)')
         (programs / 'merge_maps').unlink()
         (programs / 'merge_maps').symlink_to(BIN / 'merge_maps')
-        self.finish(self.start(city, '--workers', '2', '--resume', programs=programs))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume', programs=programs))
         self.expect_equal(['d1', 'd2'])
 
     def test_warnings_are_said_once_each(self):
@@ -345,18 +346,18 @@ class Made(MadeCity):
         unfit.terminate()
         unfit.wait()
         dask('worker', address, *options, **has_it)
-        self.finish(self.start(city, '--scheduler', address, '--resume'))
+        self.finish(self.start(city, '--scheduler', address, '--no-picture', '--resume'))
         self.expect_equal(['d1', 'd2'])
         # The scheduler is killed while the worker maps.
         city = self.describe(DRIVES)
-        process = self.start(city, '--scheduler', address, '--resume')
+        process = self.start(city, '--scheduler', address, '--no-picture', '--resume')
         end = time.monotonic() + 60
         while not list(self.output.glob('pieces/d[3456]/*')) and time.monotonic() < end:
             time.sleep(0.01)
         scheduler.kill()
         self.assertIn('map_city: the Dask scheduler has gone; start it', self.finish(process, 1))
         self.assertLess(len(list(self.output.glob('pieces/*/*.bkm'))), 18)
-        self.finish(self.start(city, '--workers', '2', '--resume'))
+        self.finish(self.start(city, '--workers', '2', '--no-picture', '--resume'))
         self.expect_equal(DRIVES)
 
     def test_a_picture_and_the_costs_are_reported(self):
