@@ -67,13 +67,15 @@ function(bki_mapping_test_headers name)
 endfunction()
 bki_mapping_test_headers(bki_mapping_unit_test_headers bki_mapping_reference
   HEADERS <Eigen/Geometry> <algorithm> <cmath> <fstream> <map> <random> <string> <vector>)
-if(CATKIN_ENABLE_TESTING)
+if(CATKIN_ENABLE_TESTING AND NOT BKI_MAPPING_JOIN)
   bki_mapping_test_headers(bki_mapping_ros_test_headers bki_mapping_ros HEADERS ${BKI_MAPPING_ROS_HEADERS})
 endif()
 # bki_mapping_test_uses_ros(TARGET): definitions and precompiled headers of a test that includes ROS.
 function(bki_mapping_test_uses_ros target)
   target_compile_definitions(${target} PRIVATE BKI_MAPPING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  bki_mapping_precompile(${target} REUSE bki_mapping_ros_test_headers)
+  if(NOT BKI_MAPPING_JOIN)
+    bki_mapping_precompile(${target} REUSE bki_mapping_ros_test_headers)
+  endif()
 endfunction()
 
 # Builds TARGET from unit tests of a room, linked with the room, the reference and other libraries.
@@ -117,13 +119,25 @@ endfunction()
 
 # bki_mapping_unit_tests(ROOM name... [LINK library...]): the tests NAME_test of test/ROOM/NAME_test.cpp, each a program. Where
 # several files are compiled as one, those of one call are one program, and each test runs the suites of its file. So they may
-# not define the same names.
+# not define the same names. Files of tests that BKI_MAPPING_CHOSEN does not name are then left out.
 function(bki_mapping_unit_tests room)
   cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
   set(names ${arg_UNPARSED_ARGUMENTS})
   list(LENGTH names count)
   if(BKI_MAPPING_JOIN AND count GREATER 1)
     list(GET names 0 first)
+    if(BKI_MAPPING_CHOSEN)
+      set(given ${names})
+      set(names)
+      foreach(name ${given})
+        if("${name}_test" IN_LIST BKI_MAPPING_CHOSEN)
+          list(APPEND names ${name})
+        endif()
+      endforeach()
+      if(NOT names)
+        return()
+      endif()
+    endif()
     set(program ${room}_${first}_tests)
     list(TRANSFORM names REPLACE "(.+)" "test/${room}/\\1_test.cpp" OUTPUT_VARIABLE files)
     bki_mapping_unit_test_program(${program} ${room} SOURCES ${files} LINK ${arg_LINK})

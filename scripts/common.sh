@@ -151,5 +151,5 @@ run_hostile() {
 configure_sanitizer() {
   configure_build "$1" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="$3" \
     -DCMAKE_CXX_FLAGS="-O1 -fsanitize=$2 -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr -fno-omit-frame-pointer" \
-    -DBKI_MAPPING_SHELL_FLAGS="${4-}" -DBKI_MAPPING_JOIN=ON >/dev/null
+    -DBKI_MAPPING_SHELL_FLAGS="${4-}" -DBKI_MAPPING_JOIN=ON -DBKI_MAPPING_LIGHT=ON >/dev/null
 }
