@@ -13,11 +13,11 @@ namespace {
 constexpr std::uint32_t kNoCell = 0xffffffffu;
 constexpr float kRowsPerUnit = 0.5f * DirectionCells::kRows;
 
-/// The azimuth as a part of the full turn, from 0 to 1; wrong by at most 0.3 degrees.
+/// The azimuth as a part of the full turn, from 0 to 1; wrong by at most 0.3 degrees. Without branches, so
+/// that compilers vectorise loops over it.
 float turnOf(float x, float y) {
-  const float ax = std::abs(x), ay = std::abs(y), larger = std::max(ax, ay);
-  if (!(larger > 0.0f)) return 0.0f;
-  const float t = std::min(ax, ay) / larger;
+  const float ax = std::abs(x), ay = std::abs(y), larger = ax < ay ? ay : ax, smaller = ay < ax ? ay : ax;
+  const float t = larger > 0.0f ? smaller / larger : 0.0f;
   // atan(t) = pi/4 t + 0.273 t (1 - t), in turns
   const float octant = t * (0.125f + 0.04345f * (1.0f - t));
   const float quadrant = ay > ax ? 0.25f - octant : octant;
@@ -25,16 +25,28 @@ float turnOf(float x, float y) {
   return y < 0.0f ? 1.0f - half : half;
 }
 
-/// The beams of some cells by the slices in which they end.
+float rowAt(float z, float length) {
+  return (z / length + 1.0f) * kRowsPerUnit;
+}
+
+/// The beams of some cells by the slices in which they end, around some slices.
 class Profile {
  public:
-  Profile() { all_.fill(0), support_.fill(0); }
+  /// @param first, last slices of which it will be asked.
+  Profile(int first, int last)
+      : first_(static_cast<std::size_t>(first)), last_(static_cast<std::size_t>(last) + 2 * kMargin) {
+    std::fill(all_.begin() + first, all_.begin() + last + 2 * kMargin + 1, 0u);
+    std::fill(support_.begin() + first, support_.begin() + last + 2 * kMargin + 1, 0u);
+  }
+  /// Whether beams that end there make a difference.
+  bool asksFor(std::uint8_t slice) const { return slice + kMargin >= first_; }
   void add(std::uint8_t slice, std::uint32_t beams, std::uint32_t support) {
-    all_[slice + kMargin] += beams;
-    support_[slice + kMargin] += support;
+    const std::size_t at = std::min(slice + kMargin, last_);
+    all_[at] += beams;
+    support_[at] += support;
   }
   void accumulate() {
-    for (std::size_t s = all_.size() - 1; s > 0; --s) all_[s - 1] += all_[s];
+    for (std::size_t s = last_; s > first_; --s) all_[s - 1] += all_[s];
   }
   /// Number of others that end in a slice or one of those beside it.
   float near(std::uint8_t slice) const {
@@ -46,6 +58,7 @@ class Profile {
 
  private:
   static constexpr std::size_t kMargin = 2;
+  std::size_t first_, last_;  ///< with the margin; the last one has also all that is farther away
   std::array<std::uint32_t, IsolatedPoints::kSlices + 2 * kMargin> all_, support_;
 };
 
@@ -55,24 +68,15 @@ DirectionCells::DirectionCells() {
   for (int row = 0; row < kRows; ++row) {
     const double z = (row + 0.5) / kRowsPerUnit - 1.0;
     const double columns = std::round(kPi * kRows * std::sqrt(1.0 - z * z));
-    begin_[static_cast<std::size_t>(row) + 1] =
-        begin_[static_cast<std::size_t>(row)] + static_cast<std::uint32_t>(std::max(columns, 1.0));
-    row_of_.resize(begin_[static_cast<std::size_t>(row) + 1], static_cast<std::uint8_t>(row));
+    const auto r = static_cast<std::size_t>(row);
+    begin_[r + 1] = begin_[r] + static_cast<std::uint32_t>(std::max(columns, 1.0));
+    columns_[r] = static_cast<float>(begin_[r + 1] - begin_[r]);
+    row_of_.resize(begin_[r + 1], static_cast<std::uint8_t>(row));
   }
 }
 
-std::uint32_t DirectionCells::cellOf(const Eigen::Vector3f& point, float length) const {
-  const int row = std::clamp(static_cast<int>((point.z() / length + 1.0f) * kRowsPerUnit), 0, kRows - 1);
-  const std::uint32_t first = begin_[static_cast<std::size_t>(row)];
-  const int columns = rowOf(first).columns;
-  const int column = static_cast<int>(turnOf(point.x(), point.y()) * static_cast<float>(columns));
-  return first + static_cast<std::uint32_t>(std::min(column, columns - 1));
-}
-
-std::uint8_t DirectionCells::halfOf(const Eigen::Vector3f& point, std::uint32_t cell) const {
-  const Row row = rowOf(cell);
-  const float columns = turnOf(point.x(), point.y()) * static_cast<float>(row.columns);
-  return columns - static_cast<float>(cell - row.begin) < 0.5f ? 0 : 1;
+DirectionCells::Place DirectionCells::placeOf(const Eigen::Vector3f& point, float length) const {
+  return placeOf(rowAt(point.z(), length), turnOf(point.x(), point.y()));
 }
 
 int IsolatedPoints::sliceOf(float range) {
@@ -83,19 +87,40 @@ int IsolatedPoints::sliceOf(float range) {
   return static_cast<int>(std::min<std::uint32_t>((bits >> 17) - (0x40000000u >> 17), kSlices - 1));
 }
 
+void IsolatedPoints::findPlaces(const Eigen::Vector3f* points, std::size_t count, std::uint32_t* cells,
+                                std::uint16_t* keys) const {
+  constexpr std::size_t kBatch = 64;
+  float x[kBatch], y[kBatch], z[kBatch], ranges[kBatch], rows[kBatch], turns[kBatch];
+  for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    const std::size_t size = std::min(kBatch, count - begin);
+    for (std::size_t i = 0; i < size; ++i) {
+      x[i] = points[begin + i].x();
+      y[i] = points[begin + i].y();
+      z[i] = points[begin + i].z();
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      ranges[i] = std::sqrt(x[i] * x[i] + (y[i] * y[i] + z[i] * z[i]));  // as Eigen has it
+      rows[i] = rowAt(z[i], ranges[i]);
+      turns[i] = turnOf(x[i], y[i]);
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      const bool is_beam = ranges[i] >= 1e-3f && ranges[i] < 1e6f;  // neither NaN nor infinite
+      const auto [cell, half] =
+          is_beam ? cells_.placeOf(rows[i], turns[i]) : DirectionCells::Place{kNoCell, 0};
+      cells[begin + i] = cell;
+      keys[begin + i] = is_beam ? keyOf(half, sliceOf(ranges[i])) : std::uint16_t{0};
+    }
+  }
+}
+
 void IsolatedPoints::sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool) {
   const Chunks chunks(points.size());
   cell_of_.resize(points.size());
-  half_of_.resize(points.size());
-  slice_of_.resize(points.size());
+  key_of_.resize(points.size());
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-    for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
-      const float range = points[i].norm();
-      const bool is_beam = range >= 1e-3f && range < 1e6f;  // neither NaN nor infinite
-      cell_of_[i] = is_beam ? cells_.cellOf(points[i], range) : kNoCell;
-      half_of_[i] = is_beam ? cells_.halfOf(points[i], cell_of_[i]) : std::uint8_t{0};
-      slice_of_[i] = static_cast<std::uint8_t>(is_beam ? sliceOf(range) : 0);
-    }
+    const std::size_t begin = chunks.begin(c);
+    findPlaces(points.begin() + begin, chunks.end(c) - begin, cell_of_.data() + begin,
+               key_of_.data() + begin);
   });
   begin_.assign(cells_.size() + 1, 0);
   for (const std::uint32_t cell : cell_of_) {
@@ -103,24 +128,28 @@ void IsolatedPoints::sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPoo
   }
   for (std::size_t c = 0; c < cells_.size(); ++c) begin_[c + 1] += begin_[c];
   point_of_.resize(begin_[cells_.size()]);
+  sorted_keys_.resize(point_of_.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (cell_of_[i] != kNoCell) point_of_[begin_[cell_of_[i]]++] = static_cast<std::uint32_t>(i);
+    if (cell_of_[i] == kNoCell) continue;
+    const std::uint32_t at = begin_[cell_of_[i]]++;
+    point_of_[at] = static_cast<std::uint32_t>(i);
+    sorted_keys_[at] = key_of_[i];
   }
   for (std::size_t c = cells_.size(); c > 0; --c) begin_[c] = begin_[c - 1];
   begin_[0] = 0;
 }
 
 void IsolatedPoints::makeGroups(std::uint32_t cell) {
-  std::array<std::uint16_t, 2 * kSlices>
-      known;  // 1 + number of the group of a half and slice, if there is one
+  std::array<std::uint16_t, 2 * kSlices> known;  // 1 + number of the group with a key, if there is one
   Group* const groups = groups_.data() + begin_[cell];
   known.fill(0);
   std::uint16_t count = 0;
   for (std::uint32_t n = begin_[cell]; n < begin_[cell + 1]; ++n) {
-    const std::uint8_t half = half_of_[point_of_[n]], slice = slice_of_[point_of_[n]];
-    std::uint16_t& group = known[static_cast<std::size_t>(half * kSlices + slice)];
+    const std::uint16_t key = sorted_keys_[n];
+    std::uint16_t& group = known[key];
     if (group == 0) {
-      groups[count] = {half, slice, 0, 0, 0};
+      groups[count] = {static_cast<std::uint8_t>(key / kSlices), static_cast<std::uint8_t>(key % kSlices), 0,
+                       0, 0};
       group = ++count;
     }
     ++groups[group - 1].beams;
@@ -128,25 +157,38 @@ void IsolatedPoints::makeGroups(std::uint32_t cell) {
   group_count_[cell] = count;
 }
 
-bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice) const {
+bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice, bool second) const {
   constexpr std::size_t kMargin = 1;
   std::array<std::uint32_t, kSlices + 2 * kMargin> beams;
   beams.fill(0);
   std::uint32_t all = 0;
-  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
-    all += begin_[last + 1] - begin_[first];
+  const DirectionCells::Row own = cells_.rowOf(cell);
+  const auto addRange = [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t c = first; c <= last; ++c) {
       const Group* const groups = groups_.data() + begin_[c];
-      for (int g = 0; g < group_count_[c]; ++g) beams[groups[g].slice + kMargin] += groups[g].beams;
+      for (int g = 0; g < group_count_[c]; ++g) {
+        beams[groups[g].slice + kMargin] += second && groups[g].isolated ? 0 : groups[g].beams;
+      }
     }
+  };
+  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
+    all += begin_[last + 1] - begin_[first];
+    if (row.begin == own.begin) addRange(first, last);
   });
   const float enough = kOfSquareRoot * std::sqrt(static_cast<float>(all)) + 1.0f;
-  const Group* const groups = groups_.data() + begin_[cell];
-  return std::all_of(groups, groups + group_count_[cell], [&](const Group& group) {
-    const std::size_t at = group.slice + kMargin;
-    return group.slice >= last_slice ||
-           static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= enough;
+  const auto areSupported = [&] {
+    const Group* const groups = groups_.data() + begin_[cell];
+    return std::all_of(groups, groups + group_count_[cell], [&](const Group& group) {
+      const std::size_t at = group.slice + kMargin;
+      return group.slice >= last_slice || (second && group.isolated) ||
+             static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= enough;
+    });
+  };
+  if (areSupported()) return true;  // by their own row, as most are
+  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
+    if (row.begin != own.begin) addRange(first, last);
   });
+  return areSupported();
 }
 
 void IsolatedPoints::decide(std::uint32_t cell, int last_slice, bool second) {
@@ -163,46 +205,79 @@ void IsolatedPoints::decide(std::uint32_t cell, int last_slice, bool second) {
     });
     if (!any) return;
   }
-  if (!second && areAllSupported(cell, last_slice)) return;
+  if (areAllSupported(cell, last_slice, second)) {
+    for (Group* group = groups; group != end; ++group) {
+      if (isOpen(*group)) group->isolated_after = 0;
+    }
+    return;
+  }
   const DirectionCells::Row own = cells_.rowOf(cell);
   const int own_column = static_cast<int>(cell - own.begin);
-  Profile window, row_strip, column_strips[2];  // the latter for the two halves of the cell
+  int nearest = kSlices, farthest = 0;  // of the slices of open groups
+  for (const Group* group = groups; group != end; ++group) {
+    if (!isOpen(*group)) continue;
+    nearest = std::min<int>(nearest, group->slice);
+    farthest = std::max<int>(farthest, group->slice);
+  }
+  const auto supportOf = [&](const Group& group) { return second && group.isolated ? 0 : group.beams; };
+  Profile window(nearest, farthest), row_strip = window;
   std::uint32_t beams = 0;
+  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
+    beams += begin_[last + 1] - begin_[first];
+    for (std::uint32_t c = first; c <= last; ++c) {
+      const Group* const others = groups_.data() + begin_[c];
+      for (int g = 0; g < group_count_[c]; ++g) {
+        if (!window.asksFor(others[g].slice)) continue;
+        window.add(others[g].slice, others[g].beams, supportOf(others[g]));
+        if (row.begin == own.begin) row_strip.add(others[g].slice, others[g].beams, supportOf(others[g]));
+      }
+    }
+  });
+  if (beams <= kFewestAround) return;
+  window.accumulate();
+  row_strip.accumulate();
+  const auto isLine = [](const Profile& strip, const Group& group) {
+    return strip.near(group.slice) >= std::max(kOfStrip * strip.reaching(group.slice), kLeastOfStrip);
+  };
+  bool any_left = false;
+  for (Group* group = groups; group != end; ++group) {
+    if (!isOpen(*group)) continue;
+    const float enough = kOfSquareRoot * std::sqrt(window.reaching(group->slice));
+    group->isolated_after = window.near(group->slice) < std::max(enough, 1.0f) && !isLine(row_strip, *group);
+    any_left |= group->isolated_after != 0;
+  }
+  if (!any_left) return;
+  Profile column_strips[2] = {{nearest, farthest}, {nearest, farthest}};  // of the two halves of the cell
   cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
     const int halves = 2 * row.columns;
     // Of the two halves of the cell, those of the row at the same azimuth.
     const int same[2] = {(4 * own_column + 1) * row.columns / (2 * own.columns),
                          (4 * own_column + 3) * row.columns / (2 * own.columns)};
     for (std::uint32_t c = first; c <= last; ++c) {
+      bool in_strip[2][2];  // by the half of this cell, and of the other
+      for (int half = 0; half < 2; ++half) {
+        for (int other = 0; other < 2; ++other) {
+          const int apart = std::abs(2 * static_cast<int>(c - row.begin) + other - same[half]);
+          in_strip[half][other] = std::min(apart, halves - apart) <= 1;
+        }
+      }
       const Group* const others = groups_.data() + begin_[c];
       for (int g = 0; g < group_count_[c]; ++g) {
-        const Group& other = others[g];
-        const std::uint32_t supporting = second && other.isolated ? 0 : other.beams;
-        beams += other.beams;
-        window.add(other.slice, other.beams, supporting);
-        if (row.begin == own.begin) row_strip.add(other.slice, other.beams, supporting);
+        if (!window.asksFor(others[g].slice)) continue;
         for (int half = 0; half < 2; ++half) {
-          const int apart = std::abs(2 * static_cast<int>(c - row.begin) + other.half - same[half]);
-          if (std::min(apart, halves - apart) <= 1)
-            column_strips[half].add(other.slice, other.beams, supporting);
+          if (!in_strip[half][others[g].half]) continue;
+          column_strips[half].add(others[g].slice, others[g].beams, supportOf(others[g]));
         }
       }
     }
   });
-  if (beams <= kFewestAround) return;
-  for (Profile* profile : {&window, &row_strip, &column_strips[0], &column_strips[1]}) profile->accumulate();
+  for (Profile& strip : column_strips) strip.accumulate();
   for (Group* group = groups; group != end; ++group) {
-    if (!isOpen(*group)) continue;
-    const auto isLine = [&](const Profile& strip) {
-      return strip.near(group->slice) >= std::max(kOfStrip * strip.reaching(group->slice), kLeastOfStrip);
-    };
-    const float enough = kOfSquareRoot * std::sqrt(window.reaching(group->slice));
-    const bool few = window.near(group->slice) < std::max(enough, 1.0f) && !isLine(row_strip) &&
-                     !isLine(column_strips[group->half]);
-    group->isolated_after = few;
+    if (!isOpen(*group) || !group->isolated_after) continue;
+    group->isolated_after = !isLine(column_strips[group->half], *group);
     if (second) continue;
-    group->isolated = few;
-    any_isolated_[cell] |= static_cast<std::uint8_t>(few);
+    group->isolated = group->isolated_after;
+    any_isolated_[cell] |= group->isolated;
   }
 }
 
@@ -211,8 +286,7 @@ void IsolatedPoints::markPoints(std::uint32_t cell) {
   for (int g = 0; g < group_count_[cell]; ++g) {
     if (!groups[g].isolated && !groups[g].isolated_after) continue;
     for (std::uint32_t n = begin_[cell]; n < begin_[cell + 1]; ++n) {
-      const std::uint32_t point = point_of_[n];
-      if (half_of_[point] == groups[g].half && slice_of_[point] == groups[g].slice) isolated_[point] = 1;
+      if (sorted_keys_[n] == keyOf(groups[g].half, groups[g].slice)) isolated_[point_of_[n]] = 1;
     }
   }
 }

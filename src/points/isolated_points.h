@@ -18,11 +18,23 @@ class DirectionCells {
  public:
   DirectionCells();
 
-  /// The cell of a direction. @param point of any length > 0.
-  std::uint32_t cellOf(const Eigen::Vector3f& point, float length) const;
   std::uint32_t size() const { return begin_.back(); }
-  /// Which half of its cell a direction is in: 0 or 1, by rising azimuth.
-  std::uint8_t halfOf(const Eigen::Vector3f& point, std::uint32_t cell) const;
+  /// A cell, and the half of it that a direction is in: 0 or 1, by rising azimuth.
+  struct Place {
+    std::uint32_t cell;
+    std::uint8_t half;
+  };
+  /// The place of a direction. @param row from the south pole, with fractions. @param turn azimuth as a part
+  /// of the full turn, from 0 to 1.
+  Place placeOf(float row, float turn) const {
+    const auto r = static_cast<std::size_t>(std::clamp(static_cast<int>(row), 0, kRows - 1));
+    const float column = turn * columns_[r];
+    const int last = static_cast<int>(columns_[r]) - 1, whole = std::min(static_cast<int>(column), last);
+    return {begin_[r] + static_cast<std::uint32_t>(whole),
+            column - static_cast<float>(whole) < 0.5f ? std::uint8_t{0} : std::uint8_t{1}};
+  }
+  /// @param point of any length > 0.
+  Place placeOf(const Eigen::Vector3f& point, float length) const;
 
   /// A row of cells.
   struct Row {
@@ -62,11 +74,8 @@ class DirectionCells {
   static constexpr int kRows = 116;
 
  private:
-  int columnsOf(int row) const {
-    return static_cast<int>(begin_[static_cast<std::size_t>(row) + 1] -
-                            begin_[static_cast<std::size_t>(row)]);
-  }
   std::array<std::uint32_t, kRows + 1> begin_ = {};  ///< the first cell of each row, and their number
+  std::array<float, kRows> columns_ = {};            ///< number of cells of each row
   std::vector<std::uint8_t> row_of_;                 ///< of each cell
 };
 
@@ -101,24 +110,31 @@ class IsolatedPoints {
     std::uint8_t isolated, isolated_after;  ///< after the first pass, and after both
     std::uint32_t beams;
   };
+  /// The half of its cell and the slice of a beam: those of a Group.
+  static std::uint16_t keyOf(std::uint8_t half, int slice) {
+    return static_cast<std::uint16_t>(half * kSlices + slice);
+  }
+  void findPlaces(const Eigen::Vector3f* points, std::size_t count, std::uint32_t* cells,
+                  std::uint16_t* keys) const;
   void sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool);
   void makeGroups(std::uint32_t cell);
   /// Decides about the groups of a cell: by all groups around it or, in the second pass, by those that are
   /// not isolated.
   void decide(std::uint32_t cell, int last_slice, bool second);
   /// Whether so many beams end near each group of a cell that nothing else matters: a fast answer for most.
-  bool areAllSupported(std::uint32_t cell, int last_slice) const;
+  bool areAllSupported(std::uint32_t cell, int last_slice, bool second) const;
   void markPoints(std::uint32_t cell);
 
   DirectionCells cells_;
-  std::vector<std::uint32_t> cell_of_;            ///< of each point
-  std::vector<std::uint8_t> half_of_, slice_of_;  ///< of each point
-  std::vector<std::uint32_t> begin_;              ///< position of the first beam, and group, of each cell
-  std::vector<std::uint32_t> point_of_;           ///< of each beam, by cell
-  std::vector<Group> groups_;                     ///< of each cell, from its `begin_` on
-  std::vector<std::uint16_t> group_count_;        ///< of each cell
-  std::vector<std::uint8_t> any_isolated_;        ///< in each cell
-  std::vector<std::uint8_t> isolated_;            ///< of each point
+  std::vector<std::uint32_t> cell_of_;      ///< of each point
+  std::vector<std::uint16_t> key_of_;       ///< of each point
+  std::vector<std::uint32_t> begin_;        ///< position of the first beam, and group, of each cell
+  std::vector<std::uint32_t> point_of_;     ///< of each beam, by cell
+  std::vector<std::uint16_t> sorted_keys_;  ///< of each beam, by cell
+  std::vector<Group> groups_;               ///< of each cell, from its `begin_` on
+  std::vector<std::uint16_t> group_count_;  ///< of each cell
+  std::vector<std::uint8_t> any_isolated_;  ///< in each cell
+  std::vector<std::uint8_t> isolated_;      ///< of each point
 };
 
 }  // namespace bki_mapping

@@ -152,12 +152,12 @@ TEST(DirectionCells, CoverTheSphereAndAreAboutADegreeWide) {
     const bool at_pole = std::abs(elevation) > 85.0;  // columns are narrow there
     for (double azimuth = 0.0; azimuth < 360.0; azimuth += 0.2) {
       const Eigen::Vector3f point = beam(azimuth * kDegree, elevation * kDegree, 7.0);
-      const std::uint32_t cell = cells.cellOf(point, point.norm());
+      const std::uint32_t cell = cells.placeOf(point, point.norm()).cell;
       ASSERT_LT(cell, cells.size());
       seen.insert(cell);
       // Half a degree aside is at most one row and one column farther.
       const Eigen::Vector3f aside = beam(azimuth * kDegree, (elevation + 0.5) * kDegree, 7.0);
-      const std::uint32_t other = cells.cellOf(aside, aside.norm());
+      const std::uint32_t other = cells.placeOf(aside, aside.norm()).cell;
       bool around = false;
       cells.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
         around |= other >= first && other <= last;

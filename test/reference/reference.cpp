@@ -78,13 +78,13 @@ struct Direction {
 };
 
 Direction directionOf(const DirectionCells& cells, const Eigen::Vector3f& point) {
-  const std::uint32_t of_point = cells.cellOf(point, point.norm());
+  const auto [of_point, half] = cells.placeOf(point, point.norm());
   const auto cell = static_cast<int>(of_point);
   int begin = 0;
   for (int row = 0;; ++row) {
     const double z = (row + 0.5) / 58.0 - 1.0;
     const int columns = std::max(static_cast<int>(std::round(kPi * 116.0 * std::sqrt(1.0 - z * z))), 1);
-    if (cell < begin + columns) return {row, cell - begin, cells.halfOf(point, of_point), columns};
+    if (cell < begin + columns) return {row, cell - begin, half, columns};
     begin += columns;
   }
 }
