@@ -62,29 +62,47 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool c
 }
 
 bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled) {
-  Look::Voxels ever_hit, just_hit, seen;
-  for (const StoredLook& stored : block.looks()) {
-    const Look look = stored.unpacked();
-    ever_hit |= look.hit();
-    if (look.level() == 0) just_hit |= look.hit() & ~seen;
-    seen |= look.seen();
+  const Looks& looks = block.looks();
+  const Looks::Iterator end = looks.end(), visit_before = visitBefore(looks.begin(), end);
+  Look::Voxels hit, crossed, crossed_twice, voids, voids_twice;  // in the looks so far, up to the last hit
+  Look::Voxels kept, cleared, may_have_stayed, may_leave;
+  for (Looks::Iterator at = looks.begin(); at != end; ++at) {
+    const Look look = (*at).unpacked();
+    const Look::Voxels last_hit = look.hit() & ~hit, never_crossed = last_hit & ~crossed;
+    (look.level() == 0 ? kept : may_have_stayed) |= never_crossed;
+    cleared |= last_hit & voids_twice;
+    if (visit_before <= at) may_leave |= last_hit & crossed_twice & ~voids_twice;
+    hit |= last_hit;
+    const Look::Voxels seen = look.seen() & ~hit, is_void = look.voids() & ~hit;
+    crossed_twice |= look.length() >= kCrossedToClear ? seen : crossed & seen;
+    crossed |= seen;
+    voids_twice |= voids & is_void;
+    voids |= is_void;
   }
-  if (ever_hit.none()) return false;
-  bool decides = false;
-  const LayerBits hit = bitsOf(ever_hit);
-  for (std::size_t layer = 0; layer < hit.size(); ++layer) {
-    for (std::uint64_t left = hit[layer]; left != 0; left &= left - 1) {
-      const std::size_t v = 64 * layer + static_cast<std::size_t>(__builtin_ctzll(left));
-      std::int32_t verdict = kKept;
-      if (!just_hit[v]) {
-        const auto [label, best] = likeliestClass(block, v);
-        verdict = verdictOf(block.looks(), v, stayOf(best, rules.mostVote()), rules.canLeave(label));
+  static_assert(kVoidsToClear == 2 && kCrossedToClear == 2, "twice is enough");
+  const auto forEachOf = [](const Look::Voxels& voxels, const auto& visit) {
+    const LayerBits bits = bitsOf(voxels);
+    for (std::size_t layer = 0; layer < bits.size(); ++layer) {
+      for (std::uint64_t left = bits[layer]; left != 0; left &= left - 1) {
+        visit(64 * layer + static_cast<std::size_t>(__builtin_ctzll(left)));
       }
-      if (verdict == kNotOverruled) continue;
-      overruled[v] = verdict;
-      decides = true;
     }
-  }
+  };
+  forEachOf(kept, [&](std::size_t v) { overruled[v] = kKept; });
+  forEachOf(cleared, [&](std::size_t v) { overruled[v] = kCleared; });
+  bool decides = kept.any() || cleared.any();
+  const auto overrule = [&](std::size_t v, std::int32_t verdict) {
+    overruled[v] = verdict;
+    decides = true;
+  };
+  forEachOf(may_have_stayed, [&](std::size_t v) {
+    const Stay stay = stayOf(likeliestClass(block, v).second, rules.mostVote());
+    if (stay == Stay::kLong || (stay == Stay::kSome && verdictOf(looks, v, stay, false) == kKept))
+      overrule(v, kKept);
+  });
+  forEachOf(may_leave, [&](std::size_t v) {
+    if (rules.canLeave(likeliestClass(block, v).first)) overrule(v, kCleared);
+  });
   return decides;
 }
 
