@@ -81,6 +81,32 @@ class TileCodecTest : public testing::Test {
     return codec_.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()),
                          content.size());
   }
+  /// Packs and unpacks a tile whose blocks have as many looks as there can be, or none.
+  void keepsAllLooks() {
+    SemanticMap map = infoOf().emptyMap();
+    Look::Voxels some, other;
+    some[77] = other[78] = other[500] = true;
+    constexpr std::uint64_t kLatest = Look::tickOf(~std::uint64_t{0});
+    for (const int x : {16, 18}) {
+      Block& block = map.getOrAllocate({{x, -8, 0}});
+      block.setOcclusion(some);
+      for (unsigned level = 0; level < 36; ++level) {
+        const std::uint64_t interval = kLatest >> level;
+        block.looks().add(Look(interval << level, some, other, {}));
+        block.looks().add(Look((interval - 1) << level, some, some, level == 7 ? other : Look::Voxels()));
+      }
+      EXPECT_GT(block.looks().size(), 36u);
+      EXPECT_LE(block.looks().size(), 2 * 36u);
+      some = ~some;
+    }
+    map.getOrAllocate({{17, -8, 0}}).setOcclusion(other);
+    entry_ = codec_.pack(map, kKey);
+    const std::string packed = codec_.packed();
+    ASSERT_EQ(fault(packed), "");
+    SemanticMap copy = infoOf().emptyMap();
+    codec_.addTo(copy, kKey);
+    EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  }
 
   const TileKey kKey{{2, -1, 0}, 3};
   TileCodec codec_;
@@ -257,25 +283,7 @@ TEST_F(LooksInTile, AreWrittenAsSpecified) {
 }
 
 TEST_F(LooksInTile, AreAllKept) {
-  SemanticMap map = infoOf().emptyMap();
-  Block& block = map.getOrAllocate({{16, -8, 0}});
-  Look::Voxels some;
-  some[77] = true;
-  block.setOcclusion(some);
-  constexpr std::uint64_t kLatest = Look::tickOf(~std::uint64_t{0});
-  for (unsigned level = 0; level < 36; ++level) {  // as many as there can be
-    const std::uint64_t interval = kLatest >> level;
-    block.looks().add(Look(interval << level, some, {}, {}));
-    block.looks().add(Look((interval - 1) << level, some, some, {}));
-  }
-  EXPECT_GT(block.looks().all().size(), 36u);
-  EXPECT_LE(block.looks().all().size(), 2 * 36u);
-  entry_ = codec_.pack(map, kKey);
-  const std::string packed = codec_.packed();
-  ASSERT_EQ(fault(packed), "");
-  SemanticMap copy = infoOf().emptyMap();
-  codec_.addTo(copy, kKey);
-  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  keepsAllLooks();
 }
 
 TEST_F(LooksInTile, StayReadableWhenABoxIsCleared) {
@@ -449,28 +457,7 @@ TEST_F(LookRowsInTile, AreWrittenAsSpecified) {
 }
 
 TEST_F(LookRowsInTile, AreAllKept) {
-  SemanticMap map = infoOf().emptyMap();
-  Look::Voxels some, other;
-  some[77] = other[78] = other[500] = true;
-  constexpr std::uint64_t kLatest = Look::tickOf(~std::uint64_t{0});
-  for (const int x : {16, 18}) {
-    Block& block = map.getOrAllocate({{x, -8, 0}});
-    block.setOcclusion(some);
-    for (unsigned level = 0; level < 36; ++level) {  // as many as there can be
-      const std::uint64_t interval = kLatest >> level;
-      block.looks().add(Look(interval << level, some, other, {}));
-      block.looks().add(Look((interval - 1) << level, some, some, level == 7 ? other : Look::Voxels()));
-    }
-    EXPECT_GT(block.looks().size(), 36u);
-    some = ~some;
-  }
-  map.getOrAllocate({{17, -8, 0}}).setOcclusion(other);  // without looks
-  entry_ = codec_.pack(map, kKey);
-  const std::string packed = codec_.packed();
-  ASSERT_EQ(fault(packed), "");
-  SemanticMap copy = infoOf().emptyMap();
-  codec_.addTo(copy, kKey);
-  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  keepsAllLooks();
 }
 
 TEST_F(LookRowsInTile, AreRefusedIfNoMapWritesThem) {
