@@ -62,6 +62,12 @@ class Profile {
   std::array<std::uint32_t, IsolatedPoints::kSlices + 2 * kMargin> all_, support_;
 };
 
+/// Whether the beams of a strip that end near a slice are enough for a line.
+bool isLine(const Profile& strip, std::uint8_t slice) {
+  const float least = IsolatedPoints::kOfStrip * strip.reaching(slice);
+  return strip.near(slice) >= std::max(least, IsolatedPoints::kLeastOfStrip);
+}
+
 }  // namespace
 
 DirectionCells::DirectionCells() {
@@ -157,7 +163,7 @@ void IsolatedPoints::makeGroups(std::uint32_t cell) {
   group_count_[cell] = count;
 }
 
-bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice, bool second) const {
+bool IsolatedPoints::areAllSupported(std::uint32_t cell, const Pass& pass) const {
   constexpr std::size_t kMargin = 1;
   std::array<std::uint32_t, kSlices + 2 * kMargin> beams;
   beams.fill(0);
@@ -167,7 +173,7 @@ bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice, bool se
     for (std::uint32_t c = first; c <= last; ++c) {
       const Group* const groups = groups_.data() + begin_[c];
       for (int g = 0; g < group_count_[c]; ++g) {
-        beams[groups[g].slice + kMargin] += second && groups[g].isolated ? 0 : groups[g].beams;
+        beams[groups[g].slice + kMargin] += pass.supportOf(groups[g]);
       }
     }
   };
@@ -180,8 +186,7 @@ bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice, bool se
     const Group* const groups = groups_.data() + begin_[cell];
     return std::all_of(groups, groups + group_count_[cell], [&](const Group& group) {
       const std::size_t at = group.slice + kMargin;
-      return group.slice >= last_slice || (second && group.isolated) ||
-             static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= enough;
+      return !pass.asksFor(group) || static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= enough;
     });
   };
   if (areSupported()) return true;  // by their own row, as most are
@@ -191,63 +196,52 @@ bool IsolatedPoints::areAllSupported(std::uint32_t cell, int last_slice, bool se
   return areSupported();
 }
 
-void IsolatedPoints::decide(std::uint32_t cell, int last_slice, bool second) {
-  Group* const groups = groups_.data() + begin_[cell];
-  const Group* const end = groups + group_count_[cell];
-  const auto isOpen = [&](const Group& group) {
-    return group.slice < last_slice && !(second && group.isolated);
-  };
-  if (std::none_of(static_cast<const Group*>(groups), end, isOpen)) return;
-  if (second) {
-    bool any = false;
-    cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
-      for (std::uint32_t c = first; c <= last; ++c) any |= any_isolated_[c] != 0;
-    });
-    if (!any) return;
+std::array<int, 2> IsolatedPoints::slicesOf(std::uint32_t cell, const Pass& pass) const {
+  std::array<int, 2> slices = {kSlices, 0};
+  const Group* const groups = groups_.data() + begin_[cell];
+  for (int g = 0; g < group_count_[cell]; ++g) {
+    if (!pass.asksFor(groups[g])) continue;
+    slices = {std::min<int>(slices[0], groups[g].slice), std::max<int>(slices[1], groups[g].slice)};
   }
-  if (areAllSupported(cell, last_slice, second)) {
-    for (Group* group = groups; group != end; ++group) {
-      if (isOpen(*group)) group->isolated_after = 0;
-    }
-    return;
-  }
-  const DirectionCells::Row own = cells_.rowOf(cell);
-  const int own_column = static_cast<int>(cell - own.begin);
-  int nearest = kSlices, farthest = 0;  // of the slices of open groups
-  for (const Group* group = groups; group != end; ++group) {
-    if (!isOpen(*group)) continue;
-    nearest = std::min<int>(nearest, group->slice);
-    farthest = std::max<int>(farthest, group->slice);
-  }
-  const auto supportOf = [&](const Group& group) { return second && group.isolated ? 0 : group.beams; };
-  Profile window(nearest, farthest), row_strip = window;
+  return slices;
+}
+
+bool IsolatedPoints::compareWithAllAndRow(std::uint32_t cell, const Pass& pass) {
+  const auto [nearest, farthest] = slicesOf(cell, pass);
+  const std::uint32_t own_row = cells_.rowOf(cell).begin;
+  Profile all(nearest, farthest), strip(nearest, farthest);
   std::uint32_t beams = 0;
   cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
     beams += begin_[last + 1] - begin_[first];
     for (std::uint32_t c = first; c <= last; ++c) {
       const Group* const others = groups_.data() + begin_[c];
       for (int g = 0; g < group_count_[c]; ++g) {
-        if (!window.asksFor(others[g].slice)) continue;
-        window.add(others[g].slice, others[g].beams, supportOf(others[g]));
-        if (row.begin == own.begin) row_strip.add(others[g].slice, others[g].beams, supportOf(others[g]));
+        if (!all.asksFor(others[g].slice)) continue;
+        all.add(others[g].slice, others[g].beams, pass.supportOf(others[g]));
+        if (row.begin == own_row) strip.add(others[g].slice, others[g].beams, pass.supportOf(others[g]));
       }
     }
   });
-  if (beams <= kFewestAround) return;
-  window.accumulate();
-  row_strip.accumulate();
-  const auto isLine = [](const Profile& strip, const Group& group) {
-    return strip.near(group.slice) >= std::max(kOfStrip * strip.reaching(group.slice), kLeastOfStrip);
-  };
-  bool any_left = false;
-  for (Group* group = groups; group != end; ++group) {
-    if (!isOpen(*group)) continue;
-    const float enough = kOfSquareRoot * std::sqrt(window.reaching(group->slice));
-    group->isolated_after = window.near(group->slice) < std::max(enough, 1.0f) && !isLine(row_strip, *group);
-    any_left |= group->isolated_after != 0;
+  if (beams <= kFewestAround) return false;
+  all.accumulate();
+  strip.accumulate();
+  bool any = false;
+  Group* const groups = groups_.data() + begin_[cell];
+  for (int g = 0; g < group_count_[cell]; ++g) {
+    Group& group = groups[g];
+    if (!pass.asksFor(group)) continue;
+    const float enough = std::max(kOfSquareRoot * std::sqrt(all.reaching(group.slice)), 1.0f);
+    group.isolated_after = all.near(group.slice) < enough && !isLine(strip, group.slice);
+    any |= group.isolated_after != 0;
   }
-  if (!any_left) return;
-  Profile column_strips[2] = {{nearest, farthest}, {nearest, farthest}};  // of the two halves of the cell
+  return any;
+}
+
+void IsolatedPoints::compareWithColumns(std::uint32_t cell, const Pass& pass) {
+  const auto [nearest, farthest] = slicesOf(cell, pass);
+  const DirectionCells::Row own = cells_.rowOf(cell);
+  const int own_column = static_cast<int>(cell - own.begin);
+  Profile strips[2] = {{nearest, farthest}, {nearest, farthest}};  // of the two halves of the cell
   cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
     const int halves = 2 * row.columns;
     // Of the two halves of the cell, those of the row at the same azimuth.
@@ -263,19 +257,37 @@ void IsolatedPoints::decide(std::uint32_t cell, int last_slice, bool second) {
       }
       const Group* const others = groups_.data() + begin_[c];
       for (int g = 0; g < group_count_[c]; ++g) {
-        if (!window.asksFor(others[g].slice)) continue;
+        if (!strips[0].asksFor(others[g].slice)) continue;
         for (int half = 0; half < 2; ++half) {
           if (!in_strip[half][others[g].half]) continue;
-          column_strips[half].add(others[g].slice, others[g].beams, supportOf(others[g]));
+          strips[half].add(others[g].slice, others[g].beams, pass.supportOf(others[g]));
         }
       }
     }
   });
-  for (Profile& strip : column_strips) strip.accumulate();
+  for (Profile& strip : strips) strip.accumulate();
+  Group* const groups = groups_.data() + begin_[cell];
+  for (int g = 0; g < group_count_[cell]; ++g) {
+    if (pass.asksFor(groups[g]) && isLine(strips[groups[g].half], groups[g].slice))
+      groups[g].isolated_after = 0;
+  }
+}
+
+void IsolatedPoints::decide(std::uint32_t cell, const Pass& pass) {
+  Group* const groups = groups_.data() + begin_[cell];
+  Group* const end = groups + group_count_[cell];
+  if (std::none_of(groups, end, [&](const Group& group) { return pass.asksFor(group); })) return;
+  if (pass.second) {  // where no support is gone, the first pass has decided
+    bool any = false;
+    cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
+      for (std::uint32_t c = first; c <= last; ++c) any |= any_isolated_[c] != 0;
+    });
+    if (!any) return;
+  }
+  if (areAllSupported(cell, pass)) return;
+  if (compareWithAllAndRow(cell, pass)) compareWithColumns(cell, pass);
+  if (pass.second) return;
   for (Group* group = groups; group != end; ++group) {
-    if (!isOpen(*group) || !group->isolated_after) continue;
-    group->isolated_after = !isLine(column_strips[group->half], *group);
-    if (second) continue;
     group->isolated = group->isolated_after;
     any_isolated_[cell] |= group->isolated;
   }
@@ -310,8 +322,8 @@ const std::vector<std::uint8_t>& IsolatedPoints::find(Span<const Eigen::Vector3f
   };
   std::fill(group_count_.begin(), group_count_.end(), std::uint16_t{0});
   forEachCell([&](std::uint32_t cell) { makeGroups(cell); });
-  forEachCell([&](std::uint32_t cell) { decide(cell, last_slice, false); });
-  forEachCell([&](std::uint32_t cell) { decide(cell, last_slice, true); });
+  forEachCell([&](std::uint32_t cell) { decide(cell, {last_slice, false}); });
+  forEachCell([&](std::uint32_t cell) { decide(cell, {last_slice, true}); });
   forEachCell([&](std::uint32_t cell) { markPoints(cell); });
   return isolated_;
 }

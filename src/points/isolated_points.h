@@ -118,11 +118,26 @@ class IsolatedPoints {
                   std::uint16_t* keys) const;
   void sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool);
   void makeGroups(std::uint32_t cell);
-  /// Decides about the groups of a cell: by all groups around it or, in the second pass, by those that are
-  /// not isolated.
-  void decide(std::uint32_t cell, int last_slice, bool second);
-  /// Whether so many beams end near each group of a cell that nothing else matters: a fast answer for most.
-  bool areAllSupported(std::uint32_t cell, int last_slice, bool second) const;
+  /// The first pass asks for the support of all groups, the second one for that of those that are not
+  /// isolated after the first.
+  struct Pass {
+    int last_slice;  ///< groups from it on are not isolated
+    bool second;
+    bool asksFor(const Group& group) const { return group.slice < last_slice && !(second && group.isolated); }
+    std::uint32_t supportOf(const Group& group) const { return second && group.isolated ? 0 : group.beams; }
+  };
+  /// Decides about the groups of a cell.
+  void decide(std::uint32_t cell, const Pass& pass);
+  // Parts of decide(), by what they take: the first one decides about most cells.
+  /// Whether so many beams end near each group of a cell that nothing else matters.
+  bool areAllSupported(std::uint32_t cell, const Pass& pass) const;
+  /// Finds the groups of a cell that neither all beams around nor those of its row support.
+  /// @return whether there are any.
+  bool compareWithAllAndRow(std::uint32_t cell, const Pass& pass);
+  /// Of these, keeps those that the beams of their column do not support either.
+  void compareWithColumns(std::uint32_t cell, const Pass& pass);
+  /// The first and the last slice of the groups of a cell for which a pass asks.
+  std::array<int, 2> slicesOf(std::uint32_t cell, const Pass& pass) const;
   void markPoints(std::uint32_t cell);
 
   DirectionCells cells_;
