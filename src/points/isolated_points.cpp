@@ -95,10 +95,10 @@ int IsolatedPoints::sliceOf(float range) {
 
 void IsolatedPoints::findPlaces(const Eigen::Vector3f* points, std::size_t count, std::uint32_t* cells,
                                 std::uint16_t* keys) const {
-  constexpr std::size_t kBatch = 64;
-  float x[kBatch], y[kBatch], z[kBatch], ranges[kBatch], rows[kBatch], turns[kBatch];
-  for (std::size_t begin = 0; begin < count; begin += kBatch) {
-    const std::size_t size = std::min(kBatch, count - begin);
+  constexpr std::size_t kAtOnce = 64;
+  float x[kAtOnce], y[kAtOnce], z[kAtOnce], ranges[kAtOnce], rows[kAtOnce], turns[kAtOnce];
+  for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
+    const std::size_t size = std::min(kAtOnce, count - begin);
     for (std::size_t i = 0; i < size; ++i) {
       x[i] = points[begin + i].x();
       y[i] = points[begin + i].y();
