@@ -81,6 +81,14 @@ class TileCodecTest : public testing::Test {
     return codec_.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()),
                          content.size());
   }
+  void expectReadAsWritten(const SemanticMap& map) {
+    entry_ = codec_.pack(map, kKey);
+    const std::string packed = codec_.packed();
+    ASSERT_EQ(fault(packed), "");
+    SemanticMap copy = infoOf().emptyMap();
+    codec_.addTo(copy, kKey);
+    EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  }
   /// Packs and unpacks a tile whose blocks have as many looks as there can be, or none.
   void keepsAllLooks() {
     SemanticMap map = infoOf().emptyMap();
@@ -100,12 +108,7 @@ class TileCodecTest : public testing::Test {
       some = ~some;
     }
     map.getOrAllocate({{17, -8, 0}}).setOcclusion(other);
-    entry_ = codec_.pack(map, kKey);
-    const std::string packed = codec_.packed();
-    ASSERT_EQ(fault(packed), "");
-    SemanticMap copy = infoOf().emptyMap();
-    codec_.addTo(copy, kKey);
-    EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+    expectReadAsWritten(map);
   }
 
   const TileKey kKey{{2, -1, 0}, 3};
@@ -296,12 +299,7 @@ TEST_F(LooksInTile, StayReadableWhenABoxIsCleared) {
   map.getOrAllocate(index).looks().erase(cleared);
   EXPECT_EQ(map.find(index)->looks().all().size(), 2u)
       << "without the latest, the other would have a wrong level";
-  entry_ = codec_.pack(map, kKey);
-  const std::string packed = codec_.packed();
-  ASSERT_EQ(fault(packed), "");
-  SemanticMap copy = infoOf().emptyMap();
-  codec_.addTo(copy, kKey);
-  EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+  expectReadAsWritten(map);
   cleared.set();
   map.getOrAllocate(index).looks().erase(cleared);
   EXPECT_TRUE(map.find(index)->looks().empty());
