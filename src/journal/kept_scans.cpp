@@ -30,7 +30,8 @@ ScanStats KeptScans::integrateRecorded(const ScanView& scan, const Eigen::Isomet
 
 ScanStats KeptScans::add(RoundedScan rounded, const std::string& sensor,
                          const std::optional<Eigen::Isometry3d>& T_odometry_sensor) {
-  ScanStats stats = mapper_.integrate(place(rounded.scan, rounded.T_map_sensor));
+  place(rounded.scan, rounded.T_map_sensor, placed_);
+  ScanStats stats = mapper_.integrate(placed_);
   stats.counts += rounded.left_out;
   robot_ = rounded.T_map_sensor.translation();
   const auto known = std::find(sensors_.begin(), sensors_.end(), sensor);

@@ -56,6 +56,7 @@ class KeptScans {
   MapCorrector corrector_;
   std::vector<std::string> sensors_;
   std::vector<Eigen::AlignedBox3d> cleared_;
+  Scan placed_;                                      ///< the last scan; its memory is used again
   Eigen::Vector3d robot_ = Eigen::Vector3d::Zero();  ///< where the last scan is
 };
 

@@ -12,10 +12,33 @@ namespace {
 constexpr float kMostQuanta = 0x1.0p30f;
 constexpr std::size_t kMostClassesOfPoint = 255;
 
+/// std::round of a number that the integer can hold. Not every processor has an instruction for it, and a
+/// call for each coordinate takes most of the time of rounding a scan.
+std::int32_t nearest(float number) {
+  constexpr float kBelowHalf = 0x1.fffffep-2f;  // 0.5 would make 1 of the number below 0.5
+  return static_cast<std::int32_t>(number + std::copysign(kBelowHalf, number));
+}
+
 SensorScan::Coordinates rounded(const Eigen::Vector3f& vector, float unit) {
-  const Eigen::Vector3f quanta = (vector / unit).array().round();
-  return {static_cast<std::int32_t>(quanta.x()), static_cast<std::int32_t>(quanta.y()),
-          static_cast<std::int32_t>(quanta.z())};
+  return {nearest(vector.x() / unit), nearest(vector.y() / unit), nearest(vector.z() / unit)};
+}
+
+/// Points that are rounded at once; they stay in the first-level cache.
+constexpr std::size_t kRun = 512;
+
+/// Rounds up to kRun points. @param limit of the coordinates [m].
+/// @return false if some do not become points; then all have to be looked at one by one.
+bool roundRun(Span<const Eigen::Vector3f> points, float unit, float limit,
+              std::array<SensorScan::Coordinates, kRun>& rounded) {
+  const float* const coordinates = points.begin()->data();
+  std::int32_t* const quanta = rounded.front().data();
+  const std::size_t count = 3 * points.size();
+  int outside = 0, zero = 0;  // counted rather than left at once, so that the loops are vectorised
+  for (std::size_t n = 0; n < count; ++n) outside += std::abs(coordinates[n]) < limit ? 0 : 1;
+  if (outside > 0) return false;
+  for (std::size_t n = 0; n < count; ++n) quanta[n] = nearest(coordinates[n] / unit);
+  for (std::size_t n = 0; n < count; n += 3) zero += (quanta[n] | quanta[n + 1] | quanta[n + 2]) == 0 ? 1 : 0;
+  return zero == 0;
 }
 
 Eigen::Vector3f vectorOf(const SensorScan::Coordinates& coordinates, float unit) {
@@ -78,6 +101,7 @@ RoundedScan toSensorScan(const ScanView& scan, const Eigen::Isometry3d& T_map_se
   const SensorModelConfig& model = scan.sensor_model ? *scan.sensor_model : sensor;
   const Eigen::Matrix3f to_sensor = roundedRotation(T_map_sensor).transpose();
   const auto unit = static_cast<float>(quantum);
+  const float limit = kMostQuanta * unit;
   const auto leaveOut = [&](std::size_t PointCounts::*reason) {
     ++left_out.points;
     ++(left_out.*reason);
@@ -88,41 +112,46 @@ RoundedScan toSensorScan(const ScanView& scan, const Eigen::Isometry3d& T_map_se
     kept.no_returns.push_back(length > 0.0f ? rounded(direction / length, SensorScan::kDirectionUnit)
                                             : SensorScan::Coordinates{0, 0, 0});
   };
-  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+  const auto addPoint = [&](std::size_t i) {
     const Eigen::Vector3f point = to_sensor * scan.points[i];
-    if (!point.allFinite()) {
-      leaveOut(&PointCounts::not_finite);
-    } else if (!(point.cwiseAbs().maxCoeff() < kMostQuanta * unit)) {
-      leaveOut(&PointCounts::outside_map);
-    } else if (scan.no_returns_at_max_range && isAtMaxRange(model, point.norm())) {
-      addDirection(point);
+    if (!point.allFinite()) return leaveOut(&PointCounts::not_finite);
+    if (!(point.cwiseAbs().maxCoeff() < limit)) return leaveOut(&PointCounts::outside_map);
+    if (scan.no_returns_at_max_range && isAtMaxRange(model, point.norm())) return addDirection(point);
+    const SensorScan::Coordinates quanta = rounded(point, unit);
+    if (isZero(quanta)) return leaveOut(&PointCounts::at_sensor);
+    if (scan.soft && !addShares(scan.soft->begin(i), scan.soft->end(i), kept)) {
+      return leaveOut(&PointCounts::not_finite);
+    }
+    kept.points.push_back(quanta);
+    kept.labels.push_back(scan.labels[i]);
+  };
+  const bool as_they_are = to_sensor.isIdentity(0.0f) && !scan.soft && !scan.no_returns_at_max_range;
+  std::array<SensorScan::Coordinates, kRun> run;
+  for (std::size_t begin = 0; begin < scan.points.size(); begin += kRun) {
+    const std::size_t end = std::min(begin + kRun, scan.points.size());
+    if (as_they_are && roundRun({&scan.points[begin], end - begin}, unit, limit, run)) {
+      kept.points.insert(kept.points.end(), run.begin(),
+                         run.begin() + static_cast<std::ptrdiff_t>(end - begin));
+      kept.labels.insert(kept.labels.end(), scan.labels.begin() + begin, scan.labels.begin() + end);
     } else {
-      const SensorScan::Coordinates quanta = rounded(point, unit);
-      if (isZero(quanta)) {
-        leaveOut(&PointCounts::at_sensor);
-      } else if (scan.soft && !addShares(scan.soft->begin(i), scan.soft->end(i), kept)) {
-        leaveOut(&PointCounts::not_finite);
-      } else {
-        kept.points.push_back(quanta);
-        kept.labels.push_back(scan.labels[i]);
-      }
+      for (std::size_t i = begin; i < end; ++i) addPoint(i);
     }
   }
   for (const Eigen::Vector3f& direction : scan.no_returns) addDirection(to_sensor * direction);
   return result;
 }
 
-Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor) {
-  Scan scan;
+void place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor, Scan& scan) {
   scan.origin = T_map_sensor.translation();
   const Eigen::Matrix3f rotation = roundedRotation(T_map_sensor);
   const auto unit = static_cast<float>(kept.quantum);
-  scan.points.reserve(kept.points.size());
-  for (const SensorScan::Coordinates& point : kept.points) {
-    scan.points.push_back(rotation * vectorOf(point, unit));
+  scan.points.resize(kept.points.size());
+  for (std::size_t i = 0; i < kept.points.size(); ++i) {
+    scan.points[i].noalias() = rotation * vectorOf(kept.points[i], unit);
   }
   scan.labels = kept.labels;
   scan.labels_are_ids = kept.labels_are_ids;
+  scan.soft = {};
   std::size_t next = 0;
   for (const std::uint8_t count : kept.soft_counts) {
     scan.soft.startPoint();
@@ -130,22 +159,31 @@ Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor) {
       scan.soft.add({kept.soft_ids[next], SensorScan::kShareUnit * kept.soft_shares[next]});
     }
   }
-  scan.no_returns.reserve(kept.no_returns.size());
+  scan.no_returns.clear();
   for (const SensorScan::Coordinates& direction : kept.no_returns) {
     scan.no_returns.push_back(rotation * vectorOf(direction, SensorScan::kDirectionUnit));
   }
+  scan.no_returns_at_max_range = false;
   scan.sensor_model = kept.sensor_model;
   scan.stamp = kept.stamp;
+}
+
+Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor) {
+  Scan scan;
+  place(kept, T_map_sensor, scan);
   return scan;
 }
 
 double reachOf(const SensorScan& scan, const SensorModelConfig& sensor) {
   const SensorModelConfig& model = scan.sensor_model ? *scan.sensor_model : sensor;
-  double farthest = 0.0;
-  for (const auto& [x, y, z] : scan.points) {
-    farthest = std::max(farthest, Eigen::Vector3d(x, y, z).squaredNorm());
+  std::array<double, 4> farthest = {};  // several, so that one does not wait for another
+  for (std::size_t n = 0; n < scan.points.size(); ++n) {
+    const auto& [x, y, z] = scan.points[n];
+    double& most = farthest[n % farthest.size()];
+    most = std::max(most, Eigen::Vector3d(x, y, z).squaredNorm());
   }
-  double reach = std::min(scan.quantum * std::sqrt(farthest), model.reach());
+  double reach =
+      std::min(scan.quantum * std::sqrt(*std::max_element(farthest.begin(), farthest.end())), model.reach());
   if (!scan.no_returns.empty() && model.knowsRange()) reach = std::max(reach, model.max_range);
   return reach;
 }

@@ -246,7 +246,8 @@ void MappingServer::reportTfJumps() {
 ScanStats MappingServer::addToMap(const WaitingCloud& waiting, const PlacedScan& placed) {
   if (!corrected_) return addToMap(placed.scan);
   RoundedScan rounded = corrected_->round(placed);
-  ScanStats stats = addToMap(place(rounded.scan, rounded.T_map_sensor));
+  place(rounded.scan, rounded.T_map_sensor, rounded_);
+  ScanStats stats = addToMap(rounded_);
   stats.counts += rounded.left_out;
   corrected_->add(std::move(rounded.scan), rounded.T_map_sensor,
                   readers_[waiting.input].sensorFrame(*waiting.cloud), mapper_->touchedBlocks());

@@ -126,6 +126,7 @@ class MappingServer {
 
   std::unique_ptr<PoseSource> poses_;
   std::unique_ptr<CorrectedPoses> corrected_;  ///< nullptr without a journal
+  Scan rounded_;  ///< the last scan, as the journal keeps it; its memory is used again
   std::vector<ros::Subscriber> cloud_subscribers_;
   std::vector<ros::ServiceServer> services_;
   ros::Publisher status_publisher_;
