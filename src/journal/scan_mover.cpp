@@ -1,6 +1,7 @@
 #include "journal/scan_mover.h"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 #include <utility>
 
@@ -32,9 +33,13 @@ void forEachLooks(const SemanticMap& map, Visit&& visit) {
 
 std::vector<GridIndex> regionsOf(const std::vector<GridIndex>& blocks) {
   std::vector<GridIndex> regions;
+  std::array<std::uint32_t, 256> last_seen = {};  // one more than the position of a region, by its hash
   for (const GridIndex& block : blocks) {
     const GridIndex region = SemanticMap::regionOf({block});
-    if (regions.empty() || regions.back() != region) regions.push_back(region);
+    std::uint32_t& seen = last_seen[GridIndexHash()(region) % last_seen.size()];
+    if (seen != 0 && regions[seen - 1] == region) continue;
+    regions.push_back(region);
+    seen = static_cast<std::uint32_t>(regions.size());
   }
   std::sort(regions.begin(), regions.end());
   regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
