@@ -551,14 +551,18 @@ class Tools(ProgramTest):
         result = call('benchmark_sequence', '--sequence', self.drive, '--repeats', '0')
         self.assertNotEqual(result.returncode, 0)
         self.assertIn('--repeats', result.stderr)
+        self.fails('--journal is 0, but must be from 0.0001 to 1', 'benchmark_sequence', '--sequence', self.drive, '--journal', '0')
         self.succeeds('benchmark_sequence', '--sequence', self.drive, '--warm-up', '2', '--repeats', '2',
-                      '--csv', self.path('times.csv'))
+                      '--journal', '0.01', '--csv', self.path('times.csv'))
         with open(self.path('times.csv'), newline='') as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(list(rows[0]),
-                         ['mode', 'resolution', 'threads', 'median_ms', 'p99_ms', 'ratio_to_y', 'map_bytes'])
+                         ['mode', 'resolution', 'threads', 'median_ms', 'p99_ms', 'ratio_to_y', 'map_bytes', 'journal_ratio'])
         self.assertEqual(len(rows), 22)
         self.assertTrue(all(float(row['median_ms']) > 0 for row in rows))
+        # Only scans that can be moved are kept.
+        self.assertTrue(all((row['journal_ratio'] == '') == ('mapped' in row['mode']) for row in rows))
+        self.assertTrue(all(float(row['journal_ratio']) > 0 for row in rows if 'mapped' not in row['mode']))
         self.assertEqual([(row['mode'], row['resolution']) for row in rows[-6::2]],
                          [('robot', '0.3'), ('robot', '0.1'), ('paper_line', '0.1')])
 
