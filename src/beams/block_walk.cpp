@@ -138,7 +138,7 @@ void markBlocks(SlabWalk walk, const MarkLayout& layout, std::uint8_t* marks) {
 }  // namespace
 
 void BlockWalk::clearMarks(std::size_t count) {
-  constexpr std::size_t kWord = sizeof(std::uint64_t);  // insertMarked() reads whole words
+  constexpr std::size_t kWord = sizeof(std::uint64_t);  // listMarked() reads whole words
   if (capacity_ < count) {
     capacity_ = 0;
     marks_ = nullptr;  // frees the old marks before allocating the new ones
@@ -148,7 +148,7 @@ void BlockWalk::clearMarks(std::size_t count) {
   std::fill_n(marks_.get(), count, std::uint8_t{0});
 }
 
-void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
+void BlockWalk::listMarked(const Box& box, std::vector<GridIndex>& blocks) const {
   constexpr int kWord = sizeof(std::uint64_t);
   const std::uint8_t* row = marks_.get();
   for (int z = 0; z < box.size.z(); ++z) {
@@ -158,15 +158,16 @@ void BlockWalk::insertMarked(const Box& box, IndexNumbering& blocks) const {
         __builtin_memcpy(&word, row + begin, sizeof(word));
         if (word == 0) continue;
         for (int x = begin; x < std::min(begin + kWord, box.size.x()); ++x) {
-          if (row[x] != 0) blocks.insert({box.low.x() + x, box.low.y() + y, box.low.z() + z});
+          if (row[x] != 0) blocks.push_back({box.low.x() + x, box.low.y() + y, box.low.z() + z});
         }
       }
     }
   }
 }
 
-void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
-                                  double reach, std::size_t most, ThreadPool& pool, IndexNumbering& blocks) {
+void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
+                                double reach, std::size_t most, ThreadPool& pool,
+                                std::vector<GridIndex>& blocks) {
   if (beams.ends.empty()) return;
   Eigen::Array3d low = Eigen::Array3d::Zero(), high = Eigen::Array3d::Zero();
   for (const Eigen::Vector3f& end : beams.ends) {
@@ -182,14 +183,15 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
   const Eigen::Array3d size =
       ((high + margin + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
   if (size.prod() > kMostMarks) {
-    const std::size_t before = blocks.size();
+    few_.clear();
     for (std::size_t b = 0; b < beams.ends.size(); ++b) {
       const double fraction = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
       forEachBlockOf(slabsAlong(geometry, segmentOf(beams, b, piece), reach), [&](int x, int y, int z) {
-        blocks.insert({x, y, z});
-        limitBlocks(blocks.size() - before, most, fraction);
+        few_.insert({x, y, z});
+        limitBlocks(few_.size(), most, fraction);
       });
     }
+    blocks.insert(blocks.end(), few_.members().begin(), few_.members().end());
     return;
   }
   const Box box{first.cast<int>(), size.cast<int>()};
@@ -203,16 +205,18 @@ void BlockWalk::insertBlocksAlong(const GridGeometry& geometry, const Beams& bea
       markBlocks(slabsAlong(geometry, segmentOf(beams, b, piece), reach), layout, marks_.get());
     }
   });
-  limitBlocks(std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0}), most);
-  insertMarked(box, blocks);
+  const std::size_t marked = std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0});
+  limitBlocks(marked, most);
+  blocks.reserve(blocks.size() + marked);
+  listMarked(box, blocks);
 }
 
-void insertMappedBlocks(const SemanticMap& map, const Eigen::Vector3d& point, double range,
-                        IndexNumbering& blocks) {
+void listMappedBlocks(const SemanticMap& map, const Eigen::Vector3d& point, double range,
+                      std::vector<GridIndex>& blocks) {
   const GridGeometry& geometry = map.geometry();
   const double radius = range + 0.5 * std::sqrt(3.0) * geometry.blockSize();
   map.forEachBlockNear(point, radius, [&](const BlockIndex& index) {
-    if ((geometry.blockCentre(index) - point).squaredNorm() < radius * radius) blocks.insert(index);
+    if ((geometry.blockCentre(index) - point).squaredNorm() < radius * radius) blocks.push_back(index);
   });
 }
 

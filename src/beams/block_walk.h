@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "beams/beams.h"
 #include "bki_mapping/map/semantic_map.h"
@@ -22,10 +23,10 @@ struct BeamPiece {
 /// Lists the blocks along beams. Keeps its memory from scan to scan.
 class BlockWalk {
  public:
-  /// Inserts every block that has a voxel centre within `reach` [m] of a beam's piece, and some around those.
-  /// @param most new blocks. @throws TooMuchWork if there are more.
-  void insertBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece,
-                         double reach, std::size_t most, ThreadPool& pool, IndexNumbering& blocks);
+  /// Appends every block that has a voxel centre within `reach` [m] of a beam's piece, and some around those,
+  /// each once. @param most blocks. @throws TooMuchWork if there are more.
+  void listBlocksAlong(const GridGeometry& geometry, const Beams& beams, const BeamPiece& piece, double reach,
+                       std::size_t most, ThreadPool& pool, std::vector<GridIndex>& blocks);
 
  private:
   /// A dense box of blocks to be marked. Beams cross the same blocks many times, so this is faster than a
@@ -36,15 +37,16 @@ class BlockWalk {
 
   /// Makes `count` cleared marks.
   void clearMarks(std::size_t count);
-  /// Inserts the marked blocks in the order of their offsets, whichever thread marked them.
-  void insertMarked(const Box& box, IndexNumbering& blocks) const;
+  /// Appends the marked blocks in the order of their offsets, whichever thread marked them.
+  void listMarked(const Box& box, std::vector<GridIndex>& blocks) const;
 
   std::unique_ptr<std::uint8_t[]> marks_;  ///< x fastest
   std::size_t capacity_ = 0;
+  IndexNumbering few_;  ///< blocks of a box that is too large for marks
 };
 
-/// Inserts the blocks of the map that come within `range` [m] of a point of the map frame.
-void insertMappedBlocks(const SemanticMap& map, const Eigen::Vector3d& point, double range,
-                        IndexNumbering& blocks);
+/// Appends the blocks of the map that come within `range` [m] of a point of the map frame.
+void listMappedBlocks(const SemanticMap& map, const Eigen::Vector3d& point, double range,
+                      std::vector<GridIndex>& blocks);
 
 }  // namespace bki_mapping

@@ -61,11 +61,11 @@ const std::vector<GridIndex>& LineEvidence::touchedBlocks(const SemanticMap& map
     near_sensor_.set(*field_, lines_, weight_, enough_ / field_->kernel().scale, pool);
   }
   if (extent_ == FreeSpaceExtent::kMapped) {
-    insertMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
+    listMappedBlocks(map, field_->origin(), field_->longest() + reach, touched_);
   } else {
-    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, most, pool, touched_);
+    walk_.listBlocksAlong(field_->geometry(), field_->beams(), BeamPiece(), reach, most, pool, touched_);
   }
-  return touched_.members();
+  return touched_;
 }
 
 void LineEvidence::reserve(std::size_t workers) {

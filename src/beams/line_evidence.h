@@ -52,7 +52,7 @@ class LineEvidence : public Evidence {
   NearSensor near_sensor_;
   float enough_ = std::numeric_limits<float>::infinity();
   BlockWalk walk_;
-  IndexNumbering touched_;
+  std::vector<GridIndex> touched_;
   std::vector<Workspace> workspaces_;
 };
 

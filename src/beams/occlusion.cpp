@@ -5,11 +5,13 @@ namespace bki_mapping {
 const std::vector<GridIndex>& Occlusion::touchedBlocks(const SemanticMap& map, std::size_t most,
                                                        ThreadPool& pool) {
   const double reach = field_->reachMetres();
-  touched_.clear();
-  insertMappedBlocks(map, field_->origin(), range_ + reach, touched_);
+  listed_.clear();
+  listMappedBlocks(map, field_->origin(), range_ + reach, listed_);
   if (extent_ == OcclusionExtent::kAll) {
-    walk_.insertBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, most, pool, touched_);
+    walk_.listBlocksAlong(field_->geometry(), field_->beams(), {true, range_}, reach, most, pool, listed_);
   }
+  touched_.clear();
+  for (const GridIndex& block : listed_) touched_.insert(block);
   return touched_.members();
 }
 

@@ -17,16 +17,23 @@ class BlocksByGroup {
     groups_.clear();
     members_.clear();
     numbers_.clear();
+    size_ = 0;
   }
-  /// Adds a block. @param number of the block, e.g. its position in a list; unique.
-  void add(const BlockIndex& block, std::uint32_t number) {
+  /// Inserts a block unless it is a member; not after sort().
+  /// @return its number: 0, 1, 2, ... in the order of insertion.
+  std::uint32_t insert(const BlockIndex& block) {
     const std::uint32_t group = groups_.insert(groupOf(block));
     if (group == members_.size()) members_.emplace_back();
+    Members& members = members_[group];
     const int slot = slotInGroup(block);
-    members_[group].slots |= std::uint64_t{1} << slot;
-    members_[group].at[static_cast<std::size_t>(slot)] = number;
+    std::uint32_t& number = members.at[static_cast<std::size_t>(slot)];
+    if ((members.slots >> slot & 1) == 0) {
+      members.slots |= std::uint64_t{1} << slot;
+      number = size_++;
+    }
+    return number;
   }
-  /// Call after the last add(). Numbers the blocks 0, 1, 2, ... in the order of their groups, and within a
+  /// Call after the last insert(). Numbers the blocks 0, 1, 2, ... in the order of their groups, and within a
   /// group by rising slots, so that each comes after the block below it in the group.
   void sort() {
     for (Members& members : members_) {
@@ -42,7 +49,7 @@ class BlocksByGroup {
 
   /// The groups, in the order in which their first blocks were added.
   const IndexNumbering& groups() const { return groups_; }
-  /// The numbers given to add(), in the new order.
+  /// The numbers that insert() gave, in the new order.
   const std::vector<std::uint32_t>& numbers() const { return numbers_; }
   /// The slots of a group's blocks. @param group position in groups().
   std::uint64_t slots(std::size_t group) const { return members_[group].slots; }
@@ -65,6 +72,7 @@ class BlocksByGroup {
   IndexNumbering groups_;
   std::vector<Members> members_;  ///< in the order of groups_
   std::vector<std::uint32_t> numbers_;
+  std::uint32_t size_ = 0;
 };
 
 }  // namespace bki_mapping

@@ -78,19 +78,21 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
   forEachBlock([&](std::size_t b) {
     const SeenVoxels& seen = seen_[b];
     empty_[b] = seen.crossed;
-    if (seen.crossed.none() || seen.crossed.all()) return;
-    empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
-                 ~(seen.bounds | seen.moving);
+    if (seen.crossed.any() && !seen.crossed.all()) {
+      empty_[b] |= betweenIn(b, 2, [&](std::size_t n) -> const VoxelMask& { return seen_[n].crossed; }) &
+                   ~(seen.bounds | seen.moving);
+    }
+    open_[b] = empty_[b] | seen.bounds;
   });
-  const auto seen = [&](std::size_t n) { return empty_[n] | seen_[n].bounds; };
+  const auto open = [&](std::size_t n) -> const VoxelMask& { return open_[n]; };
   forEachBlock([&](std::size_t b) {
-    along_x_[b] = seen(b);
-    if (along_x_[b].any()) along_x_[b] &= betweenIn(b, 0, seen);
+    along_x_[b] = open(b);
+    if (along_x_[b].any()) along_x_[b] &= betweenIn(b, 0, open);
   });
   // With both neighbours across the faces, those across an edge are two steps away, along different axes.
   forEachBlock([&](std::size_t b) {
     const auto along_x = [&](std::size_t n) -> const VoxelMask& { return along_x_[n]; };
-    const auto along_y = [&](std::size_t n) { return seen(n) & betweenIn(n, 1, seen); };
+    const auto along_y = [&](std::size_t n) { return open(n) & betweenIn(n, 1, open); };
     VoxelMask& voids = voids_[b];
     // Cheapest first: far from the sensor, beams are sheets, and voxels above or below them are not seen.
     voids = empty_[b] & along_x_[b];

@@ -26,13 +26,14 @@ struct SeenVoxels {
 /// evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:
-  /// Forgets the last scan, and takes all memory for this one. @param blocks number of those that it touches.
+  /// Takes all memory for a scan. @param blocks number of those that it touches; at() of each has to be set.
   void start(std::size_t blocks) {
-    seen_.assign(blocks, {});
+    seen_.resize(blocks);
     beside_.resize(blocks);
-    for (std::vector<VoxelMask>* masks : {&empty_, &along_x_, &voids_}) masks->resize(blocks);
+    for (std::vector<VoxelMask>* masks : {&empty_, &open_, &along_x_, &voids_}) masks->resize(blocks);
   }
-  /// What the scan says of a block; different threads may write to different blocks.
+  /// What the scan says of a block, at first what the scan before said of another one; different threads may
+  /// write to different blocks.
   SeenVoxels& at(std::size_t block) { return seen_[block]; }
   /// Computes the void voxels. @param blocks all of them, sorted; their order is that of at().
   void find(const BlocksByGroup& blocks, ThreadPool& pool);
@@ -53,7 +54,8 @@ class VoidSearch {
   std::vector<SeenVoxels> seen_;
   std::vector<Beside> beside_;
   std::vector<VoxelMask> empty_;    ///< crossed or bridged
-  std::vector<VoxelMask> along_x_;  ///< seen, with both neighbours along x
+  std::vector<VoxelMask> open_;     ///< these, and bounds
+  std::vector<VoxelMask> along_x_;  ///< open, with both neighbours along x
   std::vector<VoxelMask> voids_;
 };
 

@@ -31,8 +31,9 @@ void MapUpdater::setTasks(const ScanEvidence& scan) {
 }
 
 std::uint32_t MapUpdater::jobOf(SemanticMap& map, const BlockIndex& index) {
-  const std::uint32_t position = touched_.insert(index);
+  const std::uint32_t position = by_group_.insert(index);
   if (position < jobs_.size()) return position;
+  touched_.push_back(index);
   const SemanticMap::Claim claimed = map.claim(index);
   try {
     jobs_.push_back({index, claimed.block, nullptr, 0, claimed.is_new, claimed.shared, 0, false, 0});
@@ -58,15 +59,11 @@ void MapUpdater::collect(SemanticMap& map, const UpdateLimits& limits, ThreadPoo
 }
 
 void MapUpdater::groupJobs() {
-  by_group_.clear();
-  for (std::size_t n = 0; n < jobs_.size(); ++n) {
-    by_group_.add(jobs_[n].index, static_cast<std::uint32_t>(n));
-  }
   by_group_.sort();
   sorted_.clear();
   sorted_.reserve(jobs_.size());
   for (const std::uint32_t number : by_group_.numbers()) {
-    sorted_.push_back(jobs_[number]);
+    sorted_.push_back(std::move(jobs_[number]));
     sorted_.back().number = number;
   }
   jobs_.swap(sorted_);
@@ -182,6 +179,11 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
 void MapUpdater::addGroup(const Group& group, std::size_t worker) {
   Worker& own = workers_[worker];
   GroupInWork in_work(own.sums);
+  if (rules_.seeksVoids()) {
+    for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
+      voids_.at(j) = {};
+    }
+  }
   for (std::size_t t = 0; t < task_count_; ++t) {
     const Task& task = tasks_[t];
     const BlockGroup selected = selectBlocks(task, group, own);
@@ -287,6 +289,7 @@ MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, Th
   MapUpdateStats stats;
   Stopwatch watch;
   touched_.clear();
+  by_group_.clear();
   jobs_.clear();
   rules_ = rules;
   withdraws_ = scan.withdraws;

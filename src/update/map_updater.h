@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "map/blocks_by_group.h"
-#include "parallel/index_numbering.h"
 #include "rules/void_search.h"
 #include "update/evidence.h"
 #include "update/sum_kernels.h"
@@ -52,7 +51,7 @@ class MapUpdater {
                         const ScanRules& rules = ScanRules(), const UpdateLimits& limits = UpdateLimits());
 
   /// The blocks that the last update may have changed, created or erased, each once.
-  const std::vector<GridIndex>& touched() const { return touched_.members(); }
+  const std::vector<GridIndex>& touched() const { return touched_; }
 
  private:
   /// A touched block of the map.
@@ -137,9 +136,9 @@ class MapUpdater {
   void finishGroup(const Group& group);
 
   const SumKernels& kernels_ = sumKernelsFor("");
-  IndexNumbering touched_;        ///< blocks, in the order in which jobs were collected
-  std::vector<BlockJob> jobs_;    ///< as collected, then in the order of by_group_
-  std::vector<BlockJob> sorted_;  ///< memory for sorting them
+  std::vector<GridIndex> touched_;  ///< blocks, in the order in which jobs were collected
+  std::vector<BlockJob> jobs_;      ///< as collected, then in the order of by_group_
+  std::vector<BlockJob> sorted_;    ///< memory for sorting them
   BlocksByGroup by_group_;
   std::vector<Group> groups_;   ///< by falling cost
   std::vector<Task> tasks_;     ///< in the order of execution

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <random>
+#include <set>
+#include <vector>
 
 #include "beams/block_walk.h"
 
@@ -49,13 +51,14 @@ TEST(BlockWalk, ListsTheBlocksAlongBeams) {
     for (const Eigen::Vector3f& end : all.ends) {
       const Beams beams = {all.origin, {end}};
       ThreadPool pool(1);
-      IndexNumbering listed;
-      BlockWalk().insertBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, listed);
+      std::vector<GridIndex> blocks;
+      BlockWalk().listBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, blocks);
+      const std::set<GridIndex> listed(blocks.begin(), blocks.end());
       const BlockIndex centre = GridGeometry::blockOf(geometry.voxelAt(all.origin));
       for (int n = 0; n < 15 * 15 * 15; ++n) {
         const BlockIndex block{
             {centre.x + n % 15 - 7, centre.y + n / 15 % 15 - 7, centre.z + n / (15 * 15) - 7}};
-        const bool is_listed = listed.find(block) != kNoPosition;
+        const bool is_listed = listed.count(block) > 0;
         const double distance = distanceOf(geometry.blockCentre(block), beams.origin, end);
         if (distance < reach + geometry.blockSize()) {  // others cannot be reached
           EXPECT_TRUE(is_listed || !isReached(geometry, block, beams, reach))
@@ -75,14 +78,14 @@ TEST(BlockWalk, DoesNotDependOnThreads) {
     std::vector<GridIndex> expected;
     for (const int threads : {1, 2, 5}) {
       ThreadPool pool(threads);
-      IndexNumbering listed;
+      std::vector<GridIndex> listed;
       BlockWalk walk;
       for (int scan = 0; scan < 2; ++scan) {  // marks of the scan before are gone
         listed.clear();
-        walk.insertBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, listed);
+        walk.listBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, listed);
       }
-      if (threads == 1) expected = listed.members();
-      EXPECT_EQ(listed.members(), expected) << threads;
+      if (threads == 1) expected = listed;
+      EXPECT_EQ(listed, expected) << threads;
     }
     EXPECT_GT(expected.size(), 1000u);
   }
@@ -95,14 +98,16 @@ TEST(BlockWalk, ListsEachBlockOfAnyBeamOnce) {
   const Beams beams = randomBeams(random, 300);
   ThreadPool pool(2);
   BlockWalk walk;
-  IndexNumbering together, one_by_one;
-  walk.insertBlocksAlong(geometry, beams, BeamPiece(), 0.3, 1 << 20, pool, together);
+  std::vector<GridIndex> together, one_by_one;
+  walk.listBlocksAlong(geometry, beams, BeamPiece(), 0.3, 1 << 20, pool, together);
   for (const Eigen::Vector3f& end : beams.ends) {
-    walk.insertBlocksAlong(geometry, {beams.origin, {end}}, BeamPiece(), 0.3, 1 << 20, pool, one_by_one);
+    walk.listBlocksAlong(geometry, {beams.origin, {end}}, BeamPiece(), 0.3, 1 << 20, pool, one_by_one);
   }
-  ASSERT_EQ(together.size(), one_by_one.size());
-  for (const GridIndex& block : together.members()) EXPECT_NE(one_by_one.find(block), kNoPosition);
-  EXPECT_THROW(walk.insertBlocksAlong(geometry, beams, BeamPiece(), 0.3, together.size() - 1, pool, together),
+  const std::set<GridIndex> expected(one_by_one.begin(), one_by_one.end());
+  EXPECT_EQ(std::set<GridIndex>(together.begin(), together.end()), expected);
+  EXPECT_EQ(together.size(), expected.size());
+  std::vector<GridIndex> too_many;
+  EXPECT_THROW(walk.listBlocksAlong(geometry, beams, BeamPiece(), 0.3, together.size() - 1, pool, too_many),
                TooMuchWork);
 }
 

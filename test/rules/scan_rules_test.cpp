@@ -113,7 +113,7 @@ TEST(BlocksByGroup, ComesToEachBlockAfterTheOneBelow) {
       const auto coordinate = [&] { return static_cast<std::int32_t>(random() % 9) - 5; };
       blocks.insert({coordinate(), coordinate(), coordinate()});
     }
-    for (std::uint32_t b = 0; b < blocks.size(); ++b) by_group.add({blocks.members()[b]}, b);
+    for (const GridIndex& block : blocks.members()) by_group.insert({block});
     by_group.sort();
     ASSERT_EQ(by_group.numbers().size(), blocks.size());
     std::vector<bool> seen(blocks.size(), false);

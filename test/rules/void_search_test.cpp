@@ -39,13 +39,14 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
         added.insert({coordinate(), coordinate(), coordinate()});
       }
       BlocksByGroup by_group;  // up to eight groups
-      for (std::uint32_t b = 0; b < added.size(); ++b) by_group.add({added.members()[b]}, b);
+      for (const GridIndex& block : added.members()) by_group.insert({block});
       by_group.sort();
       IndexNumbering blocks;  // in the order of their groups
       for (const std::uint32_t b : by_group.numbers()) blocks.insert(added.members()[b]);
       ASSERT_EQ(blocks.size(), added.size());
       search.start(blocks.size());
       for (std::size_t b = 0; b < blocks.size(); ++b) {
+        search.at(b) = {};
         if (b % 7 == 3) continue;  // neither crossed nor hit
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
           if (random() % 1000 < unseen_of_thousand) continue;
