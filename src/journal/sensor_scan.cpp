@@ -29,9 +29,9 @@ constexpr std::size_t kRun = 512;
 /// Rounds up to kRun points. @param limit of the coordinates [m].
 /// @return false if some do not become points; then all have to be looked at one by one.
 bool roundRun(Span<const Eigen::Vector3f> points, float unit, float limit,
-              std::array<SensorScan::Coordinates, kRun>& rounded) {
-  const float* const coordinates = points.begin()->data();
-  std::int32_t* const quanta = rounded.front().data();
+              std::array<SensorScan::Coordinates, kRun>& run) {
+  const float* const coordinates = points.begin()->data();  // of all points, without gaps
+  std::int32_t* const quanta = run.front().data();
   const std::size_t count = 3 * points.size();
   int outside = 0, zero = 0;  // counted rather than left at once, so that the loops are vectorised
   for (std::size_t n = 0; n < count; ++n) outside += std::abs(coordinates[n]) < limit ? 0 : 1;
@@ -141,31 +141,32 @@ RoundedScan toSensorScan(const ScanView& scan, const Eigen::Isometry3d& T_map_se
   return result;
 }
 
-void place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor, Scan& scan) {
-  scan.origin = T_map_sensor.translation();
+void place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor, Scan& placed) {
+  placed.origin = T_map_sensor.translation();
   const Eigen::Matrix3f rotation = roundedRotation(T_map_sensor);
   const auto unit = static_cast<float>(kept.quantum);
-  scan.points.resize(kept.points.size());
+  placed.points.resize(kept.points.size());
   for (std::size_t i = 0; i < kept.points.size(); ++i) {
-    scan.points[i].noalias() = rotation * vectorOf(kept.points[i], unit);
+    placed.points[i].noalias() = rotation * vectorOf(kept.points[i], unit);
   }
-  scan.labels = kept.labels;
-  scan.labels_are_ids = kept.labels_are_ids;
-  scan.soft = {};
+  placed.labels = kept.labels;
+  placed.labels_are_ids = kept.labels_are_ids;
+  placed.soft.clear();
   std::size_t next = 0;
   for (const std::uint8_t count : kept.soft_counts) {
-    scan.soft.startPoint();
+    placed.soft.startPoint();
     for (const std::size_t end = next + count; next < end; ++next) {
-      scan.soft.add({kept.soft_ids[next], SensorScan::kShareUnit * kept.soft_shares[next]});
+      placed.soft.add({kept.soft_ids[next], SensorScan::kShareUnit * kept.soft_shares[next]});
     }
   }
-  scan.no_returns.clear();
+  placed.no_returns.clear();
+  placed.no_returns.reserve(kept.no_returns.size());
   for (const SensorScan::Coordinates& direction : kept.no_returns) {
-    scan.no_returns.push_back(rotation * vectorOf(direction, SensorScan::kDirectionUnit));
+    placed.no_returns.push_back(rotation * vectorOf(direction, SensorScan::kDirectionUnit));
   }
-  scan.no_returns_at_max_range = false;
-  scan.sensor_model = kept.sensor_model;
-  scan.stamp = kept.stamp;
+  placed.no_returns_at_max_range = false;
+  placed.sensor_model = kept.sensor_model;
+  placed.stamp = kept.stamp;
 }
 
 Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor) {

@@ -59,9 +59,9 @@ RoundedScan toSensorScan(const ScanView& scan, const Eigen::Isometry3d& T_map_se
                          const SensorModelConfig& sensor);
 
 /// The scan, placed at a pose of the sensor. Equal arguments give equal scans, to the bit.
-Scan place(const SensorScan& scan, const Eigen::Isometry3d& T_map_sensor);
+Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor);
 /// The same, into the memory of an earlier scan.
-void place(const SensorScan& scan, const Eigen::Isometry3d& T_map_sensor, Scan& placed);
+void place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor, Scan& placed);
 
 /// The farthest hit, or end of a beam without a return [m]. @param sensor as for toSensorScan().
 double reachOf(const SensorScan& scan, const SensorModelConfig& sensor);

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 #include "journal/some_scan.h"
 
@@ -68,6 +70,74 @@ TEST(SensorScan, WhatNoMapCanHoldIsCounted) {
   EXPECT_EQ(rounded.left_out.outside_map, 1u);
   scan.labels.pop_back();
   EXPECT_THROW(toSensorScan(scan, Eigen::Isometry3d::Identity(), kQuantum, {}), std::invalid_argument);
+}
+
+/// Where points need no turning, they are rounded many at a time.
+TEST(SensorScan, ManyPointsAreRoundedAsEachIs) {
+  constexpr float kUnit = 1.0f;  // so that the coordinates are what is rounded
+  const float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  std::vector<float> numbers = {0.0f,       0.5f,       1.5f,       2.5f,         1e-30f,
+                                4194303.5f, 8388607.0f, 8388609.0f, 1073741760.0f};
+  for (std::size_t n = numbers.size(); n-- > 0;) numbers.push_back(std::nextafter(numbers[n], 0.0f));
+  for (std::size_t n = numbers.size(); n-- > 0;) numbers.push_back(-numbers[n]);
+  std::mt19937 random(9);
+  const auto any = [&] { return numbers[random() % numbers.size()]; };
+  Scan scan;
+  while (scan.points.size() < 1300) {
+    scan.points.emplace_back(any(), any(), any());
+    if (scan.points.size() <= 512 || scan.points.size() > 1024)
+      scan.points.back().x() = 7.5f;  // all are hits
+  }
+  for (const std::size_t n : {600, 700}) scan.points[n] = {1.0f, kNan, 0.0f};
+  scan.points[800] = {kInf, 0.0f, 0.0f};
+  scan.points[900] = {0.0f, 0x1.0p30f, 0.0f};
+  scan.points[1000] = {0.0f, 0.4f, -0.4f};
+  for (std::size_t n = 0; n < scan.points.size(); ++n) scan.labels.push_back(static_cast<std::uint32_t>(n));
+  const RoundedScan rounded = toSensorScan(scan, Eigen::Isometry3d::Identity(), kUnit, {});
+  std::vector<SensorScan::Coordinates> points;
+  std::vector<std::uint32_t> labels;
+  std::size_t at_sensor = 0;
+  for (std::size_t n = 0; n < scan.points.size(); ++n) {
+    const Eigen::Vector3f& point = scan.points[n];
+    if (!(point.cwiseAbs().maxCoeff() < 0x1.0p30f) || !point.allFinite()) continue;
+    const auto whole = [](float number) { return static_cast<std::int32_t>(std::round(number)); };
+    points.push_back({whole(point.x()), whole(point.y()), whole(point.z())});
+    labels.push_back(scan.labels[n]);
+    if (points.back() != SensorScan::Coordinates{0, 0, 0}) continue;
+    ++at_sensor;
+    points.pop_back();
+    labels.pop_back();
+  }
+  EXPECT_EQ(rounded.scan.points, points);
+  EXPECT_EQ(rounded.scan.labels, labels);
+  EXPECT_GT(at_sensor, 0u);
+  EXPECT_EQ(rounded.left_out.at_sensor, at_sensor);
+  EXPECT_EQ(rounded.left_out.not_finite, 3u);
+  EXPECT_EQ(rounded.left_out.outside_map, 1u);
+  EXPECT_EQ(rounded.left_out.points, at_sensor + 4);
+}
+
+TEST(SensorScan, IsPlacedInTheMemoryOfAnotherAsInItsOwn) {
+  const Eigen::Isometry3d pose = somePose(6);
+  Scan placed = someScan(pose, 7, true);
+  placed.no_returns_at_max_range = true;
+  placed.sensor_model.emplace();
+  Scan plain = someScan(pose, 8, false);
+  plain.points.resize(30);
+  plain.labels.resize(30);
+  plain.no_returns.clear();
+  const SensorScan kept = toSensorScan(plain, pose, kQuantum, {}).scan;
+  place(kept, pose, placed);
+  const Scan expected = place(kept, pose);
+  EXPECT_EQ(placed.origin, expected.origin);
+  EXPECT_EQ(placed.points, expected.points);
+  EXPECT_EQ(placed.labels, expected.labels);
+  EXPECT_EQ(placed.labels_are_ids, expected.labels_are_ids);
+  EXPECT_TRUE(placed.soft.empty());
+  EXPECT_TRUE(placed.no_returns.empty());
+  EXPECT_FALSE(placed.no_returns_at_max_range);
+  EXPECT_FALSE(placed.sensor_model.has_value());
+  EXPECT_EQ(placed.stamp, expected.stamp);
 }
 
 TEST(SensorScan, PointsAtTheSensorsRangeStayBeamsWithoutAReturn) {
