@@ -183,15 +183,15 @@ void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams
   const Eigen::Array3d size =
       ((high + margin + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
   if (size.prod() > kMostMarks) {
-    few_.clear();
+    unmarked_.clear();
     for (std::size_t b = 0; b < beams.ends.size(); ++b) {
       const double fraction = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
       forEachBlockOf(slabsAlong(geometry, segmentOf(beams, b, piece), reach), [&](int x, int y, int z) {
-        few_.insert({x, y, z});
-        limitBlocks(few_.size(), most, fraction);
+        unmarked_.insert({x, y, z});
+        limitBlocks(unmarked_.size(), most, fraction);
       });
     }
-    blocks.insert(blocks.end(), few_.members().begin(), few_.members().end());
+    blocks.insert(blocks.end(), unmarked_.members().begin(), unmarked_.members().end());
     return;
   }
   const Box box{first.cast<int>(), size.cast<int>()};
@@ -205,9 +205,7 @@ void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams
       markBlocks(slabsAlong(geometry, segmentOf(beams, b, piece), reach), layout, marks_.get());
     }
   });
-  const std::size_t marked = std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0});
-  limitBlocks(marked, most);
-  blocks.reserve(blocks.size() + marked);
+  limitBlocks(std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0}), most);
   listMarked(box, blocks);
 }
 

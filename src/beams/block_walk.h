@@ -42,7 +42,7 @@ class BlockWalk {
 
   std::unique_ptr<std::uint8_t[]> marks_;  ///< x fastest
   std::size_t capacity_ = 0;
-  IndexNumbering few_;  ///< blocks of a box that is too large for marks
+  IndexNumbering unmarked_;  ///< blocks along beams whose box is too large for marks
 };
 
 /// Appends the blocks of the map that come within `range` [m] of a point of the map frame.

@@ -35,7 +35,7 @@ class Occlusion : public BlockPass {
   const BeamField* field_ = nullptr;
   double range_ = 0.0;
   BlockWalk walk_;
-  std::vector<GridIndex> listed_;  ///< may have some twice
+  std::vector<GridIndex> listed_;  ///< may list a block twice
   IndexNumbering touched_;
   std::vector<Workspace> workspaces_;
 };

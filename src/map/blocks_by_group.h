@@ -19,7 +19,7 @@ class BlocksByGroup {
     numbers_.clear();
     size_ = 0;
   }
-  /// Inserts a block unless it is a member; not after sort().
+  /// Inserts a block unless it is a member. Must not be called after sort().
   /// @return its number: 0, 1, 2, ... in the order of insertion.
   std::uint32_t insert(const BlockIndex& block) {
     const std::uint32_t group = groups_.insert(groupOf(block));
@@ -47,7 +47,7 @@ class BlocksByGroup {
     }
   }
 
-  /// The groups, in the order in which their first blocks were added.
+  /// The groups, in the order in which their first blocks were inserted.
   const IndexNumbering& groups() const { return groups_; }
   /// The numbers that insert() gave, in the new order.
   const std::vector<std::uint32_t>& numbers() const { return numbers_; }

@@ -26,14 +26,15 @@ struct SeenVoxels {
 /// evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:
-  /// Takes all memory for a scan. @param blocks number of those that it touches; at() of each has to be set.
+  /// Allocates all memory for a scan. @param blocks number of those that it touches. Set at() of each before
+  /// find().
   void start(std::size_t blocks) {
     seen_.resize(blocks);
     beside_.resize(blocks);
     for (std::vector<VoxelMask>* masks : {&empty_, &open_, &along_x_, &voids_}) masks->resize(blocks);
   }
-  /// What the scan says of a block, at first what the scan before said of another one; different threads may
-  /// write to different blocks.
+  /// What the scan says of a block; until it is set, what an earlier scan said of another one. Different
+  /// threads may write to different blocks.
   SeenVoxels& at(std::size_t block) { return seen_[block]; }
   /// Computes the void voxels. @param blocks all of them, sorted; their order is that of at().
   void find(const BlocksByGroup& blocks, ThreadPool& pool);
