@@ -67,7 +67,7 @@ po::options_description options() {
       "number of times that each mode maps the sequence")(
       "journal", tools::realOption("--journal", 1e-4, 1.0)->value_name("METRES"),
       "also map with the scans kept and their points rounded to this, and print how many times as long that "
-      "takes; modes whose scans cannot move have none")(
+      "takes; modes whose scans cannot move are left out")(
       "curves", po::value<std::string>()->value_name("DIR"),
       "also measure simulated drives, and write curves as CSV and PNG to this folder")(
       "curve-scans", tools::countOption("--curve-scans", 2, 1000000)->value_name("N")->default_value(2000),
@@ -89,13 +89,6 @@ MapperConfig configOf(const Case& c, int threads) {
   return config;
 }
 
-/// The scan of a frame in the axes of the sensor.
-Scan recordedScan(const SequenceFrame& frame) {
-  SequenceFrame recorded = frame;
-  recorded.T_map_sensor.setIdentity();
-  return recorded.scan();
-}
-
 /// The time of each scan [ms]. @param after called after each, and not timed.
 template <typename After>
 std::vector<double> timeScans(SemanticMapper& mapper, const std::vector<SequenceFrame>& frames,
@@ -111,7 +104,7 @@ std::vector<double> timeScans(SemanticMapper& mapper, const std::vector<Sequence
   return times;
 }
 
-/// The same with a journal. What packs a scan beside mapping ends before the next one comes, as at 10 Hz.
+/// The same with a journal. Each scan is packed before the next one comes, as at 10 Hz; that is not timed.
 /// @param quantum [m].
 std::vector<double> timeKeptScans(SemanticMapper& mapper, const std::vector<SequenceFrame>& frames,
                                   double quantum) {
@@ -120,7 +113,7 @@ std::vector<double> timeKeptScans(SemanticMapper& mapper, const std::vector<Sequ
   KeptScans kept(mapper, settings);
   std::vector<double> times;
   for (const SequenceFrame& frame : frames) {
-    const Scan scan = recordedScan(frame);
+    const Scan scan = frame.recordedScan();
     Stopwatch watch;
     kept.update();
     kept.integrateRecorded(scan, frame.T_map_sensor);
@@ -160,7 +153,7 @@ void timeJournal(const Case& c, int threads, const std::vector<SequenceFrame>& f
   // Packing empties the caches for the next scan, so it runs in both.
   const std::vector<double> without = timed([&](SemanticMapper& mapper) {
     return timeScans(mapper, frames, [&](const SequenceFrame& frame) {
-      packScan(toSensorScan(recordedScan(frame), Eigen::Isometry3d::Identity(), quantum, config.sensor_model)
+      packScan(toSensorScan(frame.recordedScan(), Eigen::Isometry3d::Identity(), quantum, config.sensor_model)
                    .scan);
     });
   });

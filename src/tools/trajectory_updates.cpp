@@ -76,9 +76,7 @@ void JournalledMapping::readUpdates(const std::string& path) {
 }
 
 ScanStats JournalledMapping::integrate(const Sequence& sequence, std::size_t i, const SequenceFrame& frame) {
-  SequenceFrame in_sensor_frame = frame;
-  in_sensor_frame.T_map_sensor.setIdentity();
-  const ScanStats stats = kept_.integrateRecorded(in_sensor_frame.scan(), frame.T_map_sensor);
+  const ScanStats stats = kept_.integrateRecorded(frame.recordedScan(), frame.T_map_sensor);
   mapped_.push_back(i);
   for (; next_ < updates_.size() && updates_[next_].scan <= sequence.number(i); ++next_) {
     poses_.map_poses = updates_[next_].poses;

@@ -21,6 +21,10 @@ struct SequenceFrame {
   std::uint64_t stamp = 0;  ///< [ns], after kFirstStamp
 
   Scan scan() const { return scanFromSensorFrame(T_map_sensor, points, labels, stamp); }
+  /// The scan in the axes of the sensor, which is its origin.
+  Scan recordedScan() const {
+    return scanFromSensorFrame(Eigen::Isometry3d::Identity(), points, labels, stamp);
+  }
 };
 
 enum class SequenceLayout {
