@@ -177,14 +177,11 @@ Scan place(const SensorScan& kept, const Eigen::Isometry3d& T_map_sensor) {
 
 double reachOf(const SensorScan& scan, const SensorModelConfig& sensor) {
   const SensorModelConfig& model = scan.sensor_model ? *scan.sensor_model : sensor;
-  std::array<double, 4> farthest = {};  // several, so that one does not wait for another
-  for (std::size_t n = 0; n < scan.points.size(); ++n) {
-    const auto& [x, y, z] = scan.points[n];
-    double& most = farthest[n % farthest.size()];
-    most = std::max(most, Eigen::Vector3d(x, y, z).squaredNorm());
+  double farthest = 0.0;
+  for (const auto& [x, y, z] : scan.points) {
+    farthest = std::max(farthest, Eigen::Vector3d(x, y, z).squaredNorm());
   }
-  double reach =
-      std::min(scan.quantum * std::sqrt(*std::max_element(farthest.begin(), farthest.end())), model.reach());
+  double reach = std::min(scan.quantum * std::sqrt(farthest), model.reach());
   if (!scan.no_returns.empty() && model.knowsRange()) reach = std::max(reach, model.max_range);
   return reach;
 }
