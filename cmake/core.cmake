@@ -50,7 +50,7 @@ function(bki_mapping_core_room room)
 endfunction()
 
 bki_mapping_core_room(core SOURCES atomic_file.cpp class_filter.cpp class_table.cpp named_parameter.cpp unlisted_labels.cpp LINK Eigen3::Eigen)
-bki_mapping_core_room(parallel SOURCES thread_pool.cpp LINK bki_mapping_core Threads::Threads)
+bki_mapping_core_room(parallel SOURCES gate.cpp thread_pool.cpp LINK bki_mapping_core Threads::Threads)
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES clear_box.cpp looks.cpp semantic_map.cpp LINK bki_mapping_parallel)
 bki_mapping_core_room(rules SOURCES

@@ -40,6 +40,7 @@ void CorrectedLooks::noteAdded(Number scan) {
 }
 
 void CorrectedLooks::noteMoved(const std::vector<Number>& scans, ScanMover::Moved& moved) {
+  if (!has_looks_) return;
   for (const Number scan : scans) {
     restart(journal_.at(scan).regions);
     moved_looks_.drop(scan, journal_.at(scan).regions);
@@ -116,18 +117,14 @@ bool CorrectedLooks::begin(const Eigen::Vector3d& robot, double within) {
 }
 
 std::optional<CorrectedLooks::Batch> CorrectedLooks::next(const Eigen::Vector3d& robot, double within,
-                                                          bool all_moved, ScanMover& mover) {
+                                                          bool all_moved, ScanMover* mover) {
   if (areDone()) return std::nullopt;
-  if (!has_looks_) {
-    changed_regions_.clear();
-    return std::nullopt;
-  }
   const bool is_time = all_moved || moves_before_looks_ == 0;
   if (!looks_ && (!is_time || !begin(robot, within))) return std::nullopt;
   const bool in_memory =
       !to_look_.empty() && journal_.has(to_look_.front()) && journal_.at(to_look_.front()).packed;
-  if (in_memory && to_look_.size() <= kLookedThroughAtOnce && ++rounds_ > kPatience) {
-    lookAtNext(mover);
+  if (in_memory && to_look_.size() <= kLookedThroughAtOnce && ++rounds_ > kPatience && mover != nullptr) {
+    lookAtNext(*mover);
     return std::nullopt;
   }
   Batch batch{{}, looks_};

@@ -47,6 +47,10 @@ class CorrectedLooks {
   /// Whether the looks of all regions are made and in the map; of those within a distance of the robot [m].
   bool areDone() const { return changed_regions_.empty() && !looks_; }
   bool areDone(const Eigen::Vector3d& robot, double within) const;
+  /// Whether next() would make looks within a distance of the robot [m], though scans are left to be moved.
+  bool areDue(const Eigen::Vector3d& robot, double within) const {
+    return (looks_ || moves_before_looks_ == 0) && !areDone(robot, within);
+  }
 
   /// Scans to be looked through, with ScanMover::addLooks(scan, *to).
   struct Batch {
@@ -57,8 +61,8 @@ class CorrectedLooks {
   /// What is to be looked through next, if anything is. @param within only for regions within this distance
   /// of the robot [m]. @param all_moved whether no scan is left to be moved; otherwise, as many scans have to
   /// move before the next looks as were looked through for the last ones. @param mover with which one of the
-  /// last scans is looked through here, where more keep coming.
-  std::optional<Batch> next(const Eigen::Vector3d& robot, double within, bool all_moved, ScanMover& mover);
+  /// last scans is looked through here, where more keep coming; nullptr: none is.
+  std::optional<Batch> next(const Eigen::Vector3d& robot, double within, bool all_moved, ScanMover* mover);
 
   /// Whether looks are made, and only have to be put into the map.
   bool areMade() const { return looks_ && to_look_.empty(); }

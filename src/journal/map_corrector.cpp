@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <type_traits>
 #include <utility>
 
 #include "core/stopwatch.h"
@@ -19,6 +18,10 @@ constexpr std::size_t kPackedAtOnce = 4;
 /// Scans that are moved at once. More share the work of changing blocks, but hold up the mapper for longer
 /// when their difference is added.
 constexpr std::size_t kMovesAtOnce = 2;
+/// Jobs for the thread at once: it goes on while the mapper has no time to take what is done.
+constexpr std::size_t kMostJobs = 3;
+/// Scans under way at once: the difference of each takes some ten megabytes.
+constexpr std::size_t kMostUnderWay = 2 * kMovesAtOnce;
 /// Scans of equal priority [m]: of those within this distance of each other, the newest are moved first.
 constexpr double kEquallyNear = 20.0;
 /// Scans that may wait for being packed: a raw one takes ten times the memory.
@@ -37,13 +40,12 @@ MapCorrector::MapCorrector(const MapperConfig& config, std::shared_ptr<const Cla
                            const Settings& settings, CorrectedMap map)
     : settings_(settings),
       map_(std::move(map)),
-      config_(std::make_shared<const MapperConfig>(config)),
       journal_(settings.memory, map_.fetch != nullptr),
       looks_(config, journal_, settings.looks_memory),
       mover_(std::make_unique<ScanMover>(config, std::move(classes), map_.fetch)) {
   if (!(settings_.quantum > 0.0)) settings_.quantum = usualQuantum(config.resolution);
   if (settings_.tolerance < 0.0) settings_.tolerance = 0.1 * config.resolution;
-  checkCorrectable(config);
+  reconfigure(config);
   thread_ = std::thread(&MapCorrector::work, this);
 }
 
@@ -103,6 +105,7 @@ void MapCorrector::restore(JournalScan scan) {
 void MapCorrector::reconfigure(const MapperConfig& config) {
   checkCorrectable(config);
   config_ = std::make_shared<const MapperConfig>(config);
+  gate_if_needed_ = threadCount(config.threads) < threadCount(0) ? nullptr : &gate_;
 }
 
 void MapCorrector::noteCleared(const Eigen::AlignedBox3d& box) {
@@ -195,21 +198,25 @@ MapCorrector::Progress MapCorrector::progress() const {
   progress.scans = journal_.size();
   progress.bytes = journal_.bytes();
   progress.forgotten = journal_.forgotten();
-  progress.done = progress.to_go == 0 && looks_.areDone() && !moving_;
+  progress.done = progress.to_go == 0 && looks_.areDone() && under_way_.empty();
   progress.done_around = progress.done_around || progress.done;
   return progress;
 }
 
-std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot) {
+std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot, bool may_change) {
   std::vector<GridIndex> changed;
-  if (auto done = takeDone()) changed = take(*done);
+  while (auto done = takeDone(may_change)) {
+    if (std::holds_alternative<Moving>(done->work)) may_change = false;  // enough for once
+    const std::vector<GridIndex> moved = take(*done);
+    changed.insert(changed.end(), moved.begin(), moved.end());
+  }
   if (unpacked_.size() > kMostUnpacked) packNext();
   try {
-    if (isIdle() && looks_.areMade()) {
+    if (!looking_ && looks_.areMade()) {
       const std::vector<GridIndex> looked_at = looks_.putInto(map_.replace_looks);
       changed.insert(changed.end(), looked_at.begin(), looked_at.end());
     }
-    if (isIdle()) startNext(robot);
+    while (jobs_.size() < (alone_at_work_ ? 1 : kMostJobs) && startNext(robot, may_change)) continue;
   } catch (const std::exception& error) {
     giveUpLooks(error.what());
   }
@@ -217,39 +224,57 @@ std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot) {
 }
 
 void MapCorrector::finish(const Eigen::Vector3d& robot) {
-  if (running_) {
+  {
     std::unique_lock<std::mutex> lock(mutex_);
-    ended_.wait(lock, [this] { return job_done_; });
+    ended_.wait(lock, [this] { return jobs_.empty() || jobs_.back().done; });
   }
   alone_at_work_ = true;
   do {
     update(robot);
-  } while (running_ || !progress().done || !unpacked_.empty());
+  } while (!jobs_.empty() || !progress().done || !unpacked_.empty());
   alone_at_work_ = false;
 }
 
-template <typename Work>
-void MapCorrector::start(Work work) {
-  running_ = true;
-  moving_ = std::is_same_v<Work, Moving>;
+void MapCorrector::start(Job job) {
+  job.generation = generation_;
+  std::set<Number> under_way = under_way_;
+  if (const auto* const moving = std::get_if<Moving>(&job.work)) {
+    under_way.insert(moving->numbers.begin(), moving->numbers.end());
+  }
+  const bool looks = std::holds_alternative<Looking>(job.work),
+             packs = std::holds_alternative<Packing>(job.work);
+  if (alone_at_work_) perform(job);
+  job.begun = job.done = alone_at_work_;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    job_ = Job{std::move(work), generation_, ""};
-    job_done_ = alone_at_work_;
+    // Scans that are not packed take much memory.
+    const auto next = std::find_if(jobs_.begin(), jobs_.end(), [](const Job& each) { return !each.begun; });
+    jobs_.insert(packs ? next : jobs_.end(), std::move(job));
   }
-  if (alone_at_work_) return perform(*job_);
   wake_.notify_all();
+  under_way_.swap(under_way);
+  looking_ = looking_ || looks;
 }
 
-void MapCorrector::startNext(const Eigen::Vector3d& robot) {
-  if (startPacking()) return;
-  const std::optional<NextMove> next = nextMove(robot);
-  progress_.done_around = !(next && next->is_around) && looks_.areDone(robot, kAround);
-  if (!next && progress_.to_go > 0) countToGo();  // some have been forgotten
-  if (!next && progress_.to_go == 0) startLooking(robot, std::numeric_limits<double>::infinity());
-  if (!next || (!next->is_around && startLooking(robot, kAround))) return;
-  if ((looks_.areMade() && !next->is_around) || (map_.ready && !map_.ready())) return;
-  startMoving(next->number);
+bool MapCorrector::startNext(const Eigen::Vector3d& robot, bool may_look) {
+  if (startPacking()) return true;
+  const NextMove next = nextMove(robot);
+  progress_.done_around = !next.around_left && looks_.areDone(robot, kAround);
+  if (looking_) return false;
+  if (under_way_.empty()) {
+    if (!next.number && progress_.to_go > 0) countToGo();  // some have been forgotten
+    const bool none_left = progress_.to_go == 0;
+    const double within = none_left ? std::numeric_limits<double>::infinity() : kAround;
+    const bool is_time = next.number ? !next.is_around : none_left;
+    if (is_time && startLooking(robot, within, may_look)) return true;
+  }
+  if (!next.number || under_way_.size() >= kMostUnderWay) return false;
+  // Once what is around has moved, its looks come first, for which nothing may be under way.
+  if (!next.is_around && (next.around_left || looks_.areMade() || looks_.areDue(robot, kAround)))
+    return false;
+  if (map_.ready && !map_.ready()) return false;
+  startMoving(*next.number);
+  return true;
 }
 
 bool MapCorrector::startPacking() {
@@ -260,23 +285,34 @@ bool MapCorrector::startPacking() {
     if (journal_.has(number)) packing.scans.emplace_back(number, journal_.at(number).scan);
   }
   if (packing.scans.empty()) return false;
-  start(std::move(packing));
+  start({std::move(packing)});
   return true;
 }
 
-std::optional<MapCorrector::NextMove> MapCorrector::nextMove(const Eigen::Vector3d& robot) const {
-  std::optional<NextMove> next;
+MapCorrector::NextMove MapCorrector::nextMove(const Eigen::Vector3d& robot) const {
+  NextMove next;
   double nearest = 0.0;
+  const auto distanceTo = [&](const JournalScan& scan) {
+    return std::min((scan.wanted.translation() - robot).norm(),
+                    (scan.T_map_sensor.translation() - robot).norm());
+  };
+  for (const Number n : under_way_) {
+    if (!journal_.has(n)) continue;
+    const JournalScan& scan = journal_.at(n);
+    // One that is not off is on its way to where an earlier path had it.
+    next.around_left = next.around_left || !scan.off || distanceTo(scan) < scan.reach + kAround;
+  }
   if (progress_.to_go == 0) return next;
   for (Number n = journal_.begin(); n < journal_.end(); ++n) {
     const JournalScan& scan = journal_.at(n);
-    if (!scan.isPacked() || !scan.off) continue;
-    const double metres = std::min((scan.wanted.translation() - robot).norm(),
-                                   (scan.T_map_sensor.translation() - robot).norm());
+    if (!scan.isPacked() || !scan.off || under_way_.count(n) > 0) continue;
+    const double metres = distanceTo(scan);
     const bool is_around = metres < scan.reach + kAround;
+    next.around_left = next.around_left || is_around;
     const double distance = std::floor(metres / kEquallyNear);
-    if (next && (next->is_around == is_around ? distance > nearest : next->is_around)) continue;
-    next = {n, is_around};
+    if (next.number && (next.is_around == is_around ? distance > nearest : next.is_around)) continue;
+    next.number = n;
+    next.is_around = is_around;
     nearest = distance;
   }
   return next;
@@ -290,22 +326,24 @@ void MapCorrector::startMoving(Number newest) {
   for (Number n = newest; moving.numbers.size() < (alone ? 1 : kMovesAtOnce); --n) {
     const JournalScan& scan = journal_.at(n);
     const bool alike = scan.settings == first.settings && scan.cleared_before == first.cleared_before;
-    if (!scan.isPacked() || !scan.off || !alike) break;
+    if (!scan.isPacked() || !scan.off || !alike || under_way_.count(n) > 0) break;
     moving.numbers.push_back(n);
     moving.moves.push_back({journal_.placed(n), scan.wanted});
     if (n == journal_.begin()) break;
   }
-  start(std::move(moving));
+  start({std::move(moving)});
 }
 
-bool MapCorrector::startLooking(const Eigen::Vector3d& robot, double within) {
-  std::optional<Looking> looking = looks_.next(robot, within, progress_.to_go == 0, *mover_);
+bool MapCorrector::startLooking(const Eigen::Vector3d& robot, double within, bool may_look) {
+  ScanMover* const mover = may_look ? mover_.get() : nullptr;
+  std::optional<Looking> looking = looks_.next(robot, within, progress_.to_go == 0, mover);
   if (!looking) return false;
-  start(std::move(*looking));
+  start({std::move(*looking)});
   return true;
 }
 
 void MapCorrector::takeLooks(const Job& job, const Looking& looking) {
+  looking_ = false;
   if (job.fault.empty() || job.generation != generation_) return;
   if (job.unreadable) leaveWhereItIs(looking.scans[looking.done].number, job.fault);
   if (job.unreadable) return looks_.restart();
@@ -344,7 +382,7 @@ void MapCorrector::packNext() {
   const Number number = unpacked_.front();
   unpacked_.pop_front();
   if (!journal_.has(number)) return;
-  Job job{Packing{{{number, journal_.at(number).scan}}, {}}, generation_, ""};
+  Job job{Packing{{{number, journal_.at(number).scan}}, {}}};
   perform(job);
   take(job);
 }
@@ -361,6 +399,7 @@ void MapCorrector::giveUp(const Moving& moving, const std::string& fault) {
 }
 
 std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
+  for (const Number number : moving.numbers) under_way_.erase(number);
   const bool all_known = std::all_of(moving.numbers.begin(), moving.numbers.end(),
                                      [&](Number n) { return journal_.has(n) && journal_.at(n).isKept(); });
   std::vector<GridIndex> changed;
@@ -395,25 +434,35 @@ std::vector<GridIndex> MapCorrector::takeMoved(Job& job, Moving& moving) {
   return changed;
 }
 
-std::optional<MapCorrector::Job> MapCorrector::takeDone() {
-  if (!running_) return std::nullopt;
+std::optional<MapCorrector::Job> MapCorrector::takeDone(bool may_move) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!job_done_) return std::nullopt;
-  running_ = moving_ = false;
-  return std::exchange(job_, std::nullopt);
+  if (jobs_.empty() || !jobs_.front().done) return std::nullopt;
+  const Job& first = jobs_.front();
+  const bool moves = first.generation == generation_ && std::holds_alternative<Moving>(first.work);
+  if (moves && !may_move) return std::nullopt;
+  std::optional<Job> taken = std::move(jobs_.front());
+  jobs_.pop_front();
+  return taken;
 }
 
 void MapCorrector::work() {
-  yieldToOtherThreads();
+  yieldToOtherThreads(&gate_);
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [this] { return stop_ || (job_ && !job_done_); });
+    std::list<Job>::iterator next;
+    wake_.wait(lock, [&] {
+      next = std::find_if(jobs_.begin(), jobs_.end(), [](const Job& job) { return !job.done; });
+      return stop_ || next != jobs_.end();
+    });
     if (stop_) return;
+    Job& job = *next;  // nobody else touches it before it is done
+    job.begun = true;
     lock.unlock();
-    perform(*job_);  // nobody else touches it before job_done_
+    perform(job);
     lock.lock();
-    job_done_ = true;
+    job.done = true;
     ended_.notify_all();
+    if (map_.wake) map_.wake();
   }
 }
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <condition_variable>
+#include <deque>
 #include <functional>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -16,6 +18,7 @@
 #include "journal/corrected_looks.h"
 #include "journal/scan_journal.h"
 #include "journal/scan_mover.h"
+#include "parallel/gate.h"
 
 namespace bki_mapping {
 
@@ -27,10 +30,12 @@ struct CorrectedMap {
   std::function<bool()> ready = {};
   /// Reads a scan of which noteStored() was told; called by the thread that moves scans, too.
   ScanMover::Fetch fetch = {};
+  /// Is told that update() has something to do; called by the thread that moves scans.
+  std::function<void()> wake = {};
 };
 
 /// Keeps the scans of a map, and moves them to where they belong. A thread of its own computes, for a few
-/// scans at a time, the difference that the move makes; update() adds it to the map at once, so that a
+/// scans at a time, the difference that the move makes; update() adds it to the map in one step, so that a
 /// snapshot has each scan exactly once, at its old or its new pose. The map then equals, to the bit, the one
 /// of all scans at their corrected poses.
 ///
@@ -98,12 +103,16 @@ class MapCorrector {
   void correctTo(const std::vector<Eigen::Isometry3d>& T_map_sensor);
 
   /// Adds to the map what is ready, and has the next scans moved: those near a place first, and of these the
-  /// newest. Call it between scans; it takes some milliseconds. @param robot position in the map frame [m].
-  /// @return the changed blocks.
-  std::vector<GridIndex> update(const Eigen::Vector3d& robot);
+  /// newest. Call it between scans. @param robot position in the map frame [m].
+  /// @param may_change whether the map may be changed, which takes some ten milliseconds; otherwise, what is
+  /// ready waits. @return the changed blocks.
+  std::vector<GridIndex> update(const Eigen::Vector3d& robot, bool may_change = true);
   /// Calls update() until nothing is left to be done, and works in the calling thread, with its priority.
   /// Takes as long as that takes.
   void finish(const Eigen::Vector3d& robot);
+
+  /// Is to be closed while a scan is mapped; nullptr where the mapper leaves a core to the thread.
+  Gate* gate() { return gate_if_needed_; }
 
   const ScanJournal& journal() const { return journal_; }
   /// The poses where the kept scans belong, by rising stamp.
@@ -157,18 +166,17 @@ class MapCorrector {
   struct Job {
     std::variant<Packing, Moving, Looking> work;
     std::uint64_t generation = 0;
-    std::string fault;        ///< why it has failed; "" if it has not
+    std::string fault = {};   ///< why it has failed; "" if it has not
     bool unreadable = false;  ///< the fault is of a scan, not of the moment
+    bool begun = false, done = false;
   };
 
   void work();
   void perform(Job& job);
-  /// Starts a job; the thread must be idle.
-  template <typename Work>
-  void start(Work work);
-  /// The job that has ended since the last call, if any.
-  std::optional<Job> takeDone();
-  bool isIdle() const { return !running_; }
+  /// Has the thread do a job, after those before it.
+  void start(Job job);
+  /// The oldest job, if it is done. @param may_move also if it has moved scans.
+  std::optional<Job> takeDone(bool may_move);
 
   std::vector<GridIndex> take(Job& job);
   void takePacked(const Job& job, const Packing& packing);
@@ -180,16 +188,19 @@ class MapCorrector {
   std::vector<GridIndex> takeMoved(Job& job, Moving& moving);
   /// The scans of a job could not be moved: tries each of them alone, or gives up the only one.
   void giveUp(const Moving& moving, const std::string& fault);
-  void startNext(const Eigen::Vector3d& robot);
+  /// Starts the job that comes next, if any may be started. @param may_look whether this thread may look
+  /// through a scan. @return whether it has.
+  bool startNext(const Eigen::Vector3d& robot, bool may_look);
   bool startPacking();
   struct NextMove {
-    Number number;
-    bool is_around;  ///< it is, or will be, where the robot may see what it saw
+    std::optional<Number> number;
+    bool is_around = false;    ///< it is, or will be, where the robot may see what it saw
+    bool around_left = false;  ///< there is such a scan, perhaps one under way
   };
-  std::optional<NextMove> nextMove(const Eigen::Vector3d& robot) const;
+  NextMove nextMove(const Eigen::Vector3d& robot) const;
   void startMoving(Number newest);
   /// @param within only of regions within this distance of the robot [m].
-  bool startLooking(const Eigen::Vector3d& robot, double within);
+  bool startLooking(const Eigen::Vector3d& robot, double within, bool may_look);
   /// Gives up the looks that are being made: the old ones stay.
   void giveUpLooks(const std::string& fault);
   /// Marks all scans after new poses were set.
@@ -208,16 +219,19 @@ class MapCorrector {
   bool alone_ = false;  ///< moves one scan at a time, because several have failed
   Progress progress_;
   std::uint64_t generation_ = 0;  ///< of what results of jobs may be added to the map
+  std::set<Number> under_way_;    ///< scans in jobs that move them
+  bool looking_ = false;          ///< a job looks through scans; none then moves any
+  bool alone_at_work_ = false;    ///< jobs are done by the mapper's thread, in finish()
+
+  Gate* gate_if_needed_ = nullptr;
 
   // Shared with the thread:
-  std::unique_ptr<ScanMover> mover_;  ///< the thread's, while it has a job
+  Gate gate_;
+  std::unique_ptr<ScanMover> mover_;  ///< the thread's, while a job moves or looks through scans
   std::mutex mutex_;
   std::condition_variable wake_, ended_;
-  std::optional<Job> job_;
-  bool job_done_ = false, stop_ = false;
-  bool running_ = false;        ///< a job was started and not yet taken; of the mapper's thread
-  bool moving_ = false;         ///< and it moves scans
-  bool alone_at_work_ = false;  ///< jobs are done by the mapper's thread, in finish()
+  std::list<Job> jobs_;  ///< in the order in which they are done, and then taken
+  bool stop_ = false;
   std::thread thread_;
 };
 

@@ -15,6 +15,9 @@ namespace {
 /// shorter than the time between scans.
 constexpr auto kSpinTime = std::chrono::microseconds(200);
 
+/// The gate that the calling thread passes before each job.
+thread_local Gate* gate_of_thread = nullptr;
+
 /// Spins until ready() is true or the time is up. @return ready().
 template <typename Ready>
 bool spinUntil(Ready&& ready) {
@@ -61,7 +64,10 @@ void ThreadPool::work(std::size_t worker) {
   try {
     for (std::size_t s = 0; s < ranges_.size(); ++s) {
       JobRange& range = ranges_[(worker + s) % ranges_.size()];
-      for (std::size_t j = range.next++; j < range.end; j = range.next++) call_(callable_, j, worker);
+      for (std::size_t j = range.next++; j < range.end; j = range.next++) {
+        if (gate_of_thread != nullptr) gate_of_thread->pass();
+        call_(callable_, j, worker);
+      }
     }
   } catch (...) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -114,7 +120,8 @@ void ThreadPool::run(std::size_t jobs, std::size_t parts, Call call, void* calla
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
-void yieldToOtherThreads() {
+void yieldToOtherThreads(Gate* gate) {
+  gate_of_thread = gate;
   constexpr int kNiceness = 19;  // the most
   // On Linux, niceness is a property of the thread, although POSIX speaks of the process.
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNiceness);

@@ -14,6 +14,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "parallel/gate.h"
+
 namespace bki_mapping {
 
 /// @return the number of threads that a setting selects: the setting itself, or all cores for 0.
@@ -94,7 +96,8 @@ class ThreadPool {
 };
 
 /// Gives other threads of the process priority over the calling one: publishing and corrections may wait, a
-/// scan may not.
-void yieldToOtherThreads();
+/// scan may not. @param gate that it passes before each job of a ThreadPool, from now on; must outlive the
+/// thread. A core that is shared by two threads is slower for both, whatever their priorities are.
+void yieldToOtherThreads(Gate* gate = nullptr);
 
 }  // namespace bki_mapping

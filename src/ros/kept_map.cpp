@@ -58,7 +58,8 @@ bool samePath(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name)
+KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name,
+                 std::function<void()> wake)
     : mapper_(mapper),
       frame_(config.frame_id),
       name_(name),
@@ -89,14 +90,14 @@ KeptMap::KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::
       keeper_->waitForTiles();
     }
   }
-  if (!read_only_) beginJournal(config);
+  if (!read_only_) beginJournal(config, std::move(wake));
   if (!config.map_file.empty() && !namesCity(config.map_file)) {
     ROS_INFO("The map is %s %s; %lu blocks are loaded", read_only_ ? "read from" : "kept in",
              config.map_file.c_str(), mapper_.map().size());
   }
 }
 
-void KeptMap::beginJournal(const ServerConfig& config) {
+void KeptMap::beginJournal(const ServerConfig& config, std::function<void()> wake) {
   if (!config.correction.journal) return;
   MapCorrector::Settings settings;
   settings.quantum = config.correction.journal_quantum;
@@ -124,7 +125,7 @@ void KeptMap::beginJournal(const ServerConfig& config) {
     fetch = [this](std::uint64_t number) { return keeper_->scanContent(writer_->fileNumber(number)); };
   }
   corrector_ = std::make_unique<MapCorrector>(mapper_.config(), mapper_.sharedClasses(), settings,
-                                              CorrectedMap{add, replaceLooks, ready, fetch});
+                                              CorrectedMap{add, replaceLooks, ready, fetch, std::move(wake)});
   if (!keeper_) return;
   corrector_->noteForeign(keeper_->storedTiles());
   writer_ = std::make_unique<JournalWriter>(keeper_->journalSize(), drive_.id, mapper_.sharedClasses());
@@ -179,12 +180,13 @@ std::vector<GridIndex> KeptMap::addFromCity(const ServerConfig& config) {
   return changed;
 }
 
-std::vector<GridIndex> KeptMap::update(const ServerConfig& config, PeriodicSave::Clock::time_point now) {
+std::vector<GridIndex> KeptMap::update(const ServerConfig& config, PeriodicSave::Clock::time_point now,
+                                       bool may_correct) {
   std::vector<GridIndex> changed = addFromCity(config);
   const auto add = [&](const std::vector<GridIndex>& more) {
     changed.insert(changed.end(), more.begin(), more.end());
   };
-  if (corrector_) add(corrector_->update(window_.centre));
+  if (corrector_) add(corrector_->update(window_.centre, may_correct));
   if (!keeper_) return changed;
   const bool due = keeper_->wantsSave() || (writer_ && journalIsDue(config.correction));
   save_.update(*keeper_, config.save_period, now, due);

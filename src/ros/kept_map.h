@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
@@ -50,7 +51,9 @@ class KeptMap {
   /// used becomes a fault(), and mapping goes on without it.
   /// @param name of the drive that begins, for people.
   /// @throws MapFileError; std::invalid_argument as checkMapFileSettings().
-  KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name);
+  /// @param wake is called by another thread when update() has something to do.
+  KeptMap(SemanticMapper& mapper, const ServerConfig& config, const std::string& name,
+          std::function<void()> wake = {});
   ~KeptMap() { close(); }
 
   // These return the blocks that changed, for the publishers.
@@ -58,8 +61,10 @@ class KeptMap {
   std::vector<GridIndex> addScan(std::uint64_t stamp, const Eigen::Vector3d& sensor,
                                  const ServerConfig& config);
   /// Does what is due between scans: adds evidence that has been read from the file, and what corrected poses
-  /// change, and saves the map.
-  std::vector<GridIndex> update(const ServerConfig& config, PeriodicSave::Clock::time_point now);
+  /// change, and saves the map. @param may_correct whether the map may change by corrected poses now, which
+  /// takes some ten milliseconds.
+  std::vector<GridIndex> update(const ServerConfig& config, PeriodicSave::Clock::time_point now,
+                                bool may_correct = true);
 
   /// Keeps the scans and moves them to corrected poses; nullptr without the parameter journal.
   MapCorrector* corrector() { return corrector_.get(); }
@@ -113,7 +118,7 @@ class KeptMap {
  private:
   void requireWritable() const;
   /// Begins the journal. @throws std::logic_error if the settings do not allow one.
-  void beginJournal(const ServerConfig& config);
+  void beginJournal(const ServerConfig& config, std::function<void()> wake);
   /// Whether scans that wait for being written should be saved soon.
   bool journalIsDue(const CorrectionConfig& config) const;
   /// Adds the tiles that have been read from the city. @return the blocks that changed; none with a keeper,

@@ -1,6 +1,7 @@
 #include "ros/mapping_server.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 
 #include "bki_mapping/mapping/mapper_config.h"
@@ -17,6 +18,9 @@ namespace {
 
 /// How long the thread waits for a callback [s]: with an empty queue, and while clouds wait for transforms.
 constexpr double kScanWait = 0.1, kTransformWait = 0.005;
+/// What takes time is done right after a scan if none waits, so that the next one does not wait for it; or at
+/// any time when it could not be for as long as this.
+constexpr auto kNoTimeAtMost = std::chrono::milliseconds(300);
 
 }  // namespace
 
@@ -35,7 +39,8 @@ MappingServer::MappingServer(ros::NodeHandle node, ros::NodeHandle private_node)
              table.saysWhatMoves() ? "" : ", in which no class can move");
   }
   for (const std::string& warning : settingWarnings(mapper_config, table)) ROS_WARN("%s", warning.c_str());
-  kept_ = std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace());
+  kept_ =
+      std::make_unique<KeptMap>(*mapper_, config_, private_node_.getNamespace(), [this] { wake(queue_); });
 
   poses_ = std::make_unique<PoseSource>(node_);
   if (kept_->corrector()) {
@@ -135,19 +140,23 @@ void MappingServer::applySettings(const ServerConfig& server, const MapperConfig
 void MappingServer::work() {
   while (running_) {
     queue_.callOne(ros::WallDuration(waiting_.size() == 0 ? kScanWait : kTransformWait));
-    // Handle messages first, so that every cloud is in waiting_ and counted. The limit keeps a flood of
-    // messages from starving the mapper.
-    for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
+    handleMessages();
     checkClock();
     reportTfJumps();
-    processQueue();
-    const std::vector<GridIndex> moved = kept_->update(config_, Clock::now());
+    const bool has_mapped = processQueue();
+    if (has_mapped) handleMessages();  // those that came meanwhile
+    const std::vector<GridIndex> moved = kept_->update(config_, Clock::now(), hasTime(has_mapped));
     if (!moved.empty()) mapChanged(moved);
     if (corrected_ && corrected_->update(Clock::now())) status_publisher_.publish(status());
     queries_->map().releaseIfIdle();
     reportFault();
     diagnostics_->update([this] { return status(); }, [this] { return judgeAllPoints(); }, mapper_->config());
   }
+}
+
+void MappingServer::handleMessages() {
+  // The limit keeps a flood of messages from starving the mapper.
+  for (int n = 0; n < 1000 && !queue_.isEmpty(); ++n) queue_.callOne();
 }
 
 void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
@@ -172,15 +181,26 @@ void MappingServer::onCloud(std::size_t input, const CloudEvent& event) {
   }
 }
 
-void MappingServer::processQueue() {
+bool MappingServer::processQueue() {
   const auto now = Clock::now();
   const auto next = waiting_.takeIf([&](WaitingCloud& waiting) {
     const std::chrono::duration<double> waited = now - waiting.received;
     return waited.count() >= config_.tf_timeout ||
            readers_[waiting.input].ready(*waiting.cloud, *poses_, waiting.times);
   });
-  if (!next) return;
-  map(*next);
+  if (!next) return false;
+  {
+    const Gate::Closed corrector_waits(kept_->corrector() ? kept_->corrector()->gate() : nullptr);
+    map(*next);
+  }
+  return true;
+}
+
+bool MappingServer::hasTime(bool has_mapped) {
+  const auto now = Clock::now();
+  const bool has_time = (has_mapped && waiting_.size() == 0) || now - had_time_ > kNoTimeAtMost;
+  if (has_mapped && has_time) had_time_ = now;
+  return has_time;
 }
 
 void MappingServer::map(const WaitingCloud& waiting) {

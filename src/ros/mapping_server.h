@@ -68,8 +68,14 @@ class MappingServer {
   bool onSaveMap(SaveMap::Request& request, SaveMap::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
 
-  /// Processes the first waiting cloud whose transform is available, or whose tf_timeout is over.
-  void processQueue();
+  /// Handles messages, so that every cloud is in waiting_ and counted.
+  void handleMessages();
+  /// Maps or refuses the first waiting cloud whose transform is available, or whose tf_timeout is over.
+  /// @return whether there was one.
+  bool processQueue();
+  /// Whether there is time for what no cloud should wait for. @param has_mapped whether a cloud has just been
+  /// dealt with.
+  bool hasTime(bool has_mapped);
   void map(const WaitingCloud& waiting);
   void integrate(const WaitingCloud& waiting, const PlacedScan& placed);
   void reset();
@@ -117,6 +123,7 @@ class MappingServer {
   TimeWatch time_watch_;
   bool paused_ = false;
 
+  Clock::time_point had_time_;  ///< when there was time after a cloud
   ros::Time map_stamp_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  ///< origin of the last scan
   SensorTrajectory trajectory_;

@@ -43,4 +43,12 @@ class QueuedCall : public ros::CallbackInterface {
   std::promise<Answer> answer_;
 };
 
+/// Has the thread that serves a queue go on, should it wait for a call.
+inline void wake(ros::CallbackQueue& queue) {
+  struct Nothing : ros::CallbackInterface {
+    CallResult call() override { return Success; }
+  };
+  queue.addCallback(ros::CallbackInterfacePtr(new Nothing));
+}
+
 }  // namespace bki_mapping::ros_interface

@@ -133,7 +133,7 @@ inline void expectTheMapOfTheCorrectedPoses(const std::string& name, const Mappe
       }
       map.correct(keyframes);
     }
-    if (random() % 2) map.corrector_.update(Eigen::Vector3d::Zero());
+    if (random() % 2) map.corrector_.update(Eigen::Vector3d::Zero(), random() % 2);
   }
   map.finish();
   const MapCorrector::Progress progress = map.corrector_.progress();

@@ -60,6 +60,79 @@ TEST(MapCorrector, EachScanIsInTheMapOnceAtAnyMoment) {
   EXPECT_GT(between, 0u);
 }
 
+TEST(MapCorrector, MovesWaitWhereTheMapMayNotChange) {
+  std::mt19937 random(20);
+  Corrected map(withRules());
+  const Way poses = way(9, 1.0);
+  for (const StampedMotion& pose : poses.odometry)
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+  const auto before = map.content();
+  map.correct(poses.moved);
+  for (int n = 0; n < 200; ++n) {
+    EXPECT_TRUE(map.corrector_.update(Eigen::Vector3d::Zero(), false).empty());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(map.corrector_.progress().moved, 0u);
+  EXPECT_TRUE(map.content() == before);
+  // One job of several scans at once, however many are ready.
+  while (map.corrector_.progress().moved == 0) map.corrector_.update(Eigen::Vector3d::Zero());
+  EXPECT_LT(map.corrector_.progress().moved, 4u);
+  map.finish();
+  EXPECT_TRUE(map.content() == map.wanted(random));
+}
+
+TEST(MapCorrector, ItsThreadWaitsWhileAScanIsMappedIfTheMapperNeedsAllCores) {
+  MapperConfig config;
+  config.threads = 0;
+  std::mt19937 random(21);
+  Corrected map(config);
+  const Way poses = way(4, 1.0);
+  for (const StampedMotion& pose : poses.odometry)
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+  map.finish();  // packs
+  map.correct(poses.moved);
+  ASSERT_NE(map.corrector_.gate(), nullptr);
+  {
+    const auto begin = std::chrono::steady_clock::now();
+    const Gate::Closed closed(map.corrector_.gate());
+    while (std::chrono::steady_clock::now() < begin + Gate::kMostWait / 2) {
+      map.corrector_.update(Eigen::Vector3d::Zero());
+      // A machine that stood still proves nothing.
+      if (std::chrono::steady_clock::now() < begin + Gate::kMostWait * 9 / 10) {
+        ASSERT_EQ(map.corrector_.progress().moved, 0u);
+      }
+    }
+  }
+  map.finish();
+  EXPECT_TRUE(map.content() == map.wanted(random));
+  config.threads = 1;
+  map.corrector_.reconfigure(config);
+  EXPECT_EQ(map.corrector_.gate() == nullptr, std::thread::hardware_concurrency() > 1);
+}
+
+/// As on a robot that stands still: each scan sees the regions whose looks are made.
+TEST(MapCorrector, WhatIsAroundBecomesRightWhileScansCome) {
+  std::mt19937 random(22);
+  Corrected map(withRules());
+  const Way poses = way(6, 0.5);
+  for (const StampedMotion& pose : poses.odometry)
+    map.add(roomScan(pose.motion, pose.stamp, random), pose.motion, pose.motion);
+  map.correct(poses.moved);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  const Eigen::Isometry3d& last = poses.odometry.back().motion;
+  std::uint64_t stamp = poses.odometry.back().stamp;
+  while (!map.corrector_.progress().done && std::chrono::steady_clock::now() < end) {
+    stamp += 100'000'000;
+    map.add(roomScan(last, stamp, random), last, last);
+    map.corrector_.update(Eigen::Vector3d::Zero());
+    for (int n = 0; n < 5; ++n) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(4));
+      map.corrector_.update(Eigen::Vector3d::Zero(), false);
+    }
+  }
+  EXPECT_TRUE(map.corrector_.progress().done);
+}
+
 TEST(MapCorrector, WhatIsAroundTheRobotIsRightFirst) {
   std::mt19937 random(17);
   Corrected map(withRules());

@@ -1,4 +1,5 @@
-// A ThreadPool does every job once, rethrows exceptions, and stays usable; an OrderedQueue keeps the order.
+// A ThreadPool does every job once, rethrows exceptions, and stays usable; threads wait at a closed gate; an
+// OrderedQueue keeps the order.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -140,6 +141,50 @@ TEST(OrderedQueue, TakesEachPieceInOrderAsSoonAsPossible) {
     queue.finish(2, take);
     EXPECT_EQ(taken, (std::vector<std::size_t>{0, 1, 2, 3}));
   }
+}
+
+/// A thread that yields, and does jobs without end.
+struct YieldingThread {
+  Gate gate;
+  std::atomic<int> done{0};
+  std::atomic<bool> stop{false};
+  std::thread thread{[this] {
+    yieldToOtherThreads(&gate);
+    ThreadPool pool(1);
+    while (!stop) pool.forEach(1, [this](std::size_t, std::size_t) { ++done; });
+  }};
+  ~YieldingThread() {
+    stop = true;
+    thread.join();
+  }
+  void waitForJobs(int more) const {
+    for (const int before = done; done < before + more;) std::this_thread::yield();
+  }
+};
+
+TEST(Gate, AThreadThatYieldsDoesNoJobsWhileItIsClosed) {
+  YieldingThread other;
+  for (int round = 0; round < 3; ++round) {
+    std::this_thread::sleep_for(Gate::kMostWait);  // it is patient again
+    other.waitForJobs(10);
+    const auto begin = std::chrono::steady_clock::now();
+    const Gate::Closed closed(&other.gate);
+    const int before = other.done;
+    while (std::chrono::steady_clock::now() < begin + Gate::kMostWait / 2) std::this_thread::yield();
+    const int after = other.done;
+    // A machine that stood still proves nothing.
+    if (std::chrono::steady_clock::now() < begin + Gate::kMostWait * 9 / 10) {
+      EXPECT_LE(after, before + 1);  // one had begun
+    }
+  }
+  other.waitForJobs(10);
+}
+
+TEST(Gate, NobodyWaitsForEver) {
+  YieldingThread other;
+  other.waitForJobs(1);
+  const Gate::Closed closed(&other.gate);
+  other.waitForJobs(100);
 }
 
 TEST(OrderedQueue, KeepsTheOrderWithSeveralThreads) {
