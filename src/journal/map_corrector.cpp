@@ -215,6 +215,7 @@ std::vector<GridIndex> MapCorrector::update(const Eigen::Vector3d& robot, bool m
     if (!looking_ && looks_.areMade()) {
       const std::vector<GridIndex> looked_at = looks_.putInto(map_.replace_looks);
       changed.insert(changed.end(), looked_at.begin(), looked_at.end());
+      if (looks_.areMade() && map_.wake) map_.wake();  // more are left
     }
     while (jobs_.size() < (alone_at_work_ ? 1 : kMostJobs) && startNext(robot, may_change)) continue;
   } catch (const std::exception& error) {

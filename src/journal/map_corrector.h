@@ -30,7 +30,7 @@ struct CorrectedMap {
   std::function<bool()> ready = {};
   /// Reads a scan of which noteStored() was told; called by the thread that moves scans, too.
   ScanMover::Fetch fetch = {};
-  /// Is told that update() has something to do; called by the thread that moves scans.
+  /// Is told that update() has something to do; called by the thread that moves scans, too.
   std::function<void()> wake = {};
 };
 

@@ -126,7 +126,7 @@ TEST(MapCorrector, WhatIsAroundBecomesRightWhileScansCome) {
     map.add(roomScan(last, stamp, random), last, last);
     map.corrector_.update(Eigen::Vector3d::Zero());
     for (int n = 0; n < 5; ++n) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(4));
+      std::this_thread::sleep_for(std::chrono::milliseconds(map.scans_.size()));  // until the thread keeps up
       map.corrector_.update(Eigen::Vector3d::Zero(), false);
     }
   }
