@@ -277,7 +277,7 @@ endif()
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.
 function(bki_mapping_script_test room name)
   add_test(NAME ${name} COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/${room}/${name}.py)
-  set_tests_properties(${name} PROPERTIES TIMEOUT 300 PROCESSORS 2
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
 bki_mapping_script_test(house layering_test)
