@@ -164,7 +164,7 @@ endfunction()
 bki_mapping_unit_tests(core atomic_file class_filter grid_geometry)
 bki_mapping_unit_tests(parallel group_by thread_pool)
 bki_mapping_unit_tests(kernel sparse_kernel)
-bki_mapping_unit_tests(map looks semantic_map)
+bki_mapping_unit_tests(map class_list looks semantic_map)
 bki_mapping_unit_tests(map clear_box LINK bki_mapping_store)
 bki_mapping_unit_tests(store damaged_file full_disk map_clear map_file migration
   LINK SQLite::SQLite3 ZLIB::ZLIB)

@@ -1,6 +1,5 @@
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -97,13 +96,13 @@ py::array planeOf(const py::object& self, py::handle of_class) {
                                            : orderOf(block.map->stored.info.classes, of_class, "class_");
   if (ids.size() != 1) throw std::invalid_argument("class_ must be one class");
   const ClassId id = ids.front();
-  const std::vector<ClassId>& classes = block.block->classes();
-  const auto found = std::find(classes.begin(), classes.end(), id);
-  if (found == classes.end()) {
+  const ClassList& classes = block.block->classes();
+  const std::size_t position = classes.positionOf(id);
+  if (!classes.has(id, position)) {
     throw std::invalid_argument("the block has no plane of class " + std::to_string(id) +
                                 "; see Block.classes for those that it has");
   }
-  return planesOf(self)[py::int_(found - classes.begin())];
+  return planesOf(self)[py::int_(position)];
 }
 
 void addBlock(py::module& m) {
@@ -121,8 +120,8 @@ void addBlock(py::module& m) {
       .def_property_readonly(
           "classes",
           [](const MapBlock& b) {
-            const std::vector<ClassId>& classes = b.block->classes();
-            return py::array_t<ClassId>(static_cast<py::ssize_t>(classes.size()), classes.data());
+            const ClassList& classes = b.block->classes();
+            return py::array_t<ClassId>(static_cast<py::ssize_t>(classes.size()), classes.begin());
           },
           "The ids of the classes of which a voxel has evidence, rising; FREE_CLASS for free space.")
       .def_property_readonly(

@@ -45,7 +45,7 @@ bool holdsAnything(const Block& block, const Voxels& voxels) {
 }
 
 void clear(Block& block, const Voxels& voxels) {
-  const std::vector<ClassId> classes = block.classes();
+  const ClassList classes = block.classes();
   for (const ClassId id : classes) {
     block.change(id, [&](EvidenceUnits* plane) {
       for (std::size_t v = 0; v < kBlockVoxels; ++v) {

@@ -131,10 +131,9 @@ void StateMap::RegionStates::readAll(const StateMap& map) const {
     blocks[count++] = region_->find(number);
   }
   for (std::size_t n = 0; n < count; ++n) {
-    // Each of these leads to what the next one needs.
+    // The first leads to what the second needs.
     if (n + 4 < count) __builtin_prefetch(blocks[n + 4]);
-    if (n + 2 < count) __builtin_prefetch(blocks[n + 2]->classes().data());
-    if (n + 1 < count) blocks[n + 1]->prefetch<false>();
+    if (n + 2 < count) blocks[n + 2]->prefetch<false>();
     read(map, region_->blockIndex(numbers[n]));
   }
 }

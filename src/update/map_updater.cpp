@@ -110,7 +110,7 @@ std::size_t MapUpdater::reserveBlocks(const UpdateLimits& limits, std::ptrdiff_t
     for (std::size_t j = by_group_.begin(position); j != by_group_.end(position); ++j) {
       const std::size_t left = by_group_.end(position) - j;
       if (left > kAhead) __builtin_prefetch(jobs_[j + kAhead].block);
-      if (left > kAhead / 2) __builtin_prefetch(jobs_[j + kAhead / 2].block->classes().data());
+      if (left > kAhead / 2) jobs_[j + kAhead / 2].block->looks().prefetch();
       BlockJob& job = jobs_[j];
       classes = std::max(classes, reservePlanes(job));
       of_group += static_cast<std::ptrdiff_t>(job.block->bytes() - job.bytes_before);

@@ -307,7 +307,7 @@ TEST_F(HtmlExport, TellsDrivesApart) {
     const auto evidenceIn = [&](const SemanticMap& map) {
       const Block* const block = map.find(GridGeometry::blockOf(voxel));
       std::int64_t units = 0;
-      for (const ClassId id : block ? block->classes() : std::vector<ClassId>()) {
+      for (const ClassId id : block ? block->classes() : ClassList()) {
         if (id == kFreeClass && found[0] == 2) continue;
         units += std::max(block->evidence(id)[GridGeometry::offsetInBlock(voxel)], 0);
       }

@@ -110,7 +110,7 @@ TEST(ClearBox, ErasesWhatBecomesEmpty) {
   EXPECT_EQ(clearBox(map, box).size(), 3u);
   EXPECT_EQ(map.size(), 1u);
   ASSERT_TRUE(map.find({{2, 0, 0}}));
-  EXPECT_EQ(map.find({{2, 0, 0}})->classes(), std::vector<ClassId>{80});
+  EXPECT_EQ(map.find({{2, 0, 0}})->classes(), ClassList{80});
 }
 
 TEST(ClearBox, TakesBoxesWithoutEnd) {

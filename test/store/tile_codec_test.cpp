@@ -128,7 +128,7 @@ TEST_F(TileCodecTest, ReadsWhatIsSpecified) {
   EXPECT_EQ(first.occlusion().count(), 2u);
   EXPECT_TRUE(first.occlusion()[40] && first.occlusion()[41]);
   EXPECT_TRUE(last.occlusion().none());
-  EXPECT_EQ(last.classes(), (std::vector<ClassId>{40, kFreeClass}));
+  EXPECT_EQ(last.classes(), (ClassList{40, kFreeClass}));
   for (std::size_t v = 0; v < kBlockVoxels; ++v) {
     ASSERT_EQ(last.plane(0)[v], v == 8 ? 1 : 0) << v;
     ASSERT_EQ(last.plane(1)[v], v == 8 ? -1 : 0) << v;

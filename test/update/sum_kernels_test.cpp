@@ -203,9 +203,9 @@ TEST(Block, HasAPlaneWhereThereIsEvidence) {
   plane[7] = 5;
   minus[7] = -5;
   for (const int id : {3, 255, 0, 2}) block.add(static_cast<ClassId>(id), plane.data());
-  EXPECT_EQ(block.classes(), (std::vector<ClassId>{0, 2, 3, 255}));
+  EXPECT_EQ(block.classes(), (ClassList{0, 2, 3, 255}));
   block.add(2, minus.data());
-  EXPECT_EQ(block.classes(), (std::vector<ClassId>{0, 3, 255}));
+  EXPECT_EQ(block.classes(), (ClassList{0, 3, 255}));
   for (std::size_t p = 0; p < 3; ++p) EXPECT_EQ(block.plane(p)[7], 5);
   EXPECT_EQ(block.evidence(2), nullptr);
   for (const int id : {3, 255, 0}) block.add(static_cast<ClassId>(id), minus.data());
