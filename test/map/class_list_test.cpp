@@ -72,8 +72,11 @@ TEST(ClassListTest, CopiesAndMovesFewAndMany) {
       ClassList assigned = evenOnes(other);
       assigned = list;
       EXPECT_EQ(idsOf(assigned), idsOf(list));
-      assigned.insert(0, 1);
-      EXPECT_NE(assigned, list);
+      ClassList taken = evenOnes(other);
+      taken = std::move(assigned);
+      EXPECT_EQ(idsOf(taken), idsOf(list));
+      taken.insert(taken.positionOf(1), 1);
+      EXPECT_NE(taken, list);
     }
   }
 }
