@@ -46,9 +46,10 @@ endif()
 # Tests that compute count as two processors, and rostests, which mostly wait, as one: scripts/test tells ctest that there
 # are twice as many as there are.
 
-# Less optimised than what they test: that takes a third off their compile time.
+# Less optimised than what they test: -Og takes four fifths of the time of -O1 to compile, and with the address sanitizer two
+# thirds. They run a twentieth longer.
 function(bki_mapping_test_options target)
-  target_compile_options(${target} PRIVATE -O1)
+  target_compile_options(${target} PRIVATE -Og)
   bki_mapping_warnings(${target})
 endfunction()
 
