@@ -243,7 +243,7 @@ foreach(name instruction_sets laws)
 endforeach()
 set_property(TEST instruction_sets_generic_test APPEND PROPERTY ENVIRONMENT "GTEST_FILTER=*GenericIsAlwaysThere")
 bki_mapping_unit_tests(journal corrected_looks corrected_path moved_looks scan_codec scan_journal sensor_scan)
-bki_mapping_unit_tests(journal map_corrector)  # as state_map
+bki_mapping_unit_tests(journal map_corrector)  # scripts/test leaves a part of it out, as of state_map
 bki_mapping_unit_tests(journal kept_journal LINK bki_mapping_store)  # scripts/test runs a part of it
 bki_mapping_unit_tests(journal stored_journal LINK bki_mapping_store)
 bki_mapping_unit_tests(settings class_table label_watch yaml_file LINK yaml-cpp)
