@@ -22,32 +22,32 @@ double sineOfRow(int row) {
   return 2.0 * row / kBeamRows - 1.0;
 }
 
-/// Sets each of a ring of values to the greatest of those up to `width` places before and after it.
-void spread(int width, const float* ring, int columns, const LineKernels& kernels, float* to) {
+/// Sets each of a ring of values to the greatest of those up to `width` places before and after it. @param
+/// ring those values, with room for `width` before and after them.
+void spread(int width, float* ring, int columns, const LineKernels& kernels, float* to) {
   const int wanted = 2 * width + 1;
   if (wanted >= columns) {
     std::fill_n(to, columns, *std::max_element(ring, ring + columns));
     return;
   }
-  // Windows that begin at each place, which grow to twice their size in each step.
+  std::copy(ring + columns - width, ring + columns, ring - width);
+  std::copy(ring, ring + width, ring + columns);
+  // Windows that begin at each place, which grow to twice their size in each step; the last are wanted.
   float windows[2][2 * kBeamColumns];
-  std::copy(ring + columns - width, ring + columns, windows[0]);
-  std::copy(ring, ring + columns, windows[0] + width);
-  std::copy(ring, ring + width, windows[0] + width + columns);
-  int from = 0;
-  for (int size = 1, step; size < wanted; size += step, from = 1 - from) {
+  const float* from = ring - width;
+  for (int size = 1, step, next = 0; size < wanted; size += step, next = 1 - next) {
     step = std::min(size, wanted - size);
-    kernels.find_greater(windows[from], windows[from] + step, columns + wanted - size - step,
-                         windows[1 - from]);
+    float* wider = size + step == wanted ? to : windows[next];
+    kernels.find_greater(from, from + step, columns + wanted - size - step, wider);
+    from = wider;
   }
-  std::copy(windows[from], windows[from] + columns, to);
 }
 
 }  // namespace
 
 void LongestBeams::findLengths(const BeamField& field) {
-  fine_.lengths.assign(std::size_t{kBeamRows} * kBeamColumns, 0.0f);
-  coarse_.lengths.assign(static_cast<std::size_t>(kBeamRows * coarse_.columns), 0.0f);
+  fine_.levels[0].assign(fine_.at(kBeamRows), 0.0f);
+  coarse_.levels[0].assign(coarse_.at(kBeamRows), 0.0f);
   const std::size_t count = field.beams().ends.size();
   if (count == 0) {
     with_beams_ = {0, -1};
@@ -57,7 +57,7 @@ void LongestBeams::findLengths(const BeamField& field) {
   for (std::size_t b = 0; b < count; ++b) {
     const float length = per_metre / field.inverseLengthOf(b);
     const std::uint32_t cell = field.cellOf(b);
-    float &of_cell = fine_.lengths[cell], &of_some = coarse_.lengths[cell >> coarse_.shift];
+    float &of_cell = fine_.levels[0][cell], &of_some = coarse_.levels[0][cell >> coarse_.shift];
     of_cell = std::max(of_cell, length);
     of_some = std::max(of_some, length);
   }
@@ -73,21 +73,36 @@ LongestBeams::Rows LongestBeams::rowsNear(int row, const Shell& shell) const {
           std::min(high >= kRightAngle ? kBeamRows - 1 : rowAt(std::sin(high) + kRoom), with_beams_.last)};
 }
 
+void LongestBeams::setLevels(double rows, Grid& grid, const LineKernels& kernels, ThreadPool& pool) const {
+  const int count = with_beams_.last - with_beams_.first + 1;
+  for (int level = 1; (1 << level) <= std::min(static_cast<int>(rows), count); ++level) {
+    const std::vector<float>& from = grid.levels[static_cast<std::size_t>(level - 1)];
+    std::vector<float>& to = grid.levels[static_cast<std::size_t>(level)];
+    to.resize(from.size());
+    pool.forEach(static_cast<std::size_t>(count), [&](std::size_t n, std::size_t) {
+      const int row = with_beams_.first + static_cast<int>(n),
+                next = std::min(row + (1 << (level - 1)), with_beams_.last);
+      kernels.find_greater(from.data() + grid.at(row), from.data() + grid.at(next), grid.columns,
+                           to.data() + grid.at(row));
+    });
+  }
+}
+
 void LongestBeams::setRow(int row, const Shell& shell, const LineKernels& kernels) const {
   const int columns = shell.grid->columns;
-  float ring[2][kBeamColumns] = {};
-  int from = 0;
+  // Two windows of a level cover the rows; they may overlap.
   const Rows near = rowsNear(row, shell);
-  for (int other = near.first; other <= near.last; ++other, from = 1 - from) {
-    kernels.find_greater(ring[from],
-                         shell.grid->lengths.data() + static_cast<std::ptrdiff_t>(other) * columns, columns,
-                         ring[1 - from]);
-  }
+  const int level = 31 - __builtin_clz(static_cast<unsigned>(near.last - near.first + 1));
+  const float* lengths = shell.grid->levels[static_cast<std::size_t>(level)].data();
+  float memory[3 * kBeamColumns];
+  float* ring = memory + kBeamColumns;
+  kernels.find_greater(lengths + shell.grid->at(near.first),
+                       lengths + shell.grid->at(near.last + 1 - (1 << level)), columns, ring);
   // Equation (9) of docs/method.md; the pseudo-angle grows at most as fast as the azimuth.
   const double sine = std::max(std::abs(sineOfRow(row)), std::abs(sineOfRow(row + 1))),
                cosine = std::sqrt(std::max(1.0 - sine * sine, 0.0)) - kRoom, reach = std::sin(shell.angle);
   const double azimuth = reach >= cosine ? 4.0 : std::asin(reach / cosine) + kRoom;
-  spread(static_cast<int>(azimuth * columns / 4.0) + 2, ring[from], columns, kernels,
+  spread(static_cast<int>(azimuth * columns / 4.0) + 2, ring, columns, kernels,
          shell.lengths + static_cast<std::ptrdiff_t>(row) * columns);
 }
 
@@ -126,6 +141,14 @@ void LongestBeams::set(const BeamField& field, float reach, float farthest, cons
   placeShells(reach, farthest);
   if (shells_.empty()) return;
   findLengths(field);
+  // Each grid's first shell has the largest angle; the sine of the elevation changes at most as fast.
+  const auto setLevelsOf = [&](Grid& grid) {
+    const auto isOf = [&](const Shell& shell) { return shell.grid == &grid; };
+    const auto first = std::find_if(shells_.begin(), shells_.end(), isOf);
+    if (first != shells_.end()) setLevels(first->angle * kBeamRows + 3.0, grid, kernels, pool);
+  };
+  setLevelsOf(coarse_);
+  setLevelsOf(fine_);
   for (Shell& shell : shells_) {
     Rows rows = {0, kBeamRows - 1};
     const auto isPassed = [&](int row) {

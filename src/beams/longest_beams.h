@@ -1,6 +1,7 @@
 /// @file How far the beams reach that may pass near a point.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -34,11 +35,17 @@ class LongestBeams {
 
  private:
   static constexpr std::uint8_t kNone = 0xff;
+  static constexpr int kLevels = 8;
+  static_assert(1 << (kLevels - 1) == kBeamRows);
 
   /// The bins of a row, some side by side taken together.
   struct Grid {
     int shift, columns;
-    std::vector<float> lengths;  ///< the greatest in each bin [voxels]
+    /// The greatest length in each bin [voxels]. Level n holds, for each row, that of the row and the
+    /// 2^n - 1 after it.
+    std::array<std::vector<float>, kLevels> levels;
+
+    std::size_t at(int row) const { return static_cast<std::size_t>(row * columns); }
   };
   struct Shell {
     float begin;   ///< [voxels]
@@ -56,6 +63,8 @@ class LongestBeams {
   void placeShells(float reach, float farthest);
   /// The rows with beams that pass a row of a shell; none if `first` is after `last`.
   Rows rowsNear(int row, const Shell& shell) const;
+  /// Sets the levels of a grid that windows of some rows need.
+  void setLevels(double rows, Grid& grid, const LineKernels& kernels, ThreadPool& pool) const;
   void setRow(int row, const Shell& shell, const LineKernels& kernels) const;
 
   Grid fine_ = {0, kBeamColumns, {}}, coarse_ = {3, kBeamColumns >> 3, {}};
