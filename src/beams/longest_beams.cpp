@@ -15,11 +15,14 @@ constexpr float kFirstShell = 1.5f;
 constexpr float kNearest = 0.5f;
 /// Above this angle, bins of the coarse grid are small [rad].
 constexpr double kWide = 0.08;
-constexpr double kRightAngle = 1.57079632679489661923;
 constexpr double kRoom = 1e-5;  ///< for the rounding of sines and angles
 
 double sineOfRow(int row) {
   return 2.0 * row / kBeamRows - 1.0;
+}
+
+double cosineOf(double sine) {
+  return std::sqrt(std::max(1.0 - sine * sine, 0.0));
 }
 
 /// Sets each of a ring of values to the greatest of those up to `width` places before and after it. @param
@@ -66,11 +69,13 @@ void LongestBeams::findLengths(const BeamField& field) {
 }
 
 LongestBeams::Rows LongestBeams::rowsNear(int row, const Shell& shell) const {
-  const double low = std::asin(sineOfRow(row)) - shell.angle,
-               high = std::asin(sineOfRow(row + 1)) + shell.angle;
+  const double low = sineOfRow(row), high = sineOfRow(row + 1);
   const auto rowAt = [](double sine) { return beamRow(static_cast<float>(sine)); };
-  return {std::max(low <= -kRightAngle ? 0 : rowAt(std::sin(low) - kRoom), with_beams_.first),
-          std::min(high >= kRightAngle ? kBeamRows - 1 : rowAt(std::sin(high) + kRoom), with_beams_.last)};
+  // sin(elevation - angle) and sin(elevation + angle), unless they pass a pole.
+  const int first = low <= -shell.cosine ? 0 : rowAt(low * shell.cosine - cosineOf(low) * shell.sine - kRoom);
+  const int last =
+      high >= shell.cosine ? kBeamRows - 1 : rowAt(high * shell.cosine + cosineOf(high) * shell.sine + kRoom);
+  return {std::max(first, with_beams_.first), std::min(last, with_beams_.last)};
 }
 
 void LongestBeams::setLevels(double rows, Grid& grid, const LineKernels& kernels, ThreadPool& pool) const {
@@ -100,8 +105,8 @@ void LongestBeams::setRow(int row, const Shell& shell, const LineKernels& kernel
                        lengths + shell.grid->at(near.last + 1 - (1 << level)), columns, ring);
   // Equation (9) of docs/method.md; the pseudo-angle grows at most as fast as the azimuth.
   const double sine = std::max(std::abs(sineOfRow(row)), std::abs(sineOfRow(row + 1))),
-               cosine = std::sqrt(std::max(1.0 - sine * sine, 0.0)) - kRoom, reach = std::sin(shell.angle);
-  const double azimuth = reach >= cosine ? 4.0 : std::asin(reach / cosine) + kRoom;
+               cosine = cosineOf(sine) - kRoom;
+  const double azimuth = shell.sine >= cosine ? 4.0 : std::asin(shell.sine / cosine) + kRoom;
   spread(static_cast<int>(azimuth * columns / 4.0) + 2, ring, columns, kernels,
          shell.lengths + static_cast<std::ptrdiff_t>(row) * columns);
 }
@@ -116,7 +121,7 @@ void LongestBeams::placeShells(float reach, float farthest) {
     const double nearest = static_cast<double>(begin),
                  angle = std::asin(static_cast<double>(reach) / nearest) + kRoom;
     const Grid& grid = angle > kWide ? coarse_ : fine_;
-    shells_.push_back({begin, angle, &grid, grid.shift, 0, -1, nullptr});
+    shells_.push_back({begin, std::sin(angle), std::cos(angle), &grid, grid.shift, 0, -1, nullptr});
     memory += static_cast<std::size_t>(kBeamRows * grid.columns);
   }
   memory_.resize(memory);
@@ -141,11 +146,11 @@ void LongestBeams::set(const BeamField& field, float reach, float farthest, cons
   placeShells(reach, farthest);
   if (shells_.empty()) return;
   findLengths(field);
-  // Each grid's first shell has the largest angle; the sine of the elevation changes at most as fast.
+  // Each grid's first shell has the largest angle. Windows span its sine in both directions.
   const auto setLevelsOf = [&](Grid& grid) {
     const auto isOf = [&](const Shell& shell) { return shell.grid == &grid; };
     const auto first = std::find_if(shells_.begin(), shells_.end(), isOf);
-    if (first != shells_.end()) setLevels(first->angle * kBeamRows + 3.0, grid, kernels, pool);
+    if (first != shells_.end()) setLevels(first->sine * kBeamRows + 3.0, grid, kernels, pool);
   };
   setLevelsOf(coarse_);
   setLevelsOf(fine_);

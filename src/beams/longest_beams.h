@@ -48,8 +48,8 @@ class LongestBeams {
     std::size_t at(int row) const { return static_cast<std::size_t>(row * columns); }
   };
   struct Shell {
-    float begin;   ///< [voxels]
-    double angle;  ///< that the reach subtends at most [rad]
+    float begin;          ///< [voxels]
+    double sine, cosine;  ///< of the angle that the reach subtends at most
     const Grid* grid;
     int shift;
     std::int32_t first, last;  ///< direction bins of the first and the last row that beams pass
