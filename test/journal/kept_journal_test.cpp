@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <memory>
 #include <random>
 
 #include "journal/journal_writer.h"
@@ -122,9 +123,12 @@ class Journalled {
 SemanticMap mapOfJournal(MapFile& file) {
   SemanticMap sum = file.info().emptyMap();
   const std::vector<Eigen::AlignedBox3d> boxes = file.clearedBoxes();
-  const auto settings = journalSettings(file);
+  std::vector<std::unique_ptr<SemanticMapper>> mappers;
+  for (const auto& settings : journalSettings(file)) {
+    mappers.push_back(std::make_unique<SemanticMapper>(*settings, reference::smallTable()));
+  }
   for (const ScanRecord& scan : file.scans()) {
-    SemanticMapper mapper(*settings.at(static_cast<std::size_t>(scan.settings)), reference::smallTable());
+    SemanticMapper& mapper = *mappers.at(static_cast<std::size_t>(scan.settings));
     mapper.integrate(place(unpackScan(file.scanContent(scan.number)), scan.T_map_sensor));
     const std::vector<GridIndex> tiles = tilesOf(mapper.map());
     EXPECT_TRUE(std::includes(scan.tiles.begin(), scan.tiles.end(), tiles.begin(), tiles.end()));
