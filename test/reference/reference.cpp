@@ -237,17 +237,18 @@ Eigen::Vector3d ScanReference::relativeCentre(const VoxelIndex& voxel) const {
 Value ScanReference::pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel,
                                    int label) const {
   const Eigen::Vector3d centre = relativeCentre(voxel);
+  const double length = config_.kernel.lengthFor(config_.resolution);
   Value value;
   for (const Point& point : points) {
     const double share = point.shareOf(label);
-    if (share == 0.0) continue;
+    const Eigen::Vector3d from_centre = point.p - centre;
+    if (share == 0.0 || from_centre.cwiseAbs().maxCoeff() >= std::max(length, config_.resolution)) continue;
     if (config_.kernel.type == KernelType::kSparse) {
-      value.sum += share * sparseKernel((point.p - centre).norm(),
-                                        config_.kernel.lengthFor(config_.resolution), config_.kernel.scale);
+      value.sum += share * sparseKernel(from_centre.norm(), length, config_.kernel.scale);
       continue;
     }
     // The voxel holds the point if the offset from its centre is in [-half, half) on each axis.
-    const Eigen::Array3d offset = (point.p - centre).array() / config_.resolution;
+    const Eigen::Array3d offset = from_centre.array() / config_.resolution;
     const double outside = offset.abs().maxCoeff() - 0.5;
     if (outside < -kClose) value.sum += share;
     if (std::abs(outside) <= kClose) value.slack += share;
@@ -265,12 +266,14 @@ Value ScanReference::hitEvidence(const VoxelIndex& voxel, const SemanticClass& c
   const double in_voxels = config_.kernel.lengthFor(config_.resolution) / config_.resolution;
   static const double kIntegral = kernelIntegral();
   const double total = config_.kernel.scale * kIntegral * in_voxels * in_voxels * in_voxels;
+  const Eigen::Vector3d centre = relativeCentre(voxel);
   Value value;
   for (const Point& hit : hits_) {
-    const Eigen::Vector3d offset = (hit.p - relativeCentre(voxel)) / config_.resolution;
-    const double outside = offset.cwiseAbs().maxCoeff() - 0.5;
-    if (outside < -kClose) value.sum += hit.shareOf(c.id) * total;
-    if (std::abs(outside) <= kClose) value.slack += hit.shareOf(c.id) * total;
+    const double share = hit.shareOf(c.id);
+    if (share == 0.0) continue;
+    const double outside = ((hit.p - centre) / config_.resolution).cwiseAbs().maxCoeff() - 0.5;
+    if (outside < -kClose) value.sum += share * total;
+    if (std::abs(outside) <= kClose) value.slack += share * total;
   }
   return value;
 }
@@ -312,12 +315,20 @@ bool ScanReference::blockIsHit(const BlockIndex& block) const {
   const auto known = hit_blocks_.find(key);
   if (known != hit_blocks_.end()) return known->second;
   bool hit = false;
+  const double length = config_.kernel.lengthFor(config_.resolution);
+  const Eigen::Vector3d first = relativeCentre(GridGeometry::voxelOf(block, 0)),
+                        last = relativeCentre(GridGeometry::voxelOf(block, kBlockVoxels - 1));
+  std::vector<Point> about;  // no others are near a voxel of the block, or in it
+  for (const Point& point : hits_) {
+    const Eigen::Vector3d outside = (first - point.p).cwiseMax(point.p - last);
+    if (outside.maxCoeff() <= std::max(length, config_.resolution)) about.push_back(point);
+  }
   for (int offset = 0; offset < kBlockVoxels && !hit; ++offset) {
     const Eigen::Vector3d centre = relativeCentre(GridGeometry::voxelOf(block, offset));
-    for (const Point& point : hits_) {
+    for (const Point& point : about) {
       const Eigen::Vector3d d = point.p - centre;
       const bool inside = d.cwiseAbs().maxCoeff() <= config_.resolution / 2;
-      const bool near = d.norm() < config_.kernel.lengthFor(config_.resolution);
+      const bool near = d.norm() < length;
       if (!inside && !near) continue;
       for (const SemanticClass& c : classes_) {
         if (point.shareOf(c.id) != 0.0) hit |= spreads(c) ? near : inside;
