@@ -283,6 +283,7 @@ function(bki_mapping_script_test room name)
     ENVIRONMENT "BKI_MAPPING_BIN=$<TARGET_FILE_DIR:map_sequence>;BKI_MAPPING_SOURCE_DIR=${PROJECT_SOURCE_DIR};BKI_MAPPING_BUILD=${CMAKE_BINARY_DIR}")
 endfunction()
 bki_mapping_script_test(house layering_test)
+bki_mapping_script_test(house sanitizer_cases_test)
 bki_mapping_script_test(house links_test)
 bki_mapping_script_test(house foxglove_test)
 if(NOT CMAKE_CROSSCOMPILING)  # for which this machine may lack packages

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""The cases that scripts/test chooses for the thread sanitizer exist, and their tests heed the choice."""
+import fnmatch
+import os
+import re
+import unittest
+
+ROOT = os.environ['BKI_MAPPING_SOURCE_DIR']
+
+
+def text_of(name):
+    with open(os.path.join(ROOT, name)) as file:
+        return file.read()
+
+
+def cases_of():
+    """For each NAME_test.cpp, its cases Suite.Case."""
+    cases = {}
+    for folder, _, files in os.walk(os.path.join(ROOT, 'test')):
+        for name in files:
+            if name.endswith('_test.cpp'):
+                found = re.findall(r'^ *TEST(?:_F|_P)?\((\w+), (\w+)\)', text_of(os.path.join(folder, name)), re.MULTILINE)
+                cases[name[:-len('.cpp')]] = ['.'.join(each) for each in found]
+    return cases
+
+
+def joined():
+    """The tests that may be one program with others. That gets a filter of its own, before which GTEST_FILTER counts nothing."""
+    calls = re.findall(r'^ *bki_mapping_unit_tests\(\w+ ([^)]*)\)', text_of('cmake/tests.cmake'), re.MULTILINE)
+    names = (re.sub(r'\bLINK\b.*', '', call, flags=re.DOTALL).split() for call in calls)
+    return {name + '_test' for each in names if len(each) > 1 for name in each}
+
+
+class Cases(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.script, cls.cases, cls.joined = text_of('scripts/test'), cases_of(), joined()
+
+    def expect_heeded(self, pattern, tests):
+        """A case, of which the suite may have parameters, belongs to one of the tests, which is a program of its own."""
+        has = {test for test in tests for case in self.cases[test] if fnmatch.fnmatch(case, pattern.split('/')[-1])}
+        self.assertTrue(has, f'{pattern} is a case of none of {sorted(tests)}')
+        self.assertFalse(has & self.joined, f'{pattern}: give its test a call of bki_mapping_unit_tests in cmake/tests.cmake')
+
+    def test_left_out(self):
+        (left_out, names), = re.findall(r"GTEST_FILTER=-(\S+) \\\n *run_ctest \S+ -R '\^\(([\w|]+)\)_test\$'", self.script)
+        for case in left_out.split(':'):
+            self.expect_heeded(case, [name + '_test' for name in names.split('|')])
+
+    def test_chosen(self):
+        runs = re.findall(r"bki_mapping/(\w+_test)\" --gtest_filter='([^']+)'", self.script)
+        self.assertGreater(len(runs), 0)
+        for test, patterns in runs:
+            for pattern in patterns.split(':'):
+                suite = re.sub(r'^\w+/\*/\d+$', '*', pattern)  # of a suite with parameters, all cases of one of them
+                self.expect_heeded(suite, [test])
+
+    def test_that_it_would_see_what_is_wrong(self):
+        for wrong in ('MapCorrector.NoSuchCase', 'Points.NoSuchCase'):
+            with self.assertRaises(AssertionError):
+                self.expect_heeded(wrong, ['map_corrector_test', 'points_test'])
+        case, *_ = self.cases['points_test']
+        with self.assertRaises(AssertionError):
+            self.expect_heeded(case, ['points_test'])
+
+
+if __name__ == '__main__':
+    unittest.main()
