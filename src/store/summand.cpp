@@ -60,17 +60,53 @@ void gatherLooks(const SourceVoxels& voxels, Looks& looks) {
   }
 }
 
+/// Whether the source has a block from which a voxel of a block of the target may come.
+bool hasSourceOf(const SemanticMap& source, const GridTransform& transform, const BlockIndex& index) {
+  GridIndex low = transform.sourceOf(GridGeometry::voxelOf(index, 0)), high = low;
+  for (const int x : {0, kBlockEdge - 1}) {
+    for (const int y : {0, kBlockEdge - 1}) {
+      for (const int z : {0, kBlockEdge - 1}) {
+        const GridIndex corner = transform.sourceOf(
+            {{index.x * kBlockEdge + x, index.y * kBlockEdge + y, index.z * kBlockEdge + z}});
+        low = {std::min(low.x, corner.x), std::min(low.y, corner.y), std::min(low.z, corner.z)};
+        high = {std::max(high.x, corner.x), std::max(high.y, corner.y), std::max(high.z, corner.z)};
+      }
+    }
+  }
+  // The others lie between these, but for rounding.
+  const BlockIndex first = GridGeometry::blockOf({{low.x - 1, low.y - 1, low.z - 1}}),
+                   last = GridGeometry::blockOf({{high.x + 1, high.y + 1, high.z + 1}});
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
+        if (source.find({{x, y, z}})) return true;
+      }
+    }
+  }
+  return false;
+}
+
 /// A block of the target, whose voxels come from several blocks of the source.
 void gatherBlock(const SemanticMap& source, const GridTransform& transform, const BlockIndex& index,
                  SemanticMap& target) {
+  if (!hasSourceOf(source, transform, index)) return;
   SourceVoxels voxels;
   std::bitset<256> classes;
   Block::Occlusion marks;
   BlockIndex last_index{};
   const Block* last = source.find(last_index);
   bool any = false;
+  // Turns are about z, so x and y are those of the first layer, and z is that of the first voxel of a layer.
+  constexpr int kLayer = kBlockEdge * kBlockEdge;
+  std::array<VoxelIndex, kLayer> first_layer;
+  for (int v = 0; v < kLayer; ++v) {
+    first_layer[static_cast<std::size_t>(v)] = transform.sourceOf(GridGeometry::voxelOf(index, v));
+  }
+  int z = 0;
   for (int v = 0; v < kBlockVoxels; ++v) {
-    const VoxelIndex from = transform.sourceOf(GridGeometry::voxelOf(index, v));
+    VoxelIndex from = first_layer[static_cast<std::size_t>(v % kLayer)];
+    if (v % kLayer == 0) z = transform.sourceOf(GridGeometry::voxelOf(index, v)).z;
+    from.z = z;
     const BlockIndex block = GridGeometry::blockOf(from);
     if (block != last_index) {
       last_index = block;
