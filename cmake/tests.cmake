@@ -454,7 +454,7 @@ if(CATKIN_ENABLE_TESTING)
   else()
     set_target_properties(hostile_test soak_test PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
-  bki_mapping_long_tests(commands_test map_bag_test _ctest_${PROJECT_NAME}_rostest_test_ros_replay.test)
+  bki_mapping_long_tests(commands_test map_bag_test)
   # They limit times, which another test at the same time would change.
   foreach(name query_latency rates)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_test_ros_${name}.test PROPERTIES RUN_SERIAL TRUE)
