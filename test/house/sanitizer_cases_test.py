@@ -14,13 +14,16 @@ def text_of(name):
 
 
 def cases_of():
-    """For each NAME_test.cpp, its cases Suite.Case."""
+    """For each NAME_test.cpp, its cases Suite.Case, and Name/ for the names of its suites with parameters."""
     cases = {}
     for folder, _, files in os.walk(os.path.join(ROOT, 'test')):
         for name in files:
             if name.endswith('_test.cpp'):
-                found = re.findall(r'^ *TEST(?:_F|_P)?\((\w+), (\w+)\)', text_of(os.path.join(folder, name)), re.MULTILINE)
-                cases[name[:-len('.cpp')]] = ['.'.join(each) for each in found]
+                text = text_of(os.path.join(folder, name))
+                found = ['.'.join(each) for each in re.findall(r'^ *TEST(?:_F|_P)?\((\w+), (\w+)\)', text, re.MULTILINE)]
+                # A suite with parameters has names of its own.
+                found += [each + '/' for each in re.findall(r'^ *INSTANTIATE_TEST_SUITE_P\(\s*(\w+)', text, re.MULTILINE)]
+                cases[name[:-len('.cpp')]] = found
     return cases
 
 
@@ -37,8 +40,8 @@ class Cases(unittest.TestCase):
         cls.script, cls.cases, cls.joined = text_of('scripts/test'), cases_of(), joined()
 
     def expect_heeded(self, pattern, tests):
-        """A case, of which the suite may have parameters, belongs to one of the tests, which is a program of its own."""
-        has = {test for test in tests for case in self.cases[test] if fnmatch.fnmatch(case, pattern.split('/')[-1])}
+        """A pattern is for cases of one of the tests, which is a program of its own."""
+        has = {test for test in tests for case in self.cases[test] if fnmatch.fnmatch(case, pattern)}
         self.assertTrue(has, f'{pattern} is a case of none of {sorted(tests)}')
         self.assertFalse(has & self.joined, f'{pattern}: give its test a call of bki_mapping_unit_tests in cmake/tests.cmake')
 
@@ -52,11 +55,10 @@ class Cases(unittest.TestCase):
         self.assertGreater(len(runs), 0)
         for test, patterns in runs:
             for pattern in patterns.split(':'):
-                suite = re.sub(r'^\w+/\*/\d+$', '*', pattern)  # of a suite with parameters, all cases of one of them
-                self.expect_heeded(suite, [test])
+                self.expect_heeded(re.sub(r'^(\w+/)\*/\d+$', r'\1', pattern), [test])
 
     def test_that_it_would_see_what_is_wrong(self):
-        for wrong in ('MapCorrector.NoSuchCase', 'Points.NoSuchCase'):
+        for wrong in ('MapCorrector.NoSuchCase', 'NoSuchName/'):
             with self.assertRaises(AssertionError):
                 self.expect_heeded(wrong, ['map_corrector_test', 'points_test'])
         case, *_ = self.cases['points_test']
