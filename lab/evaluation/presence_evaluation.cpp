@@ -53,7 +53,10 @@ void PresenceEvaluation::follow(const Scan& scan, double time, Occupants& map) {
     } else if (is_hit) {
       voxel.wait = Wait::kToBeSeen;
     }
-    if (voxel.wait == Wait::kToBeSeen && !is_hit &&
+    const bool is_taken = voxel.wait != Wait::kNone && isTaken(voxel, time);
+    if (is_taken && voxel.wait == Wait::kToClear) voxel.wait = Wait::kToBeSeen;
+    if (is_taken && voxel.wait == Wait::kToBeSeen && !map.at(voxel.index)) voxel.wait = Wait::kNone;
+    if (voxel.wait == Wait::kToBeSeen && !is_hit && !is_taken &&
         beams_.anyPasses(geometry_.voxelCentre(voxel.index), geometry_.resolution())) {
       start(n, Wait::kToClear, time);
     }
@@ -99,7 +102,14 @@ void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupa
   ++scans_;
 }
 
-PresenceQuality PresenceEvaluation::quality(Occupants& map, const TakenFor& taken_for) const {
+bool PresenceEvaluation::stays(const Voxel& voxel) const {
+  for (double time = last_time_; time > voxel.last_hit; time -= 0.5) {
+    if (!isTaken(voxel, time)) return false;
+  }
+  return isTaken(voxel, voxel.last_hit);
+}
+
+PresenceQuality PresenceEvaluation::quality(Occupants& map) const {
   PresenceQuality quality = quality_;
   for (const Delay& delay : delays_) {
     if (voxels_[delay.voxel].is_shared) continue;
@@ -111,8 +121,7 @@ PresenceQuality PresenceEvaluation::quality(Occupants& map, const TakenFor& take
     }
   }
   for (const Voxel& voxel : voxels_) {
-    if (!taken_for || !voxel.came || voxel.is_shared) continue;
-    if (!taken_for(voxel.index, last_time_ - voxel.last_hit)) continue;
+    if (!voxel.came || voxel.is_shared || !stays(voxel)) continue;
     ++quality.stayed;
     quality.stayed_present += map.at(voxel.index).has_value();
   }

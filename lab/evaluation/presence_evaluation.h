@@ -53,18 +53,19 @@ struct PresenceQuality {
 /// Follows a drive scan by scan, with the map after each.
 class PresenceEvaluation {
  public:
-  /// Whether a voxel has contained an object that can move during the last seconds of the drive, all the
-  /// time.
-  using TakenFor = std::function<bool(const VoxelIndex& voxel, double seconds)>;
+  /// Whether a voxel contains an object that can move at a time [s, as the stamps of scans].
+  using Taken = std::function<bool(const VoxelIndex& voxel, double time)>;
 
   PresenceEvaluation(const GridGeometry& geometry, KittiLabels moving)
       : geometry_(geometry), moving_(std::move(moving)) {}
+  /// Call before add() if the truth is known.
+  void setTruth(Taken taken) { taken_ = std::move(taken); }
 
   /// Adds the next scan, after it is in the map. The first scans only show what is there: kFirstScans.
   /// @param scan with true labels. @param map what the map shows right after the scan.
   void add(const Scan& scan, const ClassTable& classes, Occupants& map);
-  /// @param map what the map shows at the end. @param taken_for may be empty: the truth is not known.
-  PresenceQuality quality(Occupants& map, const TakenFor& taken_for = {}) const;
+  /// @param map what the map shows at the end.
+  PresenceQuality quality(Occupants& map) const;
 
   /// Scans before the first that counts.
   static constexpr std::size_t kFirstScans = 2;
@@ -90,9 +91,13 @@ class PresenceEvaluation {
   std::uint32_t voxelAt(const VoxelIndex& index);
   void start(std::uint32_t n, Wait wait, double time);
   void follow(const Scan& scan, double time, Occupants& map);
+  bool isTaken(const Voxel& voxel, double time) const { return taken_ && taken_(voxel.index, time); }
+  /// Whether a voxel has been taken since it was last hit, by samples of half a second.
+  bool stays(const Voxel& voxel) const;
 
   GridGeometry geometry_;
   KittiLabels moving_;
+  Taken taken_;  ///< empty: the truth is not known
   std::size_t scans_ = 0;
   double last_time_ = 0.0;  ///< of the last scan [s]
   GridTable index_of_;

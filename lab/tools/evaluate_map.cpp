@@ -166,15 +166,13 @@ struct Evaluation {
     return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
   }
 
-  /// Whether that is so for the last seconds of the drive, by samples of half a second.
-  PresenceEvaluation::TakenFor takenFor() const {
-    if (!truth) return {};
-    return [this](const VoxelIndex& voxel, double seconds) {
-      for (double before = 0.0; before < seconds; before += 0.5) {
-        if (!truth->isTaken(voxel, end - before)) return false;
-      }
-      return truth->isTaken(voxel, end - seconds);
+  /// Call once `truth` and `octomaps` are there. This must then stay where it is.
+  void tellTruth() {
+    const auto is_taken = [this](const VoxelIndex& voxel, double time) {
+      return truth->isTaken(voxel, time - 1e-9 * static_cast<double>(Sequence::kFirstStamp));
     };
+    presence.setTruth(is_taken);
+    for (OctomapRun& octomap : octomaps) octomap.presence.setTruth(is_taken);
   }
 
   MapQuality compare(const SemanticMapper& mapper) {
@@ -183,7 +181,7 @@ struct Evaluation {
     MapQuality quality;
     quality.dynamics = dynamics.compare(map, rules, taken());
     MapOccupants occupants(map, rules);
-    quality.presence = presence.quality(occupants, takenFor());
+    quality.presence = presence.quality(occupants);
     if (traces) quality.traces = traces->quality(occupants);
     const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
     const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
@@ -194,7 +192,7 @@ struct Evaluation {
       std::optional<TruthQuality> space;
       if (truth) space = truth->compare(octomap.mapper, end);
       quality.octomaps.push_back({octomap.settings, dynamics.compare(octomap.mapper, taken()),
-                                  octomap.presence.quality(octomap.mapper, takenFor()),
+                                  octomap.presence.quality(octomap.mapper),
                                   occupancy.compare(octomap.mapper, left), space, std::nullopt,
                                   octomap.times.median(), octomap.mapper.bytes()});
       if (traces) quality.octomaps.back().traces = octomap.traces.quality(octomap.mapper);
@@ -372,6 +370,7 @@ int evaluate(const po::variables_map& given) {
   if (config && !given.count("pose-drift")) {
     drive.emplace(*config);
     evaluation.truth.emplace(simulation::VoxelTruth::of(*drive, geometry), mapper.classes());
+    evaluation.tellTruth();
   }
   ScanTimes times, yardstick;
   std::size_t done = 0;  // scans

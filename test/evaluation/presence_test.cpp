@@ -44,9 +44,10 @@ class ScriptedDrive {
     MapOccupants map(map_, rules_);
     evaluation_.add(scan, *classes_, map);
   }
-  PresenceQuality quality(const PresenceEvaluation::TakenFor& taken_for = {}) const {
+  void setTruth(PresenceEvaluation::Taken taken) { evaluation_.setTruth(std::move(taken)); }
+  PresenceQuality quality() const {
     MapOccupants map(map_, rules_);
-    return evaluation_.quality(map, taken_for);
+    return evaluation_.quality(map);
   }
 
  private:
@@ -128,18 +129,62 @@ TEST(Presence, AsksForTheClassOfWhatIsPresent) {
 }
 
 TEST(Presence, AsksAtTheEndForWhatCameAndStayed) {
+  for (const bool is_known : {true, false}) {
+    ScriptedDrive drive;
+    if (is_known) drive.setTruth([](const VoxelIndex& voxel, double) { return voxel.x != 7; });
+    for (int n = 0; n < 2; ++n) drive.add({{3.5, 21}, {9.5, 10}}, {3});
+    drive.add({{5.5, 21}, {6.5, 21}, {7.5, 21}}, {});
+    drive.add({{2.5, 10}}, {2, 3, 5, 7});  // hides them all
+    const PresenceQuality quality = drive.quality();
+    EXPECT_EQ(quality.stayed, is_known ? 2u : 0u) << "of 5, 6, 7, and 3, which was there from the start";
+    EXPECT_EQ(quality.stayed_present, is_known ? 1u : 0u);
+  }
+}
+
+TEST(Presence, DoesNotWaitUntilSomethingIsClearedThatIsStillThere) {
   ScriptedDrive drive;
-  for (int n = 0; n < 2; ++n) drive.add({{3.5, 21}, {9.5, 10}}, {3});
-  drive.add({{5.5, 21}, {6.5, 21}, {7.5, 21}}, {});
-  drive.add({{2.5, 10}}, {2, 3, 5, 7});  // hides them all
-  const auto all_but_7 = [](const VoxelIndex& voxel, double seconds) {
-    EXPECT_NEAR(seconds, 0.1, 1e-6) << "since the last hit";
-    return voxel.x != 7;
-  };
-  const PresenceQuality quality = drive.quality(all_but_7);
-  EXPECT_EQ(quality.stayed, 2u) << "of 5, 6, 7, and 3, which was there from the start";
-  EXPECT_EQ(quality.stayed_present, 1u);
-  EXPECT_EQ(drive.quality().stayed, 0u) << "the truth is not known";
+  double gone = 1e9;  // [s]
+  drive.setTruth([&](const VoxelIndex&, double time) { return time < gone; });
+  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
+  drive.add({{5.5, 21}}, {5});
+  for (int n = 0; n < 15; ++n) drive.add({{9.5, 10}}, {5});
+  EXPECT_EQ(drive.quality().clear.count(), 0u);
+  gone = 2.85;  // scans come each tenth of a second, this was the one of 2.7 s
+  for (int n = 0; n < 3; ++n) drive.add({{9.5, 10}}, {5});
+  drive.add({{9.5, 10}}, {});
+  const PresenceQuality quality = drive.quality();
+  ASSERT_EQ(quality.clear.seconds.size(), 1u);
+  EXPECT_NEAR(quality.clear.seconds[0], 0.2, 1e-6);
+}
+
+TEST(Presence, WaitsAnewIfSomethingComesBack) {
+  ScriptedDrive drive;
+  bool is_taken = true;
+  drive.setTruth([&](const VoxelIndex&, double) { return is_taken; });
+  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
+  drive.add({{5.5, 21}}, {5});
+  is_taken = false;
+  drive.add({{9.5, 10}}, {5});
+  is_taken = true;  // comes back, and no beam hits it
+  for (int n = 0; n < 15; ++n) drive.add({{9.5, 10}}, {5});
+  EXPECT_EQ(drive.quality().clear.count(), 0u);
+  is_taken = false;
+  drive.add({{9.5, 10}}, {5});
+  drive.add({{9.5, 10}}, {});
+  ASSERT_EQ(drive.quality().clear.seconds.size(), 1u);
+  EXPECT_NEAR(drive.quality().clear.seconds[0], 0.1, 1e-6);
+}
+
+TEST(Presence, DoesNotPraiseWhatWasClearedTooEarly) {
+  ScriptedDrive drive;
+  bool is_taken = true;
+  drive.setTruth([&](const VoxelIndex&, double) { return is_taken; });
+  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
+  drive.add({{5.5, 21}}, {5});
+  drive.add({{9.5, 10}}, {});
+  is_taken = false;
+  drive.add({{9.5, 10}}, {});
+  EXPECT_EQ(drive.quality().clear.count(), 0u);
 }
 
 TEST(Delays, HaveQuantiles) {
