@@ -13,27 +13,41 @@ def read_planes(file, part=0):
     as an array [z, y, x]."""
     database = sqlite3.connect(pathlib.Path(file).absolute().as_uri() + '?mode=ro', uri=True)
     (application,), (version,) = (database.execute(f'PRAGMA {name}').fetchone() for name in ('application_id', 'user_version'))
-    if application != 0x424b494d or version not in (1, 2, 3, 4, 5):
-        raise ValueError(f'{file} is not a map file of version 1 to 5')
+    if application != 0x424b494d or version not in (1, 2, 3, 4, 5, 6):
+        raise ValueError(f'{file} is not a map file of version 1 to 6')
     exponent, = database.execute('SELECT unit_exponent FROM map').fetchone()
     for z, y, x, blocks, planes, content in database.execute(
             'SELECT z, y, x, blocks, planes, content FROM tile WHERE part = ? ORDER BY z, y, x', (part,)):
-        lengths, position = numpy.frombuffer(content, '<u4', 6), 24
+        lengths, position = list(numpy.frombuffer(content, '<u4', 6)), 24
+        steps, sections = (0,) * 4, [[8, 9, 10, 11], []]  # before version 6, all evidence is what is left, of one kind of planes
+        if version >= 6:
+            head = numpy.frombuffer(content, '<u4', 7)
+            steps, present = head[2:6], [n for n in range(24) if head[6] >> n & 1]
+            sections = [n for n in present if n < 12], [n - 12 for n in present if n >= 12]
+            lengths, position = [*head[:2], *numpy.frombuffer(content, '<u4', len(present), 28)], 28 + 4 * len(present)
 
-        def section(number, size):
+        def section(size=None):
             nonlocal position
-            data = content[position:position + lengths[number]]
-            position += lengths[number]
-            return numpy.frombuffer(data if len(data) == size else zlib.decompress(data), numpy.uint8)
-        listed = section(0, int(lengths[0]))  # in versions 3 and 4, it ends with the levels of the looks
+            begin, position = position, position + int(lengths.pop(0))
+            data = content[begin:position]
+            return numpy.frombuffer(data if len(data) == (size or len(data)) else zlib.decompress(data), numpy.uint8)
+
+        listed = section()  # in versions 3 and 4, it ends with the levels of the looks
         numbers = listed[:2 * blocks].view('<u2').astype(int)  # signed: the index of a tile may be negative
         counts, marked = listed[2 * blocks:3 * blocks], listed[3 * blocks:4 * blocks] & 1
-        masks = numpy.unpackbits(section(1, 64 * (int(marked.sum()) + planes)), bitorder='little').reshape(-1, 512)
+        labels = listed[4 * blocks:4 * blocks + planes]
+        masks = numpy.unpackbits(section(64 * (int(marked.sum()) + planes)), bitorder='little').reshape(-1, 512)
         masks = masks[int(marked.sum()):].astype(bool)
-        size = int(masks.sum())
-        units = numpy.zeros(masks.shape, '<i4')
-        units[masks] = numpy.stack([section(byte, size) for byte in range(2, 6)], axis=1).copy().view('<i4').ravel()
-        for block, label, plane in zip(numpy.repeat(numbers, counts), listed[4 * blocks:], units):
+        units = numpy.zeros(masks.shape, '<u4')
+        for kind, of_kind in enumerate(((labels == 255) | (version < 6), (labels != 255) & (version >= 6))):
+            voxels = masks & of_kind[:, None]
+            for n in sections[kind]:
+                data, step = section(int(voxels.sum())), 1
+                if n < 8:  # differences of a multiple of a step
+                    data, step = numpy.cumsum(data, dtype='u1'), int(steps[2 * kind + n // 4])
+                units[voxels] += numpy.uint32((step << 8 * (n % 4)) % 2 ** 32) * data.astype('<u4')
+        units = units.view('<i4')
+        for block, label, plane in zip(numpy.repeat(numbers, counts), labels, units):
             index = 8 * x + block % 8, 8 * y + block // 8 % 8, 8 * z + block // 64
             yield tuple(map(int, index)), int(label), plane.reshape(8, 8, 8) / 2.0 ** exponent
 

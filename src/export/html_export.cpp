@@ -100,7 +100,7 @@ class TileWriter {
         rules_(rules),
         states_(options.states),
         drives_(options.drives, options.parts),
-        codec_(classes, LooksLayout::kNone),  // pages show no looks
+        codec_(classes, TileLayout::kNoLooks),  // pages show no looks
         write_(write) {}
 
   /// Planes of the voxels in the page.

@@ -45,7 +45,9 @@ void MapFile::State::checkTotals() const {
 }
 
 TileCodec& MapFile::State::tileCodec() {
-  if (!codec_) codec_ = std::make_unique<TileCodec>(*info.classes, looksLayoutOf(version));
+  if (codec_) return *codec_;
+  codec_ = std::make_unique<TileCodec>(*info.classes, tileLayoutOf(version));
+  if (database.mode() != Database::Mode::kRead) codec_->setRules(rulesOfParameters(info.parameters));
   return *codec_;
 }
 

@@ -35,16 +35,17 @@ void toVersion4(Database& database) {
   writeTotals(database, 4, totals);
 }
 
-/// Tiles hold looks in another layout.
-void toVersion5(Database& database) {
-  Totals totals = readTotals(database, 4);
+/// Writes all tiles in the layout of the next version.
+void writeTilesAnew(Database& database, std::int64_t version) {
+  Totals totals = readTotals(database, version);
   std::int64_t checksums = 0;
   MapInfo info;
   TableRow table;
-  readMapRow(database, 4, info, table);
+  readMapRow(database, version, info, table);
   info.classes = std::make_shared<const ClassTable>(
       table.name, readClasses(database, totals.classes, checksums), table.label_mask);
-  TileCodec before(*info.classes, looksLayoutOf(4)), after(*info.classes, looksLayoutOf(5));
+  TileCodec before(*info.classes, tileLayoutOf(version)), after(*info.classes, tileLayoutOf(version + 1));
+  after.setRules(rulesOfParameters(info.parameters));
   const GridIndex low{-kMostTileIndex, -kMostTileIndex, -kMostTileIndex},
       high{kMostTileIndex, kMostTileIndex, kMostTileIndex};
   for (const int part : readTileParts(database)) {
@@ -60,14 +61,24 @@ void toVersion5(Database& database) {
       insertTile(database, key, after.pack(tile, key), after.packed(), totals);
     }
   }
-  writeTotals(database, 5, totals);
+  writeTotals(database, version + 1, totals);
+}
+
+/// Tiles hold looks in another layout.
+void toVersion5(Database& database) {
+  writeTilesAnew(database, 4);
+}
+
+/// Tiles hold evidence in another layout.
+void toVersion6(Database& database) {
+  writeTilesAnew(database, 5);
 }
 
 /// All steps up to kFormatVersion. Whoever adds a version adds the step that leads to it, and a file of the
 /// previous version in test/store/data.
 const std::vector<MigrationStep>& allSteps() {
   static const std::vector<MigrationStep> steps = {
-      {1, toVersion2}, {2, toVersion3}, {3, toVersion4}, {4, toVersion5}};
+      {1, toVersion2}, {2, toVersion3}, {3, toVersion4}, {4, toVersion5}, {5, toVersion6}};
   return steps;
 }
 

@@ -9,11 +9,13 @@ namespace bki_mapping {
 
 /// "BKIM", the application_id in the header of the file.
 constexpr std::int64_t kApplicationId = 0x424b494d;
-constexpr std::int64_t kFormatVersion = 5;
+constexpr std::int64_t kFormatVersion = 6;
 /// Before it, tiles have no looks (bki_mapping/map/looks.h).
 constexpr std::int64_t kFirstVersionWithLooks = 3;
 /// Before it, tiles hold looks with two bits for each voxel.
 constexpr std::int64_t kFirstVersionWithLookRows = 5;
+/// Before it, tiles hold the four bytes of evidence, and no multiples (src/store/evidence_steps.h).
+constexpr std::int64_t kFirstVersionWithSteps = 6;
 /// Before it, files have no journal (bki_mapping/store/scan_record.h).
 constexpr std::int64_t kFirstVersionWithJournal = 4;
 

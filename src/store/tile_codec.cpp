@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <new>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
 
+#include "bki_mapping/mapping/mapper_config.h"
+#include "bki_mapping/settings/yaml.h"
 #include "map/voxel_mask.h"
 #include "store/schema.h"
 
@@ -20,12 +23,20 @@ constexpr std::size_t kMaskBytes = kBlockVoxels / 8;
 /// Deflate's limit: a compressed byte expands to at most this many bytes.
 constexpr std::size_t kMostInflation = 1032;
 constexpr std::size_t kLengthBytes = 4;
+/// With kSteps: the numbers before the lengths of the sections of values; and the first of them that is a
+/// step, after the lengths of the list and the masks.
+constexpr std::size_t kHeadNumbers = 7, kFirstStep = 2;
 constexpr std::size_t kBeginBytes = 8, kLookBytes = kBeginBytes + 2 * kMaskBytes;  // in kLooks
 // The flags of a block: the first bit says whether it has marks, the others are its number of looks.
 constexpr std::size_t kMarked = 1, kMostLooks = 127;
 
-void append32(std::string& bytes, std::uint32_t value) {
-  for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xffu);
+void write32(std::uint32_t value, std::size_t at, std::string& bytes) {
+  for (std::size_t i = 0; i < kLengthBytes; ++i) bytes[at + i] = static_cast<char>(value >> 8 * i & 0xffu);
+}
+
+void append32(std::uint32_t value, std::string& bytes) {
+  bytes.resize(bytes.size() + kLengthBytes);
+  write32(value, bytes.size() - kLengthBytes, bytes);
 }
 
 std::uint32_t read32(const unsigned char* bytes) {
@@ -55,6 +66,10 @@ VoxelMask readMask(const char* bytes) {
   return maskOf(bits);
 }
 
+EvidenceSections::Kind kindOf(ClassId id) {
+  return id == kFreeClass ? EvidenceSections::kFree : EvidenceSections::kOther;
+}
+
 /// Fills a plane with values at the voxels of a mask, and with 0 elsewhere. @return the next unused value.
 const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, EvidenceUnits* plane) {
   for (std::size_t byte = 0; byte < kMaskBytes; ++byte, plane += 8) {
@@ -68,9 +83,21 @@ const std::uint32_t* fillPlane(const char* mask, const std::uint32_t* values, Ev
 
 }  // namespace
 
-LooksLayout looksLayoutOf(std::int64_t version) {
-  if (version < kFirstVersionWithLooks) return LooksLayout::kNone;
-  return version < kFirstVersionWithLookRows ? LooksLayout::kMasks : LooksLayout::kRows;
+TileLayout tileLayoutOf(std::int64_t version) {
+  if (version < kFirstVersionWithLooks) return TileLayout::kNoLooks;
+  if (version < kFirstVersionWithLookRows) return TileLayout::kLookMasks;
+  return version < kFirstVersionWithSteps ? TileLayout::kLookRows : TileLayout::kSteps;
+}
+
+RulesConfig rulesOfParameters(const std::string& parameters) {
+  constexpr char kName[] = "rules/void_outweighs";
+  MapperConfig config;
+  try {
+    const std::map<std::string, std::string> all = parseParameters(parameters);
+    if (const auto found = all.find(kName); found != all.end()) setParameters(config, {*found});
+  } catch (const std::invalid_argument&) {
+  }
+  return config.rules;
 }
 
 /// The streams of zlib, which take a quarter of a megabyte to set up.
@@ -110,7 +137,7 @@ struct TileCodec::Zlib {
   z_stream packing{}, unpacking{};
 };
 
-TileCodec::TileCodec(const ClassTable& classes, LooksLayout layout)
+TileCodec::TileCodec(const ClassTable& classes, TileLayout layout)
     : layout_(layout), zlib_(std::make_unique<Zlib>()) {
   for (const SemanticClass& c : classes.classes()) allowed_[c.id] = true;
   allowed_[kFreeClass] = true;
@@ -127,11 +154,12 @@ void TileCodec::clear() {
   look_counts_.clear();
   looks_.clear();
   values_.clear();
+  planes_.clear();
   packed_.clear();
   blocks_ = 0;
 }
 
-bool TileCodec::takePlane(const EvidenceUnits* units) {
+bool TileCodec::takePlane(ClassId id, const EvidenceUnits* units) {
   const std::size_t before = values_.size(), masks_before = evidence_masks_.size();
   values_.resize(before + kBlockVoxels);
   evidence_masks_.resize(masks_before + kMaskBytes);
@@ -148,8 +176,13 @@ bool TileCodec::takePlane(const EvidenceUnits* units) {
   }
   const auto after = static_cast<std::size_t>(next - values_.data());
   values_.resize(after);
-  if (after == before) evidence_masks_.resize(masks_before);
-  return after != before;
+  if (after == before) {
+    evidence_masks_.resize(masks_before);
+    return false;
+  }
+  classes_ += static_cast<char>(id);
+  planes_.push_back({kindOf(id), after - before});
+  return true;
 }
 
 void TileCodec::takeMasks(const Looks& looks) {
@@ -163,32 +196,58 @@ void TileCodec::takeMasks(const Looks& looks) {
   }
 }
 
-void TileCodec::splitValues() {
-  for (std::size_t byte = 0; byte < 4; ++byte) {
-    std::string& section = sections_[kByte0 + byte];
-    section.resize(values_.size());
-    char* const out = section.data();
-    for (std::size_t i = 0; i < values_.size(); ++i) out[i] = static_cast<char>(values_[i] >> 8 * byte);
+template <typename Add>
+void TileCodec::forEachPiece(std::size_t byte, Add&& add) const {
+  constexpr std::size_t kPiece = 4096;
+  std::string piece;
+  for (std::size_t begin = 0; begin < values_.size(); begin += kPiece) {
+    piece.resize(std::min(kPiece, values_.size() - begin));
+    for (std::size_t i = 0; i < piece.size(); ++i) {
+      piece[i] = static_cast<char>(values_[begin + i] >> 8 * byte);
+    }
+    add(piece);
   }
 }
 
-void TileCodec::joinValues() {
-  values_.resize(sections_[kByte0].size());
-  const Bytef* const bytes[] = {bytesOf(sections_[kByte0]), bytesOf(sections_[kByte1]),
-                                bytesOf(sections_[kByte2]), bytesOf(sections_[kByte3])};
-  for (std::size_t i = 0; i < values_.size(); ++i) {
-    values_[i] = bytes[0][i] | std::uint32_t{bytes[1][i]} << 8 | std::uint32_t{bytes[2][i]} << 16 |
-                 std::uint32_t{bytes[3][i]} << 24;
+void TileCodec::splitValues() {
+  if (layout_ == TileLayout::kSteps) {
+    steps_ = EvidenceSections::fittingOf(EvidenceSections::stepsOf(rules_), planes_, values_);
+    EvidenceSections::split(planes_, values_, steps_, &sections_[kValues]);
+    return;
+  }
+  for (std::size_t byte = 0; byte < kBytes; ++byte) {
+    std::string& section = sections_[kValues + byte];
+    section.clear();
+    forEachPiece(byte, [&](const std::string& piece) { section += piece; });
+  }
+}
+
+void TileCodec::joinValues(std::size_t count) {
+  values_.assign(count, 0);
+  for (std::size_t section = kValues; section < endOfValues(); ++section) {
+    const std::string& bytes = sections_[section];
+    if (bytes.empty()) continue;
+    if (layout_ == TileLayout::kSteps) {
+      EvidenceSections::add(section - kValues, bytes, planes_, steps_, values_);
+      continue;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      values_[i] |= std::uint32_t{at(bytes, i)} << 8 * (section - kValues);
+    }
   }
 }
 
 std::uint32_t TileCodec::checksum(const TileKey& key, const TileEntry& entry) const {
   std::string head;
   for (const int number : {key.part, key.index.x, key.index.y, key.index.z, entry.blocks, entry.planes}) {
-    append32(head, static_cast<std::uint32_t>(number));
+    append32(static_cast<std::uint32_t>(number), head);
   }
-  uLong sum = crc32_z(0, bytesOf(head), head.size());
-  for (const std::string& section : sections_) sum = crc32_z(sum, bytesOf(section), section.size());
+  uLong sum = 0;
+  const auto add = [&](const std::string& bytes) { sum = crc32_z(sum, bytesOf(bytes), bytes.size()); };
+  add(head);
+  for (const Section section : {kList, kMasks}) add(sections_[section]);
+  for (std::size_t byte = 0; byte < kBytes; ++byte) forEachPiece(byte, add);
+  for (const Section section : {kLooks, kSeen, kVoids, kHits}) add(sections_[section]);
   return static_cast<std::uint32_t>(sum);
 }
 
@@ -208,6 +267,33 @@ std::size_t TileCodec::appendPacked(Section section) {
   return bytes.size();
 }
 
+std::size_t TileCodec::lengthAt(std::size_t n) const {
+  const bool is_after_head = layout_ == TileLayout::kSteps && n >= kFirstStep;
+  return kLengthBytes * (is_after_head ? kHeadNumbers + n - kFirstStep : n);
+}
+
+std::vector<TileCodec::Section> TileCodec::beginPacked() {
+  std::vector<Section> sections = {kList, kMasks};
+  std::uint32_t present = 0;
+  for (std::size_t section = kValues; section < endOfValues(); ++section) {
+    if (layout_ == TileLayout::kSteps && sections_[section].empty()) continue;
+    sections.push_back(static_cast<Section>(section));
+    present |= std::uint32_t{1} << (section - kValues);
+  }
+  packed_.assign(lengthAt(sections.size()), '\0');
+  if (layout_ == TileLayout::kSteps) {
+    std::size_t next = kFirstStep * kLengthBytes;
+    for (const EvidenceSteps& steps : steps_) {
+      for (const std::uint32_t step : {steps.a, steps.b}) {
+        write32(step, next, packed_);
+        next += kLengthBytes;
+      }
+    }
+    write32(present, next, packed_);
+  }
+  return sections;
+}
+
 TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
   clear();
   const Region region(key.index);
@@ -222,16 +308,14 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
         throw std::invalid_argument("the map has evidence for class " + std::to_string(id) +
                                     ", which is not in the class table");
       }
-      if (!takePlane(block->plane(p))) continue;
-      classes_ += static_cast<char>(id);
-      ++planes;
+      planes += takePlane(id, block->plane(p));
     }
     const bool marked = block->occlusion().any();
     if (planes == 0 && !marked) continue;
     if (marked) appendMask(marks_, block->occlusion());
-    const std::size_t looks = layout_ == LooksLayout::kNone ? 0 : block->looks().size();
-    if (looks > 0 && layout_ == LooksLayout::kMasks) takeMasks(block->looks());
-    if (looks > 0 && layout_ == LooksLayout::kRows) look_rows_.add(block->looks());
+    const std::size_t looks = layout_ == TileLayout::kNoLooks ? 0 : block->looks().size();
+    if (looks > 0 && layout_ == TileLayout::kLookMasks) takeMasks(block->looks());
+    if (looks > 0 && hasLookRows()) look_rows_.add(block->looks());
     numbers_ += static_cast<char>(number & 0xff);
     numbers_ += static_cast<char>(number >> 8);
     plane_counts_ += static_cast<char>(planes);
@@ -249,16 +333,11 @@ TileEntry TileCodec::pack(const SemanticMap& map, const TileKey& key) {
   sections_[kHits] = std::move(rows.hits);
   splitValues();
   entry.checksum = checksum(key, entry);
-  packed_.assign(kLooks * kLengthBytes, '\0');
   const auto append = [&](Section section, std::size_t length_at) {
-    const std::size_t length = appendPacked(section);
-    for (unsigned i = 0; i < kLengthBytes; ++i) {
-      packed_[length_at + i] = static_cast<char>(length >> 8 * i & 0xff);
-    }
+    write32(static_cast<std::uint32_t>(appendPacked(section)), length_at, packed_);
   };
-  for (std::size_t section = 0; section < kLooks; ++section) {
-    append(static_cast<Section>(section), section * kLengthBytes);
-  }
+  const std::vector<Section> sections = beginPacked();
+  for (std::size_t n = 0; n < sections.size(); ++n) append(sections[n], lengthAt(n));
   if (sections_[kLooks].empty()) return entry;
   for (std::size_t section = kLooks; section < endOfSections(); ++section) {
     const std::size_t length_at = packed_.size();
@@ -282,10 +361,10 @@ std::string TileCodec::checkList(const TileEntry& entry, std::size_t& marked) {
     last_number = number;
     const std::size_t planes = at(list, 2 * blocks + b), flags = at(list, 3 * blocks + b);
     if (planes + (flags & kMarked) == 0) return "a block is empty";
-    if (flags > kMarked && layout_ == LooksLayout::kNone) return "a flag is not known";
+    if (flags > kMarked && layout_ == TileLayout::kNoLooks) return "a flag is not known";
     marked += flags & kMarked;
     if (flags > kMarked) look_counts_.push_back(flags >> 1);
-    if (layout_ == LooksLayout::kMasks) levels += flags >> 1;
+    if (layout_ == TileLayout::kLookMasks) levels += flags >> 1;
     if (planes > end_of_classes - next_class) return "planes are missing";
     for (std::size_t p = next_class; p < next_class + planes; ++p) {
       if (p > next_class && at(list, p) <= at(list, p - 1)) return "its planes are out of order";
@@ -318,7 +397,7 @@ std::string TileCodec::readLooks() {
   for (const std::size_t count : look_counts_) {
     Looks looks;
     bool is_right = true;
-    if (layout_ == LooksLayout::kRows) {
+    if (hasLookRows()) {
       is_right = rows.read(looks);
     } else {
       looks = masksAt(next, count);
@@ -333,10 +412,22 @@ std::string TileCodec::readLooks() {
 std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
                               std::size_t size) {
   clear();
-  constexpr std::size_t kHead = kLooks * kLengthBytes;
-  if (size < kHead) return "it is too short";
-  const unsigned char* next = bytes + kHead;
-  std::size_t left = size - kHead;
+  const bool has_steps = layout_ == TileLayout::kSteps;
+  if (size < (has_steps ? kHeadNumbers * kLengthBytes : lengthAt(kValues + kBytes))) return "it is too short";
+  std::uint32_t present = (1u << kBytes) - 1;
+  if (has_steps) {
+    const unsigned char* number = bytes + kFirstStep * kLengthBytes;
+    for (EvidenceSteps& steps : steps_) {
+      steps = {read32(number), read32(number + kLengthBytes)};
+      number += 2 * kLengthBytes;
+    }
+    present = read32(number);
+    if (present >> EvidenceSections::kSections != 0) return "a section is not known";
+  }
+  const std::size_t head = lengthAt(kValues + static_cast<std::size_t>(__builtin_popcount(present)));
+  if (size < head) return "it is too short";
+  const unsigned char* next = bytes + head;
+  std::size_t left = size - head, lengths = 0;  // that have been read
   const auto takeOf = [&](Section section, std::size_t length, std::size_t wanted) -> std::string {
     std::string& content = sections_[section];
     if (length > left || length > wanted || (section == kList && length != wanted)) {
@@ -362,30 +453,47 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     return "";
   };
   const auto take = [&](Section section, std::size_t wanted) {
-    return takeOf(section, read32(bytes + section * kLengthBytes), wanted);
+    return takeOf(section, read32(bytes + lengthAt(lengths++)), wanted);
   };
 
   if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
   const std::size_t blocks = static_cast<std::size_t>(entry.blocks),
                     least = 4 * blocks + static_cast<std::size_t>(entry.planes), listed = read32(bytes),
-                    most_levels = layout_ == LooksLayout::kRows ? 0 : kMostLooks * blocks;
+                    most_levels = hasLookRows() ? 0 : kMostLooks * blocks;
   if (listed < least || listed > least + most_levels) return "a length is wrong";
   std::string fault = take(kList, listed);
   std::size_t marked = 0;
   if (fault.empty()) fault = checkList(entry, marked);
   if (fault.empty()) fault = take(kMasks, kMaskBytes * (marked + static_cast<std::size_t>(entry.planes)));
   if (!fault.empty()) return fault;
+  const std::size_t first_class = least - static_cast<std::size_t>(entry.planes);
+  planes_.reserve(static_cast<std::size_t>(entry.planes));
   std::size_t values = 0;
-  for (std::size_t begin = 0; begin < sections_[kMasks].size(); begin += kMaskBytes) {
+  for (std::size_t plane = 0; plane < marked + static_cast<std::size_t>(entry.planes); ++plane) {
     std::size_t bits = 0;
-    for (std::size_t i = begin; i < begin + kMaskBytes; ++i) {
+    for (std::size_t i = kMaskBytes * plane; i < kMaskBytes * (plane + 1); ++i) {
       bits += static_cast<std::size_t>(__builtin_popcount(at(sections_[kMasks], i)));
     }
     if (bits == 0) return "a plane is empty";
-    if (begin >= kMaskBytes * marked) values += bits;
+    if (plane < marked) continue;
+    planes_.push_back({kindOf(at(sections_[kList], first_class + plane - marked)), bits});
+    values += bits;
   }
-  for (std::size_t section = kByte0; section < kLooks && fault.empty(); ++section) {
-    fault = take(static_cast<Section>(section), values);
+  std::array<std::size_t, EvidenceSections::kKinds> of_kinds = {values, 0};
+  if (has_steps) {
+    for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
+      of_kinds[kind] = EvidenceSections::count(planes_, kind);
+      const std::uint32_t of_kind = present >> kind * EvidenceSections::kOfKind;
+      if (of_kinds[kind] > 0 && of_kind % (1u << EvidenceSections::kOfKind) == 0) {
+        return "a value is out of range";  // all are 0
+      }
+    }
+  }
+  for (std::size_t n = 0; n < EvidenceSections::kSections; ++n) {
+    const auto section = static_cast<Section>(kValues + n);
+    sections_[section].clear();
+    const bool is_there = (present >> n & 1) != 0;
+    if (is_there && fault.empty()) fault = take(section, of_kinds[EvidenceSections::kindOf(n)]);
   }
   for (const Section section : {kLooks, kSeen, kVoids, kHits}) sections_[section].clear();
   const auto takeNext = [&](Section section, std::size_t wanted) -> std::string {
@@ -395,7 +503,7 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
     left -= kLengthBytes;
     return takeOf(section, length, wanted);
   };
-  if (fault.empty() && !look_counts_.empty() && layout_ == LooksLayout::kMasks) {
+  if (fault.empty() && !look_counts_.empty() && layout_ == TileLayout::kLookMasks) {
     fault = takeNext(kLooks,
                      kLookBytes * std::accumulate(look_counts_.begin(), look_counts_.end(), std::size_t{0}));
   } else if (fault.empty() && !look_counts_.empty()) {
@@ -408,14 +516,15 @@ std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const 
   }
   if (!fault.empty()) return fault;
   if (left > 0) return "bytes are left over";
+  joinValues(values);
   if (checksum(key, entry) != entry.checksum) return "its checksum is wrong";
-  joinValues();
   constexpr auto kLeast = static_cast<std::uint32_t>(std::numeric_limits<EvidenceUnits>::min());
   for (const std::uint32_t value : values_) {
     if (value == 0 || value == kLeast) return "a value is out of range";
   }
-  blocks_ = entry.blocks;
-  return readLooks();
+  const std::string wrong = readLooks();
+  if (wrong.empty()) blocks_ = entry.blocks;
+  return wrong;
 }
 
 void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {

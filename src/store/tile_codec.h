@@ -10,27 +10,37 @@
 
 #include "bki_mapping/map/semantic_map.h"
 #include "bki_mapping/store/map_file.h"
+#include "store/evidence_steps.h"
 #include "store/look_rows.h"
 
 namespace bki_mapping {
 
-/// How tiles hold looks.
-enum class LooksLayout {
-  kNone,   ///< not at all: before version 3 of map files
-  kMasks,  ///< with two bits for each voxel: in versions 3 and 4
-  kRows,   ///< without rows of voxels that nobody saw
+/// How tiles hold what they hold. Each layout changes one thing of the one before.
+enum class TileLayout {
+  kNoLooks,    ///< before version 3 of map files
+  kLookMasks,  ///< looks with two bits for each voxel: in versions 3 and 4
+  kLookRows,   ///< looks without rows of voxels that nobody saw: in version 5
+  kSteps,      ///< evidence as multiples of what scans add: since version 6
 };
 
 /// @param version of a map file.
-LooksLayout looksLayoutOf(std::int64_t version);
+TileLayout tileLayoutOf(std::int64_t version);
+
+/// The rules of settings in a map file, as far as they say which steps evidence has. @param parameters YAML;
+/// if they cannot be read, the rules are those of RulesConfig.
+RulesConfig rulesOfParameters(const std::string& parameters);
 
 /// Packs and unpacks tiles. Keeps its working memory from tile to tile. Not thread-safe.
 class TileCodec {
  public:
-  explicit TileCodec(const ClassTable& classes, LooksLayout layout = LooksLayout::kRows);
+  explicit TileCodec(const ClassTable& classes, TileLayout layout = TileLayout::kSteps);
   ~TileCodec();
   TileCodec(const TileCodec&) = delete;
   TileCodec& operator=(const TileCodec&) = delete;
+
+  /// The rules with which the map was made: with their steps, tiles take less space. By default, those of
+  /// RulesConfig.
+  void setRules(const RulesConfig& rules) { rules_ = rules; }
 
   /// Packs the blocks that a map has in a tile, and leaves out empty blocks and planes. The bytes stay in
   /// packed() until the next call. @return the tile's entry; it has 0 blocks if all are empty.
@@ -38,64 +48,79 @@ class TileCodec {
   TileEntry pack(const SemanticMap& map, const TileKey& key);
   const std::string& packed() const { return packed_; }
 
-  /// Unpacks a tile and checks it. Uses at most kMemoryPerByte bytes of memory for each packed byte.
+  /// Unpacks a tile and checks it. Uses at most kMemoryPerByte bytes of memory for each packed byte, and half
+  /// a megabyte.
   /// @return what is wrong with it; "" if nothing is, and the content is ready for addTo().
   std::string unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
                      std::size_t size);
   /// Adds the content that unpack() has read to a map, as SemanticMap::add does.
   void addTo(SemanticMap& map, const TileKey& key) const;
 
-  /// A plane has one byte in the list of classes, which is not compressed, and so has a look.
+  /// A plane takes one byte in the list of classes, which is not compressed, and at least half a byte in a
+  /// section of values. A look takes one in the heads, and the rows of looks bring what they take.
   static constexpr std::size_t kMemoryPerByte = kBlockVoxels * sizeof(EvidenceUnits);
 
  private:
   /// The sections of the content, each compressed by itself.
   enum Section : std::size_t {
-    kList,   ///< for each block its number (2 bytes), number of planes, and flags; then classes
-    kMasks,  ///< 512 bits for the marks of each block that has any; then for each plane, where evidence is
-    kByte0,  ///< the lowest byte of each evidence other than 0
-    kByte1,
-    kByte2,
-    kByte3,
-    kLooks,  ///< LookSections, only if a block has looks; kMasks: begins and masks, and levels in the list
+    kList,    ///< for each block its number (2 bytes), number of planes, and flags; then classes
+    kMasks,   ///< 512 bits for the marks of each block that has any; then for each plane, where evidence is
+    kValues,  ///< EvidenceSections; before kSteps: the four bytes of each evidence other than 0, lowest first
+    kLooks = kValues + EvidenceSections::kSections,  ///< LookSections, only if a block has looks; kLookMasks:
+                                                     ///< begins and masks, and levels in the list
     kSeen,
     kVoids,
     kHits,
     kSections
   };
+  /// Of a value.
+  static constexpr std::size_t kBytes = sizeof(EvidenceUnits);
   struct Zlib;
 
   void clear();
+  /// Calls add(bytes) with pieces of one of the four bytes of each value, plane after plane.
+  template <typename Add>
+  void forEachPiece(std::size_t byte, Add&& add) const;
   /// @return whether the plane holds evidence.
-  bool takePlane(const EvidenceUnits* units);
+  bool takePlane(ClassId id, const EvidenceUnits* units);
   void splitValues();
-  void joinValues();
+  void joinValues(std::size_t count);
+  /// Does not depend on the layout of the evidence.
   std::uint32_t checksum(const TileKey& key, const TileEntry& entry) const;
+  /// Where the length of a section is, the n-th of those before looks.
+  std::size_t lengthAt(std::size_t n) const;
+  /// Writes what comes before the sections, without their lengths. @return those before looks.
+  std::vector<Section> beginPacked();
   /// @return the length of the section in the content.
   std::size_t appendPacked(Section section);
   void takeMasks(const Looks& looks);
   /// Checks the list, and reads look_counts_ from it. @param[out] marked number of blocks with occlusion
   /// marks.
   std::string checkList(const TileEntry& entry, std::size_t& marked);
-  /// The sections of the layout.
-  std::size_t endOfSections() const { return layout_ == LooksLayout::kRows ? kSections : kSeen; }
+  bool hasLookRows() const { return layout_ >= TileLayout::kLookRows; }
+  // The sections of the layout:
+  std::size_t endOfValues() const { return layout_ == TileLayout::kSteps ? kLooks : kValues + kBytes; }
+  std::size_t endOfSections() const { return hasLookRows() ? kSections : kSeen; }
   /// Reads the looks of all blocks that have any; these must have the intervals that their latest demands.
   std::string readLooks();
   /// Reads looks from masks. @param[in,out] next position of the first one; then of the one after the last.
   Looks masksAt(std::size_t& next, std::size_t count) const;
 
-  LooksLayout layout_;
+  TileLayout layout_;
   std::bitset<256> allowed_;  ///< the class ids that planes may have
   std::array<std::string, kSections> sections_;
-  std::string packed_, bytes_;
+  std::string packed_;
   // Parts of kList and kMasks:
   std::string numbers_, plane_counts_, flags_, classes_, levels_, marks_, evidence_masks_;
-  std::string begins_, look_masks_;  ///< parts of kLooks with kMasks
+  std::string begins_, look_masks_;  ///< parts of kLooks with kLookMasks
   LookRowsWriter look_rows_;
   std::vector<std::size_t> look_counts_;  ///< of the blocks that have looks
   std::vector<Looks> looks_;              ///< that unpack() has read, of these blocks
-  std::vector<std::uint32_t> values_;     ///< evidence other than 0, plane after plane
-  int blocks_ = 0;                        ///< number of blocks that unpack() has read
+  EvidenceSections::Values values_;       ///< evidence other than 0, plane after plane
+  EvidenceSections::Planes planes_;
+  EvidenceSections::StepsOfKinds steps_;
+  RulesConfig rules_;
+  int blocks_ = 0;  ///< number of blocks that unpack() has read
   std::unique_ptr<Zlib> zlib_;
 };
 

@@ -134,7 +134,7 @@ class HtmlExport : public testing::Test {
   /// The evidence in a page, as a map.
   static SemanticMap evidenceOf(const Page& page) {
     SemanticMap map = infoOf().emptyMap();
-    TileCodec codec(*infoOf().classes);
+    TileCodec codec(*infoOf().classes, TileLayout::kNoLooks);
     for (std::size_t t = 0; t < page.evidence.size(); ++t) {
       const json& tile = page.header["tiles"][t];
       TileEntry entry{indexOf(tile), tile["evidence_blocks"], tile["evidence_planes"]};

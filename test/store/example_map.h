@@ -47,8 +47,9 @@ inline std::vector<std::uint64_t> exampleAges(int drive) {
 }
 
 /// The evidence of a drive: that of drive 0 is in the sum only, that of drive 1 also has a part of its own.
-/// @param has_looks false for what files of versions before 3 hold.
-inline SemanticMap exampleMap(int drive, bool has_looks = true) {
+/// @param version of the file: those before 3 hold no looks, and those before 6 no evidence that is mostly a
+/// sum of what scans add with rules.
+inline SemanticMap exampleMap(int drive, int version = 6) {
   SemanticMap map = exampleInfo().emptyMap();
   std::vector<EvidenceUnits> plane(kBlockVoxels);
   const auto add = [&](const BlockIndex& block, ClassId id, auto&& units_of) {
@@ -58,7 +59,7 @@ inline SemanticMap exampleMap(int drive, bool has_looks = true) {
     map.getOrAllocate(block).add(id, plane.data());
   };
   const auto addLooks = [&] {
-    if (!has_looks) return;
+    if (version < 3) return;
     for (const std::uint64_t age : exampleAges(drive)) {
       map.getOrAllocate({{0, 0, 0}}).looks().add(exampleLook(kExampleTick - age));
     }
@@ -84,6 +85,16 @@ inline SemanticMap exampleMap(int drive, bool has_looks = true) {
       mixed = (mixed ^ mixed >> 15) * 2246822519u;
       return static_cast<EvidenceUnits>((mixed ^ mixed >> 13) % 4294967295u - 2147483647u);
     });
+  }
+  if (version >= 6) {
+    const auto rest = [](std::uint32_t v) { return v % 4 == 0 ? v : 0; };
+    for (const std::uint32_t more : {0u, 5u}) {
+      add({{2, static_cast<std::int32_t>(more), 0}}, kFreeClass, [&](std::uint32_t v) {
+        return static_cast<EvidenceUnits>(38339 * ((v + more) % 3) + 98 * ((v + more) % 7) + rest(v) % 98);
+      });
+    }
+    add({{-2, -1, -1}}, 40,
+        [&](std::uint32_t v) { return static_cast<EvidenceUnits>(1278 * (v % 5 * 100) + rest(v)); });
   }
   Block::Occlusion marks;
   for (std::size_t v = 0; v < marks.size(); v += 3) marks[v] = true;

@@ -57,10 +57,10 @@ std::string deflated(const std::string& bytes) {
   return packed;
 }
 
-/// @param compressed a bit for each section. @param[out] checksum of the content, as entry.checksum should
-/// be.
+/// @param compressed a bit for the masks, one for each byte of values, and one for the looks. @param[out]
+/// checksum of the content, as entry.checksum should be.
 std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size_t compressed,
-                   LooksLayout layout) {
+                   TileLayout layout) {
   const auto blocks = static_cast<std::size_t>(entry.blocks), planes = static_cast<std::size_t>(entry.planes);
   std::array<std::string, 10> sections;
   sections[0] = bytes.string(4 * blocks + planes);
@@ -72,14 +72,40 @@ std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size
     looks += flags >> 1;
     if (flags > 1) counts.push_back(flags >> 1);
   }
-  if (layout == LooksLayout::kMasks) sections[0] += bytes.string(looks);
+  if (layout == TileLayout::kLookMasks) sections[0] += bytes.string(looks);
   sections[1] = bytes.string(64 * (marked + planes));
+  EvidenceSections::Planes all_planes;
   std::size_t values = 0;
-  for (std::size_t b = 64 * marked; b < sections[1].size(); ++b) {
-    values += static_cast<std::size_t>(__builtin_popcount(static_cast<unsigned char>(sections[1][b])));
+  for (std::size_t p = 0; p < planes; ++p) {
+    const bool is_free = static_cast<unsigned char>(sections[0][4 * blocks + p]) == kFreeClass;
+    all_planes.push_back({is_free ? EvidenceSections::kFree : EvidenceSections::kOther, 0});
+    for (std::size_t b = 64 * (marked + p); b < 64 * (marked + p + 1); ++b) {
+      all_planes.back().values +=
+          static_cast<std::size_t>(__builtin_popcount(static_cast<unsigned char>(sections[1][b])));
+    }
+    values += all_planes.back().values;
   }
-  for (std::size_t s = 2; s < 6; ++s) sections[s] = bytes.string(values);
-  if (layout == LooksLayout::kMasks) {
+  EvidenceSections::StepsOfKinds steps;
+  std::vector<std::string> of_steps(EvidenceSections::kSections);
+  if (layout == TileLayout::kSteps) {
+    for (EvidenceSteps& each : steps) {
+      each.a = static_cast<std::uint32_t>(bytes.number(4));
+      each.b = static_cast<std::uint32_t>(bytes.number(4));
+    }
+    const std::size_t present = bytes.number(3);
+    EvidenceSections::Values sum(values);
+    for (std::size_t n = 0; n < of_steps.size(); ++n) {
+      if ((present >> n & 1) == 0) continue;
+      of_steps[n] = bytes.string(EvidenceSections::count(all_planes, EvidenceSections::kindOf(n)));
+      EvidenceSections::add(n, of_steps[n], all_planes, steps, sum);
+    }
+    for (std::size_t byte = 0; byte < 4; ++byte) {
+      for (const std::uint32_t value : sum) sections[2 + byte] += static_cast<char>(value >> 8 * byte);
+    }
+  } else {
+    for (std::size_t s = 2; s < 6; ++s) sections[s] = bytes.string(values);
+  }
+  if (layout == TileLayout::kLookMasks) {
     sections[6] = bytes.string(looks * (8 + 2 * 64));
   } else {
     const LookRowsReader rows(counts, sections[6], sections[7], sections[8], sections[9]);
@@ -93,23 +119,46 @@ std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size
     checksum = crc32(checksum, reinterpret_cast<const Bytef*>(&number), 4);
   }
   std::string head, body;
-  for (std::size_t s = 0; s < sections.size(); ++s) {
-    std::string& section = sections[s];
-    if ((s == 6 && looks == 0) || (s == 7 && layout == LooksLayout::kMasks)) break;
-    checksum = crc32_z(checksum, reinterpret_cast<const Bytef*>(section.data()), section.size());
-    if (s > 0 && (compressed >> std::min<std::size_t>(s, 6) & 1) != 0) {
+  const auto append32 = [](std::size_t number, std::string& to) {
+    for (unsigned shift = 0; shift < 32; shift += 8) to += static_cast<char>(number >> shift);
+  };
+  constexpr std::size_t kNever = 8;  // no bit of `compressed`, which is a byte
+  const auto append = [&](std::string section, std::size_t bit, std::string& length) {
+    if ((compressed >> bit & 1) != 0) {
       std::string packed = deflated(section);
       if (packed.size() < section.size()) section = std::move(packed);
     }
-    std::string& length = s < 6 ? head : body;
-    for (unsigned shift = 0; shift < 32; shift += 8) length += static_cast<char>(section.size() >> shift);
+    append32(section.size(), length);
     body += section;
+  };
+  for (std::size_t s = 0; s < sections.size(); ++s) {
+    if ((s == 6 && looks == 0) || (s == 7 && layout == TileLayout::kLookMasks)) break;
+    checksum = crc32_z(checksum, reinterpret_cast<const Bytef*>(sections[s].data()), sections[s].size());
+    const bool is_value = s >= 2 && s < 6;
+    if (layout == TileLayout::kSteps && is_value) {
+      if (s > 2) continue;
+      std::size_t present = 0;
+      for (const EvidenceSteps& each : steps) {
+        append32(each.a, head);
+        append32(each.b, head);
+      }
+      for (std::size_t n = 0; n < of_steps.size(); ++n) {
+        present |= static_cast<std::size_t>(!of_steps[n].empty()) << n;
+      }
+      append32(present, head);
+      for (std::size_t n = 0; n < of_steps.size(); ++n) {
+        if (!of_steps[n].empty()) append(of_steps[n], 2 + n % 4, head);
+      }
+      continue;
+    }
+    append(sections[s], s == 0 ? kNever : std::min<std::size_t>(s, 6),
+           s < 6 ? head : body);
   }
   entry.checksum = static_cast<std::uint32_t>(checksum);
   return head + body;
 }
 
-void test(const unsigned char* data, std::size_t size, LooksLayout layout) {
+void test(const unsigned char* data, std::size_t size, TileLayout layout) {
   static const MapInfo info = infoOf();
   Bytes bytes(data, size);
   const TileKey key{{-1, 0, 2}, 1};
@@ -143,8 +192,8 @@ void test(const unsigned char* data, std::size_t size, LooksLayout layout) {
 }  // namespace bki_mapping
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
-  using bki_mapping::LooksLayout;
-  for (const LooksLayout layout : {LooksLayout::kMasks, LooksLayout::kRows}) {
+  using bki_mapping::TileLayout;
+  for (const TileLayout layout : {TileLayout::kLookMasks, TileLayout::kLookRows, TileLayout::kSteps}) {
     bki_mapping::test(data, size, layout);
   }
   return 0;

@@ -17,7 +17,7 @@ namespace bki_mapping {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_5.bkm";
+const std::string kFile = BKI_MAPPING_SOURCE_DIR "/test/store/data/version_6.bkm";
 
 class HostileFile : public testing::Test {
  protected:
@@ -125,7 +125,10 @@ TEST_F(HostileFile, HasWrongValues) {
       {"UPDATE scan SET number = -1 WHERE number = 7", "out of range"},
       {"UPDATE settings SET number = 5 WHERE number = 0", "missing"},
       {"UPDATE cleared SET min_x = NULL", "not a real number"},
-      {"UPDATE tile SET content = x'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF'", "a length is wrong"},
+      {"UPDATE tile SET content = x'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF00000000'",
+       "a length is wrong"},
+      {"UPDATE tile SET content = x'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF'",
+       "a section is not known"},
       {"INSERT INTO tile SELECT part, z, y, x, blocks, planes, checksum + 1, content FROM tile",
        "out of order"},
   };
@@ -256,8 +259,8 @@ TEST_F(HostileFile, ClaimsWhatItHasNoRoomFor) {
   expectRefused("more content", "the largest tile");
   // The same with room: in other rows, and then in the tile itself, whose list is right.
   for (const char* const content :
-       {"content", "x'00060200FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF' || zeroblob(132608)",
-        "x'000602000120000000000000000000000000000000000000' || zeroblob(200000)"}) {
+       {"content", "x'00060200FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF00' || zeroblob(132704)",
+        "x'00060200012000000000000000000000000000000000000000000000' || zeroblob(200000)"}) {
     writeFile(path_, readFile(kFile));
     forge("UPDATE map SET parameters = hex(zeroblob(200000))");
     forge(std::string("UPDATE tile SET blocks = 512, planes = 130560, content = CAST(") + content +

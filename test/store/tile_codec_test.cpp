@@ -5,7 +5,9 @@
 #include <zlib.h>
 
 #include <array>
+#include <cstring>
 #include <limits>
+#include <random>
 
 #include "reference/content.h"
 #include "store/counted_memory.h"
@@ -60,8 +62,8 @@ std::uint32_t checksumOf(const TileKey& key, const TileEntry& entry, const Secti
 /// voxel 8.
 class TileCodecTest : public testing::Test {
  protected:
-  explicit TileCodecTest(LooksLayout layout = LooksLayout::kRows)
-      : codec_(*infoOf().classes, layout), last_section_(layout == LooksLayout::kRows ? 9 : 6) {
+  explicit TileCodecTest(TileLayout layout = TileLayout::kLookRows)
+      : codec_(*infoOf().classes, layout), last_section_(layout == TileLayout::kLookRows ? 9 : 6) {
     sections_[0] = std::string("\0\0\xff\1\0\2\1\0", 8) + "\x28\xff";
     sections_[1].resize(3 * 64);
     sections_[1][5] = '\3';
@@ -218,7 +220,7 @@ TEST_F(TileCodecTest, RefusesStreamsOfAnotherSize) {
 /// 16), and 0x0102048765.
 class LooksInTile : public TileCodecTest {
  protected:
-  LooksInTile() : TileCodecTest(LooksLayout::kMasks) {
+  LooksInTile() : TileCodecTest(TileLayout::kLookMasks) {
     sections_[0] = std::string("\0\0\xff\1\0\2\1\4", 8) + "\x28\xff" + std::string("\x10\0", 2);
     std::string& looks = sections_[6];
     looks = std::string("\0\0\3\2\1\0\0\0", 8) + std::string("\x65\x87\4\2\1\0\0\0", 8);
@@ -278,7 +280,7 @@ TEST_F(LooksInTile, AreWrittenAsSpecified) {
   sections_[0][7] = '\0';
   sections_[0].resize(10);
   sections_[6].clear();
-  TileCodec without(*infoOf().classes, LooksLayout::kNone);
+  TileCodec without(*infoOf().classes, TileLayout::kNoLooks);
   EXPECT_EQ(without.pack(map, kKey).checksum, checksumOf(kKey, entry, sections_));
   for (const auto& [index, block] : sortedBlocks(map)) map.getOrAllocate(index).looks().clear();
   EXPECT_TRUE(codec_.pack(map, kKey) == without.pack(map, kKey));
@@ -374,7 +376,7 @@ TEST_F(LooksInTile, AreRefusedInOtherNumbers) {
 TEST_F(LooksInTile, AreRefusedInFilesThatKeepNone) {
   entry_.checksum = checksumOf(kKey, entry_, sections_);
   const std::string content = joined();
-  TileCodec codec(*infoOf().classes, LooksLayout::kNone);
+  TileCodec codec(*infoOf().classes, TileLayout::kNoLooks);
   EXPECT_EQ(
       codec.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()), content.size()),
       "a flag is not known");
@@ -450,7 +452,7 @@ TEST_F(LookRowsInTile, AreWrittenAsSpecified) {
   EXPECT_EQ(fault(packed), "");
   sections_[0][7] = '\0';
   for (std::size_t section = 6; section < sections_.size(); ++section) sections_[section].clear();
-  TileCodec without(*infoOf().classes, LooksLayout::kNone);
+  TileCodec without(*infoOf().classes, TileLayout::kNoLooks);
   EXPECT_EQ(without.pack(map, kKey).checksum, checksumOf(kKey, entry, sections_));
 }
 
@@ -554,6 +556,235 @@ TEST_F(TileCodecTest, TakesNoMemoryForClaims) {
   const PeakMemory memory;
   EXPECT_EQ(fault(content), "a length is wrong");
   EXPECT_LT(memory.bytes(), 200'000);
+}
+
+/// Blocks 1 and 511, each with values of class 40, two and one, in multiples of 1000, and of `free`, three
+/// and two, in multiples of 1000 and 7.
+class StepsInTile : public testing::Test {
+ protected:
+  using Parts = std::vector<std::string>;
+
+  StepsInTile() {
+    std::string masks(4 * 64, '\0');
+    masks[0] = '\3';
+    masks[64 + 63] = '\7';  // voxels 504 to 506
+    masks[2 * 64] = '\4';
+    masks[3 * 64 + 63] = '\x18';  // voxels 507 and 508
+    parts_ = {std::string("\1\0\xff\1\2\2\0\0", 8) + "\x28\xff\x28\xff",
+              masks,
+              std::string("\2\1\0\0\xfe", 5),  // 2, 3, 3, 3, 1 times 1000
+              std::string("\0\1\1\0\0", 5),    // 0, 1, 2, 2, 2 times 256 times 1000
+              std::string("\0\5\0\0\1", 5),    // 0, 5, 5, 5, 6 times 7
+              std::string("\0\0\3\0\0", 5),    // 0, 0, 3, 0, 0
+              std::string("\1\0\2", 3),        // 1, 1, 3 times 1000
+              std::string("\xff\1\0", 3),
+              std::string("\xff\0\0", 3),
+              std::string("\xff\0\0", 3),
+              std::string("\xff\0\0", 3)};
+  }
+  std::string joined() const {
+    std::string head;
+    const auto append = [&](std::size_t number) {
+      for (unsigned shift = 0; shift < 32; shift += 8) head += static_cast<char>(number >> shift & 0xff);
+    };
+    append(parts_[0].size());
+    append(parts_[1].size());
+    for (const std::size_t step : {1000, 7, 1000, 0}) append(step);
+    append(present_);
+    std::string content = parts_[0] + parts_[1];
+    for (std::size_t n = 2; n < parts_.size(); ++n) {
+      append(parts_[n].size());
+      content += parts_[n];
+    }
+    return head + content;
+  }
+  std::string fault(const std::string& content) {
+    return codec_.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()),
+                         content.size());
+  }
+  std::string fault() { return fault(joined()); }
+  /// What the sections hold, as before version 6, whose checksum is the same.
+  std::uint32_t checksum() const {
+    Sections sections;
+    sections[0] = parts_[0];
+    sections[1] = parts_[1];
+    for (const EvidenceUnits units :
+         {kOther[0], kOther[1], kFree[0], kFree[1], kFree[2], kOther[2], kFree[3], kFree[4]}) {
+      for (unsigned byte = 0; byte < 4; ++byte) {
+        sections[2 + byte] += static_cast<char>(static_cast<std::uint32_t>(units) >> 8 * byte);
+      }
+    }
+    return checksumOf(kKey, entry_, sections);
+  }
+
+  const std::vector<EvidenceUnits> kOther = {999, 1001, 3000}, kFree = {2000, 259035, 515038, 515035, 513042};
+  const TileKey kKey{{2, -1, 0}, 3};
+  TileCodec codec_{*infoOf().classes};
+  std::size_t present_ = 1u << 0 | 1u << 1 | 1u << 4 | 1u << 8 | 1u << 12 | 0xfu << 20;
+  Parts parts_;
+  TileEntry entry_{kKey.index, 2, 4, 0};
+};
+
+TEST_F(StepsInTile, AreReadAsSpecified) {
+  entry_.checksum = checksum();
+  ASSERT_EQ(fault(), "");
+  SemanticMap map = infoOf().emptyMap();
+  codec_.addTo(map, kKey);
+  ASSERT_EQ(map.size(), 2u);
+  const Block &first = *map.find({{17, -8, 0}}), &last = *map.find({{23, -1, 7}});
+  ASSERT_EQ(first.classes(), (ClassList{40, kFreeClass}));
+  ASSERT_EQ(last.classes(), first.classes());
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    ASSERT_EQ(first.plane(0)[v], v < 2 ? kOther[v] : 0) << v;
+    ASSERT_EQ(first.plane(1)[v], v >= 504 && v < 507 ? kFree[v - 504] : 0) << v;
+    ASSERT_EQ(last.plane(0)[v], v == 2 ? kOther[v] : 0) << v;
+    ASSERT_EQ(last.plane(1)[v], v >= 507 && v < 509 ? kFree[v - 504] : 0) << v;
+  }
+}
+
+TEST_F(StepsInTile, AreRefusedIfSomethingIsWrong) {
+  entry_.checksum = checksum();
+  const Parts good = parts_;
+  for (std::size_t n = 0; n < parts_.size(); ++n) {
+    parts_ = good;
+    parts_[n].pop_back();
+    EXPECT_NE(fault(), "") << n;
+    parts_[n] = good[n] + 'x';
+    EXPECT_EQ(fault(), "a length is wrong") << n;
+    if (n < 2) continue;
+    parts_[n] = good[n];
+    parts_[n][1] = static_cast<char>(parts_[n][1] + 1);
+    EXPECT_EQ(fault(), "its checksum is wrong") << n;
+  }
+  parts_ = good;
+  EXPECT_EQ(fault(joined() + "x"), "bytes are left over");
+  for (const std::size_t end : {0, 27, 28, 28 + 4 * 9 - 1}) {
+    EXPECT_EQ(fault(joined().substr(0, end)), "it is too short") << end;
+  }
+  present_ |= 1u << 24;
+  EXPECT_EQ(fault(), "a section is not known");
+  present_ = 1;
+  parts_.resize(3);
+  EXPECT_EQ(fault(), "a value is out of range") << "all of class 40 are 0";
+}
+
+// Whoever claims much must send much: here, as many planes in a block as there can be.
+TEST_F(StepsInTile, TakeNoMemoryForClaims) {
+  std::vector<SemanticClass> classes(254);
+  for (std::size_t id = 0; id < classes.size(); ++id) {
+    classes[id].id = static_cast<ClassId>(id);
+    classes[id].name = std::to_string(id);
+    classes[id].unlabelled = classes[id].any_raw = id == 0;
+    if (id > 0) classes[id].raw = {static_cast<std::uint32_t>(id)};
+  }
+  TileCodec codec(ClassTable("all", classes));
+  constexpr std::size_t kBlocks = 64, kPlanes = 255 * kBlocks;
+  std::string numbers, of_classes, of_block;
+  for (std::size_t id = 0; id < classes.size(); ++id) of_block += static_cast<char>(id);
+  of_block += '\xff';
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    numbers += {static_cast<char>(b & 0xff), static_cast<char>(b >> 8)};
+    of_classes += of_block;
+  }
+  const Parts head = {numbers + std::string(kBlocks, '\xff') + std::string(kBlocks, '\0') + of_classes,
+                      deflated(std::string(kPlanes * 64, '\xff'))};
+  const std::string free = deflated(std::string(kBlocks * kBlockVoxels, '\1')),
+                    other = deflated(std::string((kPlanes - kBlocks) * kBlockVoxels, '\1'));
+  entry_ = {kKey.index, kBlocks, kPlanes, 0};
+  for (const std::size_t of_each : {0u, 1u, 2u}) {
+    parts_ = head;
+    parts_.insert(parts_.end(), of_each, free);
+    parts_.insert(parts_.end(), of_each, other);
+    present_ = ((1u << of_each) - 1) * (1u + (1u << 12));
+    const std::string content = joined();
+    const PeakMemory memory;
+    EXPECT_EQ(
+        codec.unpack(kKey, entry_, reinterpret_cast<const unsigned char*>(content.data()), content.size()),
+        of_each == 0 ? "a value is out of range" : "its checksum is wrong");
+    EXPECT_LT(memory.bytes(),
+              static_cast<std::ptrdiff_t>(500'000 + TileCodec::kMemoryPerByte * content.size()))
+        << of_each;
+  }
+}
+
+// Most evidence with rules is a sum of what scans add.
+TEST_F(StepsInTile, AreThoseOfTheRulesIfTheyFit) {
+  SemanticMap map = infoOf().emptyMap();
+  std::vector<EvidenceUnits> plane(kBlockVoxels);
+  Block& block = map.getOrAllocate({{16, -8, 0}});
+  const auto add = [&](ClassId id, auto&& units_of) {
+    for (std::size_t v = 0; v < plane.size(); ++v) plane[v] = units_of(static_cast<int>(v));
+    block.add(id, plane.data());
+  };
+  const auto expectHead = [&](const std::vector<std::uint32_t>& steps, std::uint32_t present) {
+    entry_ = codec_.pack(map, kKey);
+    const std::string packed = codec_.packed();
+    EXPECT_EQ(fault(packed), "");
+    SemanticMap copy = infoOf().emptyMap();
+    codec_.addTo(copy, kKey);
+    EXPECT_TRUE(reference::contentOf(copy) == reference::contentOf(map));
+    std::vector<std::uint32_t> head(5);
+    std::memcpy(head.data(), packed.data() + 8, 20);
+    EXPECT_EQ(head.back(), present);
+    head.pop_back();
+    EXPECT_EQ(head, steps);
+    return packed.size();
+  };
+  constexpr std::uint32_t kRestOfFree = 1u << 8, kRestOfOther = 1u << 20;
+  add(40, [](int v) { return 1278 * (v % 5); });
+  expectHead({38339, 98, 1278, 0}, 1u << 12);
+  add(kFreeClass, [](int v) { return 38339 * (v % 3) + 98 * (v % 7); });
+  const std::size_t size = expectHead({38339, 98, 1278, 0}, 1u << 12 | 1u << 4 | 1u);
+  TileCodec before(*infoOf().classes, TileLayout::kLookRows);
+  EXPECT_EQ(before.pack(map, kKey).checksum, entry_.checksum) << "does not depend on the layout";
+  EXPECT_LT(size, before.packed().size() / 2);
+  add(40, [](int v) { return v % 2; });
+  expectHead({38339, 98, 1278, 0}, kRestOfOther | 1u << 12 | 1u << 4 | 1u);
+  add(kFreeClass, [](int) { return 5; });
+  expectHead({0, 0, 1278, 0}, kRestOfOther | 1u << 12 | 7 * kRestOfFree);
+}
+
+TEST_F(StepsInTile, AreThoseOfTheSettingsOfTheFile) {
+  SemanticMap map = infoOf().emptyMap();
+  std::vector<EvidenceUnits> plane(kBlockVoxels);
+  for (std::size_t v = 0; v < plane.size(); ++v) plane[v] = 3834 * static_cast<int>(1 + v % 20);
+  map.getOrAllocate({{16, -8, 0}}).add(kFreeClass, plane.data());
+  codec_.setRules(rulesOfParameters("rules: {enabled: true, void_outweighs: 3}"));
+  codec_.pack(map, kKey);
+  EXPECT_EQ(codec_.packed().substr(8, 2), "\xfa\x0e") << "3834 = 0x0efa";
+  for (const std::string parameters :
+       {"", "rules: {stands_after: 2}", "rules: {void_outweighs: -1}", ": no: YAML ]"}) {
+    EXPECT_EQ(rulesOfParameters(parameters).void_outweighs, RulesConfig().void_outweighs) << parameters;
+  }
+}
+
+TEST(EvidenceSections, HoldAnyValuesInAnySteps) {
+  std::mt19937 random(1);
+  const auto below = [&](std::size_t limit) { return static_cast<std::size_t>(random() % limit); };
+  const auto draw = [&] {
+    const auto bits = static_cast<std::uint32_t>(random());
+    return bits >> below(32);
+  };
+  for (int round = 0; round < 200; ++round) {
+    EvidenceSections::Planes planes(below(5));
+    EvidenceSections::Values values;
+    for (EvidenceSections::Plane& plane : planes) {
+      plane = {below(2) == 0 ? EvidenceSections::kFree : EvidenceSections::kOther, below(9)};
+      for (std::size_t v = 0; v < plane.values; ++v) values.push_back(draw());
+    }
+    EvidenceSections::StepsOfKinds steps;
+    for (EvidenceSteps& each : steps) {
+      each.a = draw();
+      each.b = below(2) == 0 ? 0 : draw();
+    }
+    std::array<std::string, EvidenceSections::kSections> sections;
+    EvidenceSections::split(planes, values, steps, sections.data());
+    EvidenceSections::Values sum(values.size());
+    for (std::size_t section = 0; section < sections.size(); ++section) {
+      if (!sections[section].empty()) EvidenceSections::add(section, sections[section], planes, steps, sum);
+    }
+    ASSERT_EQ(sum, values) << round;
+  }
 }
 
 }  // namespace

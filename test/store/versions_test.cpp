@@ -66,8 +66,13 @@ EvidenceUnits unitsAt(const SemanticMap& map, const BlockIndex& block, ClassId i
 TEST_P(Version, HoldsItsEvidence) {
   MapFile file(file_, MapFile::Access::kRead);
   const SemanticMap map = readPart(file, 0), part = readPart(file, 1);
-  EXPECT_EQ(map.size(), 5u);
-  EXPECT_EQ(checksumOf(map), 0x5f49333bu);
+  EXPECT_EQ(map.size(), GetParam() < 6 ? 5u : 8u);
+  EXPECT_EQ(checksumOf(map), GetParam() < 6 ? 0x5f49333bu : 0x81f7b573u);
+  if (GetParam() >= 6) {
+    EXPECT_EQ(unitsAt(map, {{2, 0, 0}}, kFreeClass, 500), 2 * 38339 + 3 * 98 + 500 % 98);
+    EXPECT_EQ(unitsAt(map, {{2, 5, 0}}, kFreeClass, 500), 1 * 38339 + 1 * 98 + 500 % 98);
+    EXPECT_EQ(unitsAt(map, {{-2, -1, -1}}, 40, 504), 400 * 1278 + 504);
+  }
   EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 2), 2);
   EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 2147483647);
   EXPECT_EQ(unitsAt(map, {{-1, -1, -1}}, kFreeClass, 511), -2147483647);
@@ -248,9 +253,8 @@ TEST_P(Version, KeepsAJournalOrSaysThatItHasNone) {
 
 // What write_example_map would write today reads as what it wrote then.
 TEST_P(Version, IsWhatTheFormulasSay) {
-  const bool has_looks = GetParam() >= 3;
-  const SemanticMap part = exampleMap(1, has_looks);
-  SemanticMap sum = exampleMap(0, has_looks);
+  const SemanticMap part = exampleMap(1, GetParam());
+  SemanticMap sum = exampleMap(0, GetParam());
   sum.add(part);
   MapFile file(file_, MapFile::Access::kRead);
   EXPECT_EQ(reference::contentOf(readPart(file, 0)), reference::contentOf(sum));
@@ -274,7 +278,7 @@ TEST_P(Version, IsUpdatedByThisVersion) {
   MapFile file(path, MapFile::Access::kRead);
   EXPECT_EQ(file.drives().size(), 1u);
   const SemanticMap map = readPart(file, 0);
-  EXPECT_EQ(map.size(), 3u);
+  EXPECT_EQ(map.size(), GetParam() < 6 ? 3u : 4u);
   EXPECT_EQ(unitsAt(map, {{0, 0, 0}}, 40, 3), 3);
   EXPECT_EQ(map.find({{0, 0, 0}})->looks().empty(), GetParam() < 3) << "the file keeps its version";
 }
@@ -284,12 +288,12 @@ TEST(NewerVersion, IsRefused) {
   const std::string path = folder / "map.bkm";
   std::filesystem::copy_file(BKI_MAPPING_SOURCE_DIR "/test/store/data/version_1.bkm", path);
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\6');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(63).put('\7');
   for (const auto access : {MapFile::Access::kRead, MapFile::Access::kUpdate}) {
     EXPECT_EQ(
         sentenceOf([&] { MapFile(path, access); }),
         path +
-            " was written by a newer version of bki_mapping (format 6, this one knows formats up to 5); "
+            " was written by a newer version of bki_mapping (format 7, this one knows formats up to 6); "
             "use that version or a later one");
   }
 }
