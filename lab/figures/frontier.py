@@ -15,7 +15,7 @@ STEPS = {
     '+ rules, without voids, time and neighbours': {
         'rules/enabled': 'true', 'rules/void_outweighs': 0, 'rules/latest': 'false', 'rules/together': 0},
     '+ rules/void_outweighs 30': {'rules/void_outweighs': 30},
-    '+ rules/together 0.6': {'rules/together': 0.6},
+    '+ rules/together 0.8': {'rules/together': 0.8},
     '+ rules/latest': {'rules/latest': 'true'},
 }
 

@@ -12,7 +12,7 @@ import os
 from .programs import Programs
 from .tables import markdown
 
-SETTINGS = {'stands_after': (3, 4, 5, 7), 'living_stands_after': (8, 12), 'together': (0.3, 0.6, 0.9)}
+SETTINGS = {'stands_after': (4, 6, 8, 12), 'living_stands_after': (12, 20), 'together': (0.3, 0.6, 0.8)}
 SIMULATED = {'street': {'scans': 300}, 'traffic': {'scene': 'traffic', 'scans': 200},
              'traffic32': {'scene': 'traffic', 'lidar': 'hdl32', 'scans': 200},
              'traffic16': {'scene': 'traffic', 'lidar': 'vlp16', 'scans': 200},

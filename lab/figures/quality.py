@@ -15,8 +15,8 @@ RESOLUTIONS = (0.1, 0.2, 0.3, 0.6)
 FEW = ('04', 'traffic', 'crowd', 'street')  # drives on which settings are compared, if they are measured at all
 LIDARS = {'hdl64': 64, 'hdl32': 32, 'vlp16': 16}  # and their rows
 HEIGHTS = {'street': (0.6, 1.0, 1.7, 2.5), 'crowd': (0.6, 1.0, 1.7, 2.5), 'rooms': (0.35, 0.6, 1.0, 1.7)}
-JUDGED = ('stands_after=3', 'stands_after=8', 'living_stands_after=6', 'living_stands_after=20', 'together=0',
-          'together=0.3', 'together=0.9')
+JUDGED = ('stands_after=3', 'stands_after=12', 'living_stands_after=10', 'living_stands_after=40', 'together=0',
+          'together=0.3', 'together=1.2')
 MEASURED = ('void_outweighs=0', 'void_outweighs=20', 'void_outweighs=60')
 FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81}  # raw labels in rooms
 SHAKEN = ('--pose-noise', '0.05,0.3')
