@@ -93,7 +93,7 @@ class Figures(unittest.TestCase):
         self.assertEqual(header, '| drive | right: SA | mIoU | wrong: mIoU |')
         right, wrong = (float(cell) for cell in row.split('|')[3:5])
         self.assertGreater(right, wrong)
-        self.assertIn('`rules/together` 0.9', quality.table_of_settings(runs, {'street': self.drive}))
+        self.assertIn('`rules/together` 1.2', quality.table_of_settings(runs, {'street': self.drive}))
         with unittest.mock.patch.object(self.programs, 'evaluate', side_effect=AssertionError('measured twice')):
             self.assertEqual(quality.measured(runs, sequences, (0.2, 0.4)), rows)
 

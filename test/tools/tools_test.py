@@ -1163,9 +1163,9 @@ class Tools(ProgramTest):
 
     def test_migrating(self):
         a, copy = self.map_of('a.bkm', 0, 1), self.path('copy.bkm')
-        self.assertIn('version 5, from version 5', self.succeeds('migrate_map', a, copy).stdout)
+        self.assertIn('version 6, from version 6', self.succeeds('migrate_map', a, copy).stdout)
         first = os.path.join(os.environ['BKI_MAPPING_SOURCE_DIR'], 'test', 'store', 'data', 'version_1.bkm')
-        self.assertIn('version 5, from version 1', self.succeeds('migrate_map', first, self.path('second.bkm')).stdout)
+        self.assertIn('version 6, from version 1', self.succeeds('migrate_map', first, self.path('second.bkm')).stdout)
         self.assertEqual(tiles_of(copy), tiles_of(a))
         self.fails('exists already', 'migrate_map', a, copy)
         self.fails('needs two files', 'migrate_map', a)
