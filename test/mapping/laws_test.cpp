@@ -453,7 +453,7 @@ TEST(Laws, NeighbourhoodsAreAskedByTheFlagsOfClasses) {
   config.rules.enabled = true;
   const auto asking = [&] {
     const SemanticMapper mapper(config, std::make_shared<ClassTable>("flags", classes));
-    EXPECT_EQ(mapper.rules().neighbourhoodReach(), 2);
+    EXPECT_EQ(mapper.rules().neighbourhoodReach(), 3);
     std::vector<int> asked;
     for (const SemanticClass& c : classes) {
       if (mapper.rules().asksNeighbourhood(c.id)) asked.push_back(c.id);
@@ -495,7 +495,7 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_GT(rulesOf().freeGain(2, hits(3.0)), 1000.0f) << "it may pass";
   EXPECT_EQ(rulesOf().freeGain(2, hits(4.0)), 1.0f) << "it stands";
   EXPECT_EQ(rulesOf().freeGain(kFreeClass, 5.0f), 1.0f);
-  config.resolution = 0.8;  // twice the way through a voxel and what stands in it
+  config.resolution = 0.6;  // twice the way through a voxel
   EXPECT_GT(rulesOf().freeGain(2, hits(7.0)), 1000.0f);
   EXPECT_EQ(rulesOf().freeGain(2, hits(8.0)), 1.0f);
   config.resolution = 0.3;
