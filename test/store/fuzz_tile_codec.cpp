@@ -151,8 +151,7 @@ std::string framed(Bytes& bytes, const TileKey& key, TileEntry& entry, std::size
       }
       continue;
     }
-    append(sections[s], s == 0 ? kNever : std::min<std::size_t>(s, 6),
-           s < 6 ? head : body);
+    append(sections[s], s == 0 ? kNever : std::min<std::size_t>(s, 6), s < 6 ? head : body);
   }
   entry.checksum = static_cast<std::uint32_t>(checksum);
   return head + body;
