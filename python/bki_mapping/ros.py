@@ -153,7 +153,8 @@ class OccupancyFollower:
         publish_map: name of the mapper's service, such as 'mapping/publish_map', which is called if updates were missed; all
         subscribers then receive the whole map. None: subscribes again instead, which works only if nothing else in this process
         subscribes to the topic, because ROS would share the connection.
-        patience: time between two requests for the whole map [s].
+        patience: time until the whole map is requested again [s]. It doubles with each request, because another request delays a
+        map that is on its way.
 
         Raises ValueError for a topic of another type.
         """
@@ -301,16 +302,18 @@ class _Subscription:
 
     def _recover(self) -> None:
         """Requests the whole map as long as it is needed. A thread of its own, because callbacks must not wait."""
-        follower = self._follower
+        follower, patience = self._follower, self._patience
         while True:
             with follower.lock:  # a new subscriber, and one that has asked, gets the map in a moment
-                if follower._changed.wait_for(lambda: self._closed or follower._in_sync, self._patience):
+                if follower._changed.wait_for(lambda: self._closed or follower._in_sync, patience):
+                    patience = self._patience
                     follower._changed.wait_for(lambda: self._closed or not follower._in_sync)
                 if self._closed:
                     return
             try:
                 if self._subscriber.get_num_connections() > 0:
                     self._request()
+                    patience *= 2.0
             except (AttributeError, self._ros.ROSException):  # unsubscribed, or shut down, meanwhile
                 if not (self._closed or self._ros.is_shutdown()):
                     raise
