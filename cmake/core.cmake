@@ -102,7 +102,8 @@ string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" BKI_MAPPING_VERSION "${
 find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
 bki_mapping_room(store SOURCES
-    database.cpp drives.cpp evidence_steps.cpp grid_transform.cpp journal_merge.cpp journal_rows.cpp look_rows.cpp map_clear.cpp map_file.cpp
+    database.cpp drives.cpp evidence_steps.cpp grid_transform.cpp journal_merge.cpp journal_rows.cpp look_rows.cpp
+    map_clear.cpp map_file.cpp
     map_file_state.cpp map_info.cpp map_keeper.cpp map_merge.cpp mapper_file.cpp migration.cpp new_map_file.cpp records.cpp
     schema.cpp summand.cpp tile_codec.cpp tile_rows.cpp tile_store.cpp whole_map.cpp
   LINK bki_mapping_settings)
