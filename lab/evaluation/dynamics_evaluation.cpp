@@ -26,11 +26,9 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     }
     moving_points_.push_back({n, added_});
     voxel.last_moved = added_;
-    if (!voxel.moved) unseen_.push_back(n);
+    if (!voxel.moved || voxel.entered_again) unseen_.push_back(n);
     voxel.moved = true;
-    if (!voxel.seen_again) continue;
-    voxel.seen_again = false;
-    unseen_.push_back(n);
+    voxel.seen_again = voxel.entered_again = false;
   }
   findSeenAgain(whole);
   ++added_;
@@ -55,13 +53,17 @@ std::vector<std::uint32_t> DynamicsEvaluation::earlyMovingPoints() const {
 void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
   if (unseen_.empty()) return;
   beams_.build(scan);
-  const auto isSeenAgain = [this](std::uint32_t n) {
+  const double edge = geometry_.resolution();
+  const auto isEnteredAgain = [&](std::uint32_t n) {
     Voxel& voxel = voxels_[n];
     if (voxel.last_moved == added_) return false;
-    voxel.seen_again = beams_.anyPasses(geometry_.voxelCentre(voxel.index), geometry_.resolution());
-    return voxel.seen_again;
+    const Eigen::Vector3d centre = geometry_.voxelCentre(voxel.index);
+    if (!beams_.anyPasses(centre, edge)) return false;
+    voxel.seen_again = true;
+    voxel.entered_again = beams_.anyPasses(centre, 0.5 * edge);
+    return voxel.entered_again;
   };
-  unseen_.erase(std::remove_if(unseen_.begin(), unseen_.end(), isSeenAgain), unseen_.end());
+  unseen_.erase(std::remove_if(unseen_.begin(), unseen_.end(), isEnteredAgain), unseen_.end());
 }
 
 bool DynamicsEvaluation::hasBeenLeft(const VoxelIndex& index, const Taken& taken) const {
@@ -123,6 +125,9 @@ DynamicsQuality DynamicsEvaluation::compare(Occupants& map, const Taken& taken) 
     }
     quality.decidable_points += moving;
     if (!occupied) quality.decidable_removed += moving;
+    if (!voxel.entered_again) continue;
+    quality.entered_points += moving;
+    if (!occupied) quality.entered_removed += moving;
   }
   quality.static_points = quality.ground_points + quality.standing_points + quality.other_points;
   quality.static_kept = quality.ground_kept + quality.standing_kept + quality.other_kept;

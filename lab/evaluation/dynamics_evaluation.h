@@ -63,12 +63,16 @@ struct DynamicsQuality : Accuracies {
   std::size_t moving_shared = 0, moving_unseen = 0;
   std::size_t decidable_points = 0;   ///< the other moving points
   std::size_t decidable_removed = 0;  ///< of these, those that the map does not keep
+  /// Of the decidable points, those in voxels that beams entered after the last moving point, and those of
+  /// them that the map does not keep.
+  std::size_t entered_points = 0, entered_removed = 0;
 
   double groundAccuracy() const { return fraction(ground_kept, ground_points); }
   double standingAccuracy() const { return fraction(standing_kept, standing_points); }
   double otherAccuracy() const { return fraction(other_kept, other_points); }
   double holes() const { return fraction(floor_holes, floor_voxels); }
   double decidableAccuracy() const { return fraction(decidable_removed, decidable_points); }
+  double enteredAccuracy() const { return fraction(entered_removed, entered_points); }
 };
 
 /// The outcome for a voxel, by its points: of static or of moving objects.
@@ -132,6 +136,7 @@ class DynamicsEvaluation {
     std::uint32_t labels = kNone;  ///< position of the first in labels_
     bool moved = false;
     bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
+    bool entered_again = false;  ///< within half an edge
 
     bool isShared() const { return ground_points + standing_points + other_points > 0; }
   };
@@ -149,7 +154,7 @@ class DynamicsEvaluation {
   void countLabel(Voxel& voxel, std::uint32_t label);
   /// The number of moving points in the first half of the scans, for each voxel.
   std::vector<std::uint32_t> earlyMovingPoints() const;
-  /// Notes the voxels that something moving has left and that beams of the scan come near.
+  /// Notes the voxels that something moving has left and that beams of the scan come near or enter.
   void findSeenAgain(const Scan& scan);
 
   bool mayBeOccupied(const Voxel& voxel, const Taken& taken) const {
@@ -163,7 +168,7 @@ class DynamicsEvaluation {
   std::vector<Voxel> voxels_;
   std::vector<LabelPoints> labels_;
   std::vector<MovingPoint> moving_points_;
-  std::vector<std::uint32_t> unseen_;  ///< voxels with moving points that were not seen again
+  std::vector<std::uint32_t> unseen_;  ///< voxels with moving points that beams have not entered again
   PassingBeams beams_;                 ///< of the last scan
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 namespace bki_mapping {
 namespace {
@@ -72,12 +73,22 @@ void PresenceEvaluation::follow(const Scan& scan, double time, Occupants& map) {
 
 void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupants& map) {
   const double time = 1e-9 * static_cast<double>(scan.stamp);
+  struct Hit {
+    std::size_t point;
+    std::uint32_t voxel;
+    ClassId id;
+  };
+  std::vector<Hit> hits;
+  std::set<std::pair<std::uint32_t, ClassId>> classes_hit;  // in each voxel
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto id = classes.classOf(scan.labels[i], labelValues(scan));
     if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
+    hits.push_back({i, voxelAt(geometry_.voxelAt(point)), *id});
+    classes_hit.emplace(hits.back().voxel, *id);
+  }
+  for (const auto& [i, n, id] : hits) {
     const bool moves = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
-    const std::uint32_t n = voxelAt(geometry_.voxelAt(point));
     Voxel& voxel = voxels_[n];
     const double before = voxel.last_hit;
     voxel.last_hit = time;
@@ -87,14 +98,14 @@ void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupa
       voxel.came = true;
       start(n, Wait::kToAppear, time);
     }
-    if (!moves && !classes.find(*id)->dynamic) continue;
+    if (!moves && !classes.find(id)->dynamic) continue;
     const std::optional<ClassId> shown = map.at(voxel.index);
     for (std::size_t bin = 0; bin < PresenceQuality::kDistances.size(); ++bin) {
       if (static_cast<double>(scan.points[i].norm()) > PresenceQuality::kDistances[bin]) continue;
       PresentPoints& points = (moves ? quality_.moving : quality_.standing)[bin];
       ++points.points;
       points.present += shown.has_value();
-      points.named += shown == id;
+      points.named += shown && classes_hit.count({n, *shown}) > 0;
     }
   }
   follow(scan, time, map);

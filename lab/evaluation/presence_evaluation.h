@@ -19,7 +19,7 @@ namespace bki_mapping {
 /// Points of a scan, and those of them in occupied voxels of the map right after that scan.
 struct PresentPoints {
   std::size_t points = 0, present = 0;
-  std::size_t named = 0;  ///< of those present, those whose class the voxel has
+  std::size_t named = 0;  ///< of those present, those whose voxel has a class that the scan hit in it
 
   double accuracy() const { return static_cast<double>(present) / static_cast<double>(points); }  ///< PA
   double namedShare() const { return static_cast<double>(named) / static_cast<double>(present); }

@@ -93,6 +93,7 @@ Json dynamicsJson(const DynamicsQuality& d) {
           {"sa_by_label", by_label},
           {"da", d.dynamicAccuracy()},
           {"da_decidable", d.decidableAccuracy()},
+          {"da_entered", d.enteredAccuracy()},
           {"moving_shared", d.moving_shared},
           {"moving_unseen", d.moving_unseen},
           {"aa", d.accuracy()},
@@ -211,7 +212,7 @@ void addPresence(const PresenceQuality& presence, Table& table) {
                   "of those of objects that could move, but stand still");
   }
   table.percent("   with its class", presence.moving.back().namedShare(),
-                "of the moving points in occupied voxels have the class of their voxel");
+                "of the moving points in occupied voxels are in one with a class that the scan hit in it");
   if (presence.stayed > 0) {
     table.percent("PA stayed", presence.stayedShare(),
                   "of the voxels into which something moved and stayed are occupied at the end");
@@ -323,6 +324,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
                 "of the early points of moving objects are in voxels that are not occupied");
   table.percent("  decidable", d.decidableAccuracy(),
                 "of those in voxels that share no static point and that beams came near again");
+  table.percent("  entered", d.enteredAccuracy(), "of those in voxels that beams passed through again");
   table.percent("AA", d.accuracy(), "sqrt(SA DA)");
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   addPresence(quality.presence, table);

@@ -152,6 +152,28 @@ TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
   EXPECT_DOUBLE_EQ(quality.decidableAccuracy(), 1.0);
 }
 
+TEST(DynamicsQuality, SaysWhatBeamsHaveEnteredAgain) {
+  // Of two things that moved, a beam later passes through the centre of one and 0.7 m beside the other.
+  const Eigen::Vector3f through(5.5f, 0.5f, 0.5f), beside(0.5f, 5.5f, 0.5f);
+  const Scan moving = scanOf({{through, 20}, {beside, 20}}),
+             later = scanOf({{2.0f * through, 10}, {2.0f * Eigen::Vector3f(1.2f, 5.5f, 0.5f), 10}});
+  const auto classes = reference::smallTable();
+  DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 6, 1);
+  const SemanticMap map = mapOf({beside.cast<double>()});
+  for (int round = 0; round < 2; ++round) {  // what comes back must be seen to leave again
+    evaluation.add(moving, *classes);
+    EXPECT_EQ(evaluation.compare(map, StateRules()).entered_points, 0u);
+    evaluation.add(later, *classes);
+    const DynamicsQuality quality = evaluation.compare(map, StateRules());
+    const std::size_t points = round + 1;
+    EXPECT_EQ(quality.decidable_points, 2 * points);
+    EXPECT_EQ(quality.decidable_removed, points);
+    EXPECT_EQ(quality.entered_points, points);
+    EXPECT_EQ(quality.entered_removed, points);
+    EXPECT_EQ(quality.enteredAccuracy(), 1.0);
+  }
+}
+
 TEST(DynamicsQuality, NothingToCountIsNoNumber) {
   const DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 4, 1);
   const DynamicsQuality quality = evaluation.compare(mapOf({{0, 0, 0}}), StateRules());

@@ -128,6 +128,15 @@ TEST(Presence, AsksForTheClassOfWhatIsPresent) {
   EXPECT_TRUE(std::isnan(quality.standing[1].namedShare()));
 }
 
+TEST(Presence, TakesAnyClassForRightThatTheScanHitInTheVoxel) {
+  ScriptedDrive drive;
+  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
+  drive.add({{5.5, 21}, {5.6, 10}}, {5});  // feet on the ground
+  const PresenceQuality quality = drive.quality();
+  EXPECT_EQ(quality.moving[1].present, 1u);
+  EXPECT_EQ(quality.moving[1].named, 1u);
+}
+
 TEST(Presence, AsksAtTheEndForWhatCameAndStayed) {
   for (const bool is_known : {true, false}) {
     ScriptedDrive drive;
