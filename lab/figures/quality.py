@@ -12,10 +12,13 @@ from .tables import markdown
 
 SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'queue': 1, 'rooms': 5}  # by how much each drive is longer
 RESOLUTIONS = (0.1, 0.2, 0.3, 0.6)
+# Drives that are longer than the others, by how much, and their lidars.
+LONGER = (('street', 5, 'hdl64'), ('traffic', 10 / 3, 'hdl64'), ('traffic', 10 / 3, 'hdl32'), ('traffic', 10 / 3, 'vlp16'),
+          ('arrivals', 10 / 3, 'hdl64'), ('queue', 10 / 3, 'hdl64'))
 FEW = ('04', 'traffic', 'crowd', 'street')  # drives on which settings are compared, if they are measured at all
 LIDARS = {'hdl64': 64, 'hdl32': 32, 'vlp16': 16}  # and their rows
 HEIGHTS = {'street': (0.6, 1.0, 1.7, 2.5), 'crowd': (0.6, 1.0, 1.7, 2.5), 'rooms': (0.35, 0.6, 1.0, 1.7)}
-JUDGED = ('stands_after=3', 'stands_after=12', 'living_stands_after=10', 'living_stands_after=40', 'together=0',
+JUDGED = ('stands_after=4', 'stands_after=16', 'living_stands_after=10', 'living_stands_after=40', 'together=0',
           'together=0.3', 'together=1.2')
 MEASURED = ('void_outweighs=0', 'void_outweighs=20', 'void_outweighs=60')
 FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81}  # raw labels in rooms
@@ -45,11 +48,13 @@ def delay(report, name):
 SA, PARKED, HOLES, DA, DECIDABLE = (('SA', lambda r: share(r, 'sa')), ('parked', lambda r: share(r, 'sa_standing')),
                                     ('holes', lambda r: share(r, 'floor_holes')), ('DA', lambda r: share(r, 'da')),
                                     ('DA where decidable', lambda r: share(r, 'da_decidable')))
+ENTERED = ('DA where entered', lambda r: share(r, 'da_entered'))
 PA20, PA50 = ((f'PA to {distance} m', lambda r, n=n: share(r, 'presence', 'by_distance', n, 'pa_moving'))
               for n, distance in enumerate((20, 50)))
 EMPTY = ('mostly empty', emptiness)
 MIOU, INPUT = ('mIoU', lambda r: share(r, 'miou_map_present')), ('input', lambda r: share(r, 'miou_input_present'))
 APPEAR, CLEAR = (('appear [s]', lambda r: delay(r, 'appear')), ('clear [s]', lambda r: delay(r, 'clear')))
+NAMED = ('named', lambda r: share(r, 'presence', 'by_distance', 1, 'moving_named'))
 STAYED = ('stayed', lambda r: share(r, 'presence', 'stayed_present'))
 
 
@@ -105,6 +110,17 @@ def table_of_sensors(runs, programs, scans):
     return markdown(['scene', 'height [m]'] + [f'{rows} rows' for rows in LIDARS.values()], rows)
 
 
+def table_of_longer_drives(runs, programs, scans):
+    columns = (SA, PARKED, HOLES, DA, DECIDABLE, ENTERED, PA50, NAMED, STAYED)
+    rows = []
+    for scene, times, lidar in LONGER:
+        count = round(times * scans)
+        drive = programs.simulate(f'{scene}{count}_{lidar}', scene=scene, scans=count, lidar=lidar)
+        report = runs.report(drive)
+        rows.append([scene, str(LIDARS[lidar]), str(count)] + [of(report) or '-' for _, of in columns])
+    return markdown(['scene', 'rows', 'scans', *(title for title, _ in columns)], rows)
+
+
 def table_of_settings(runs, sequences):
     """Parked and DA of each setting, on a few drives."""
     drives = {drive: sequences[drive] for drive in FEW if drive in sequences}
@@ -138,12 +154,14 @@ def table_without_labels(runs, sequences):
 
 def table_of_presence(runs, sequences):
     """What comes and goes; of each pair of figures, the second is OctoMap's."""
-    columns = (PA20, PA50, APPEAR, CLEAR, STAYED, SA, PARKED, HOLES, DA)
+    columns = (PA20, PA50, NAMED, APPEAR, CLEAR, STAYED, SA, PARKED, HOLES, DA)
     rows = []
     for drive, sequence in sequences.items():
         report = runs.report(sequence, more=['--octomap', 'default'])
         pairs = ((of(report), of(report['octomap'][0])) for _, of in columns)
-        rows.append([drive] + [' / '.join(pair) if any(pair) else '-' for pair in pairs])
+        cells = [' / '.join(pair) if any(pair) else '-' for pair in pairs]
+        cells[columns.index(NAMED)] = NAMED[1](report)  # an OctoMap has no classes
+        rows.append([drive] + cells)
     return markdown(['drive', *(title for title, _ in columns)], rows)
 
 
@@ -165,7 +183,7 @@ def tables_of(runs, programs, given, sequences):
     def shaken():
         return by_drive(runs, some('04', '05', 'traffic'), [
             (f'`{name}` {value}', {'settings': [f'{name}={value}'], 'more': SHAKEN}, robot)
-            for name, value in (('resolution', 0.1), ('resolution', 0.6), ('rules/stands_after', 3),
+            for name, value in (('resolution', 0.1), ('resolution', 0.6), ('rules/stands_after', 4),
                                 ('rules/void_outweighs', 20), ('rules/void_outweighs', 120))])
 
     def calibration():
@@ -177,6 +195,7 @@ def tables_of(runs, programs, given, sequences):
     return {
         'quality': lambda: table_of_resolutions(runs, sequences, given.resolution),
         'paper': lambda: by_drive(runs, sequences, [('', {'preset': 'paper_line'}, (*robot, DECIDABLE, PA50))]),
+        'longer': lambda: table_of_longer_drives(runs, programs, given.scans),
         'sensors': lambda: table_of_sensors(runs, programs, given.scans),
         'settings': lambda: table_of_settings(runs, sequences),
         'no labels': lambda: table_without_labels(runs, sequences),

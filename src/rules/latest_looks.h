@@ -23,12 +23,12 @@ constexpr std::uint64_t kCrossedToClear = 2;
 enum class Stay : std::uint8_t {
   kPassing,  ///< in less than about eight scans
   kSome,
-  kLong,  ///< in about a hundred scans or more
+  kLong,  ///< in 160 scans or more
 };
 /// @param best evidence of the likeliest class. @param most_vote StateRules::mostVote, the hits of
 /// StateRules::kMostVotes scans.
 constexpr Stay stayOf(EvidenceUnits best, EvidenceUnits most_vote) {
-  if (best >= 6 * most_vote) return Stay::kLong;
+  if (best >= 10 * most_vote) return Stay::kLong;
   return 2 * std::int64_t{best} >= most_vote ? Stay::kSome : Stay::kPassing;
 }
 

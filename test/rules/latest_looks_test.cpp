@@ -148,10 +148,10 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
       if (random() % 40 == 0) tick += 2048 << random() % 6;  // until the next visit
     }
     std::vector<EvidenceUnits> plane(kBlockVoxels);
-    constexpr EvidenceUnits kMost = 200;  // so that a long stay has 1200
+    constexpr EvidenceUnits kMost = 200;  // so that a long stay has 2000
     for (const int id : {3, 7, static_cast<int>(kFreeClass)}) {
       for (EvidenceUnits& units : plane)
-        units = static_cast<EvidenceUnits>(random() % (round % 2 == 0 ? 1500 : 300));
+        units = static_cast<EvidenceUnits>(random() % (round % 2 == 0 ? 2500 : 300));
       block.add(static_cast<ClassId>(id), plane.data());
     }
     const StateRules rules = StateRules()
@@ -165,7 +165,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
     bool expected_any = false;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const EvidenceUnits best = std::max(block.evidence(3)[v], block.evidence(7)[v]);
-      const Stay stay = best >= 6 * kMost ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
+      const Stay stay = best >= 10 * kMost ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
       const bool can_leave = best > 0 && block.evidence(3)[v] == best;
       const std::int32_t expected = slowVerdict(block.looks(), v, stay, can_leave);
       ASSERT_EQ(verdictOf(block.looks(), v, stay, can_leave), expected);
