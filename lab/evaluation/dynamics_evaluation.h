@@ -135,7 +135,7 @@ class DynamicsEvaluation {
     std::size_t last_moved = 0;    ///< the last scan with a moving point, if moved
     std::uint32_t labels = kNone;  ///< position of the first in labels_
     bool moved = false;
-    bool seen_again = false;  ///< a beam has passed within a voxel's edge of the centre since last_moved
+    bool seen_again = false;     ///< a beam has passed within a voxel's edge of the centre since last_moved
     bool entered_again = false;  ///< within half an edge
 
     bool isShared() const { return ground_points + standing_points + other_points > 0; }

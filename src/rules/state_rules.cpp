@@ -33,8 +33,8 @@ constexpr double kNeighbourhoodRatio = 1.0;
 constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAfter = 2.0;
 
 /// Evidence from which on a thing stands that does so after this many scans with hits in a voxel of 0.3 m.
-/// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in a
-/// share of the scans that grows with the edge, too. Half a hit may be missing.
+/// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in
+/// a share of the scans that grows with the edge, too. Half a hit may be missing.
 double evidenceToStand(double scans, double resolution) {
   constexpr double kUsual = 0.3;  // [m]
   return std::max(scans * std::pow(resolution / kUsual, 1.5) - 0.5, 0.0) * RulesConfig::kHit;
