@@ -11,7 +11,7 @@ from .programs import ROOT, Programs, commit
 from .tables import markdown
 
 SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'queue': 1, 'rooms': 5}  # by how much each drive is longer
-RESOLUTIONS = (0.1, 0.2, 0.3, 0.6)
+RESOLUTIONS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.6)
 # Drives that are longer than the others, by how much, and their lidars.
 LONGER = (('street', 5, 'hdl64'), ('traffic', 10 / 3, 'hdl64'), ('traffic', 10 / 3, 'hdl32'), ('traffic', 10 / 3, 'vlp16'),
           ('arrivals', 10 / 3, 'hdl64'), ('queue', 10 / 3, 'hdl64'))

@@ -28,7 +28,7 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           Changes::kWhileMapping,
           "How many scans must hit a voxel of 0.3 m until what can be parked stands there; before that, one "
           "scan that crosses the voxel clears it. Larger voxels take more scans, smaller ones fewer, as the "
-          "edge to the power of 1.5. If no class is flagged dynamic, all things stand after two scans, or "
+          "edge to the power of 1.25. If no class is flagged dynamic, all things stand after two scans, or "
           "this many if fewer. Lower it to keep what stands sooner; raise it to clear slow traffic."),
       realParameter(
           "living_stands_after", &C::living_stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",

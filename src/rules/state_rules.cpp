@@ -37,7 +37,7 @@ constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAft
 /// a share of the scans that grows with the edge, too. Half a hit may be missing.
 double evidenceToStand(double scans, double resolution) {
   constexpr double kUsual = 0.3;  // [m]
-  return std::max(scans * std::pow(resolution / kUsual, 1.5) - 0.5, 0.0) * RulesConfig::kHit;
+  return std::max(scans * std::pow(resolution / kUsual, 1.25) - 0.5, 0.0) * RulesConfig::kHit;
 }
 
 bool haveSameValues(const RulesConfig& a, const RulesConfig& b) {

@@ -495,9 +495,9 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_GT(rulesOf().freeGain(2, hits(3.0)), 1000.0f) << "it may pass";
   EXPECT_EQ(rulesOf().freeGain(2, hits(4.0)), 1.0f) << "it stands";
   EXPECT_EQ(rulesOf().freeGain(kFreeClass, 5.0f), 1.0f);
-  config.resolution = 0.6;  // 4 * 2^1.5 - 1/2 are 10.8 hits
-  EXPECT_GT(rulesOf().freeGain(2, hits(10.0)), 1000.0f);
-  EXPECT_EQ(rulesOf().freeGain(2, hits(11.0)), 1.0f);
+  config.resolution = 0.6;  // 4 * 2^1.25 - 1/2 are 9.01 hits
+  EXPECT_GT(rulesOf().freeGain(2, hits(9.0)), 1000.0f);
+  EXPECT_EQ(rulesOf().freeGain(2, hits(9.1)), 1.0f);
   config.resolution = 0.3;
   classes[2].living = true;
   EXPECT_GT(rulesOf().freeGain(2, hits(7.0)), 1000.0f);
