@@ -222,7 +222,9 @@ void TileCodec::splitValues() {
   }
 }
 
-void TileCodec::joinValues(std::size_t count) {
+void TileCodec::joinValues() {
+  std::size_t count = 0;
+  for (const auto& plane : planes_) count += plane.values;
   values_.assign(count, 0);
   for (std::size_t section = kValues; section < endOfValues(); ++section) {
     const std::string& bytes = sections_[section];
@@ -409,122 +411,156 @@ std::string TileCodec::readLooks() {
   return "";
 }
 
-std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
-                              std::size_t size) {
-  clear();
+/// The bytes of a packed tile while they are read.
+struct TileCodec::Input {
+  const unsigned char* const bytes;
+  const unsigned char* next = bytes;  ///< the first that has not been read
+  std::size_t left;                   ///< from there on
+  std::size_t lengths = 0;            ///< of sections before looks, that have been read
+  std::uint32_t present = 0;          ///< a bit for each section of values that is there
+
+  std::size_t read(std::size_t count) {
+    next += count;
+    left -= count;
+    return count;
+  }
+};
+
+std::string TileCodec::readHead(Input& input) {
   const bool has_steps = layout_ == TileLayout::kSteps;
-  if (size < (has_steps ? kHeadNumbers * kLengthBytes : lengthAt(kValues + kBytes))) return "it is too short";
-  std::uint32_t present = (1u << kBytes) - 1;
+  if (input.left < (has_steps ? kHeadNumbers * kLengthBytes : lengthAt(kValues + kBytes))) {
+    return "it is too short";
+  }
+  input.present = (1u << kBytes) - 1;
   if (has_steps) {
-    const unsigned char* number = bytes + kFirstStep * kLengthBytes;
+    const unsigned char* number = input.bytes + kFirstStep * kLengthBytes;
     for (EvidenceSteps& steps : steps_) {
       steps = {read32(number), read32(number + kLengthBytes)};
       number += 2 * kLengthBytes;
     }
-    present = read32(number);
-    if (present >> EvidenceSections::kSections != 0) return "a section is not known";
+    input.present = read32(number);
+    if (input.present >> EvidenceSections::kSections != 0) return "a section is not known";
   }
-  const std::size_t head = lengthAt(kValues + static_cast<std::size_t>(__builtin_popcount(present)));
-  if (size < head) return "it is too short";
-  const unsigned char* next = bytes + head;
-  std::size_t left = size - head, lengths = 0;  // that have been read
-  const auto takeOf = [&](Section section, std::size_t length, std::size_t wanted) -> std::string {
-    std::string& content = sections_[section];
-    if (length > left || length > wanted || (section == kList && length != wanted)) {
-      return "a length is wrong";
-    }
-    if (wanted > kMostInflation * (length + 1)) return "a length is wrong";
-    content.resize(wanted);
-    if (length == wanted) {
-      std::copy(next, next + length, content.begin());
-    } else {
-      z_stream& stream = zlib_->unpacking;
-      inflateReset(&stream);
-      stream.next_in = const_cast<Bytef*>(next);
-      stream.avail_in = static_cast<uInt>(length);
-      stream.next_out = bytesOf(content);
-      stream.avail_out = static_cast<uInt>(wanted);
-      if (inflate(&stream, Z_FINISH) != Z_STREAM_END || stream.avail_in > 0 || stream.avail_out > 0) {
-        return "it cannot be decompressed";
-      }
-    }
-    next += length;
-    left -= length;
-    return "";
-  };
-  const auto take = [&](Section section, std::size_t wanted) {
-    return takeOf(section, read32(bytes + lengthAt(lengths++)), wanted);
-  };
+  const std::size_t head = lengthAt(kValues + static_cast<std::size_t>(__builtin_popcount(input.present)));
+  if (input.left < head) return "it is too short";
+  input.read(head);
+  return "";
+}
 
+std::string TileCodec::take(Section section, std::size_t length, std::size_t wanted, Input& input) {
+  std::string& content = sections_[section];
+  if (length > input.left || length > wanted || (section == kList && length != wanted)) {
+    return "a length is wrong";
+  }
+  if (wanted > kMostInflation * (length + 1)) return "a length is wrong";
+  content.resize(wanted);
+  if (length == wanted) {
+    std::copy(input.next, input.next + length, content.begin());
+  } else {
+    z_stream& stream = zlib_->unpacking;
+    inflateReset(&stream);
+    stream.next_in = const_cast<Bytef*>(input.next);
+    stream.avail_in = static_cast<uInt>(length);
+    stream.next_out = bytesOf(content);
+    stream.avail_out = static_cast<uInt>(wanted);
+    if (inflate(&stream, Z_FINISH) != Z_STREAM_END || stream.avail_in > 0 || stream.avail_out > 0) {
+      return "it cannot be decompressed";
+    }
+  }
+  input.read(length);
+  return "";
+}
+
+std::string TileCodec::takeListed(Section section, std::size_t wanted, Input& input) {
+  return take(section, read32(input.bytes + lengthAt(input.lengths++)), wanted, input);
+}
+
+std::string TileCodec::takeNext(Section section, std::size_t wanted, Input& input) {
+  if (input.left < kLengthBytes) return "it is too short";
+  const std::size_t length = read32(input.next);
+  input.read(kLengthBytes);
+  return take(section, length, wanted, input);
+}
+
+std::string TileCodec::takePlanes(const TileEntry& entry, Input& input) {
   if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
-  const std::size_t blocks = static_cast<std::size_t>(entry.blocks),
-                    least = 4 * blocks + static_cast<std::size_t>(entry.planes), listed = read32(bytes),
+  const auto blocks = static_cast<std::size_t>(entry.blocks), planes = static_cast<std::size_t>(entry.planes);
+  const std::size_t first_class = 4 * blocks, least = first_class + planes, listed = read32(input.bytes),
                     most_levels = hasLookRows() ? 0 : kMostLooks * blocks;
   if (listed < least || listed > least + most_levels) return "a length is wrong";
-  std::string fault = take(kList, listed);
   std::size_t marked = 0;
+  std::string fault = takeListed(kList, listed, input);
   if (fault.empty()) fault = checkList(entry, marked);
-  if (fault.empty()) fault = take(kMasks, kMaskBytes * (marked + static_cast<std::size_t>(entry.planes)));
+  if (fault.empty()) fault = takeListed(kMasks, kMaskBytes * (marked + planes), input);
   if (!fault.empty()) return fault;
-  const std::size_t first_class = least - static_cast<std::size_t>(entry.planes);
-  planes_.reserve(static_cast<std::size_t>(entry.planes));
-  std::size_t values = 0;
-  for (std::size_t plane = 0; plane < marked + static_cast<std::size_t>(entry.planes); ++plane) {
+  planes_.reserve(planes);
+  for (std::size_t mask = 0; mask < marked + planes; ++mask) {
     std::size_t bits = 0;
-    for (std::size_t i = kMaskBytes * plane; i < kMaskBytes * (plane + 1); ++i) {
+    for (std::size_t i = kMaskBytes * mask; i < kMaskBytes * (mask + 1); ++i) {
       bits += static_cast<std::size_t>(__builtin_popcount(at(sections_[kMasks], i)));
     }
     if (bits == 0) return "a plane is empty";
-    if (plane < marked) continue;
-    planes_.push_back({kindOf(at(sections_[kList], first_class + plane - marked)), bits});
-    values += bits;
+    if (mask >= marked) planes_.push_back({kindOf(at(sections_[kList], first_class + mask - marked)), bits});
   }
-  std::array<std::size_t, EvidenceSections::kKinds> of_kinds = {values, 0};
-  if (has_steps) {
-    for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
-      of_kinds[kind] = EvidenceSections::count(planes_, kind);
-      const std::uint32_t of_kind = present >> kind * EvidenceSections::kOfKind;
-      if (of_kinds[kind] > 0 && of_kind % (1u << EvidenceSections::kOfKind) == 0) {
-        return "a value is out of range";  // all are 0
-      }
-    }
+  return "";
+}
+
+std::string TileCodec::takeValues(Input& input) {
+  std::array<std::size_t, EvidenceSections::kKinds> of_kinds = {};
+  for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
+    of_kinds[kind] = EvidenceSections::count(planes_, kind);
+  }
+  const std::size_t all = of_kinds[EvidenceSections::kFree] + of_kinds[EvidenceSections::kOther];
+  for (std::size_t n = 0; n < EvidenceSections::kSections; ++n) sections_[kValues + n].clear();
+  for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
+    const std::uint32_t of_kind = input.present >> kind * EvidenceSections::kOfKind;
+    const bool all_are_0 = of_kind % (1u << EvidenceSections::kOfKind) == 0;
+    if (layout_ == TileLayout::kSteps && of_kinds[kind] > 0 && all_are_0) return "a value is out of range";
   }
   for (std::size_t n = 0; n < EvidenceSections::kSections; ++n) {
-    const auto section = static_cast<Section>(kValues + n);
-    sections_[section].clear();
-    const bool is_there = (present >> n & 1) != 0;
-    if (is_there && fault.empty()) fault = take(section, of_kinds[EvidenceSections::kindOf(n)]);
+    if ((input.present >> n & 1) == 0) continue;
+    const std::size_t wanted = layout_ == TileLayout::kSteps ? of_kinds[EvidenceSections::kindOf(n)] : all;
+    std::string fault = takeListed(static_cast<Section>(kValues + n), wanted, input);
+    if (!fault.empty()) return fault;
   }
+  return "";
+}
+
+std::string TileCodec::takeLooks(Input& input) {
   for (const Section section : {kLooks, kSeen, kVoids, kHits}) sections_[section].clear();
-  const auto takeNext = [&](Section section, std::size_t wanted) -> std::string {
-    if (left < kLengthBytes) return "it is too short";
-    const std::size_t length = read32(next);
-    next += kLengthBytes;
-    left -= kLengthBytes;
-    return takeOf(section, length, wanted);
-  };
-  if (fault.empty() && !look_counts_.empty() && layout_ == TileLayout::kLookMasks) {
-    fault = takeNext(kLooks,
-                     kLookBytes * std::accumulate(look_counts_.begin(), look_counts_.end(), std::size_t{0}));
-  } else if (fault.empty() && !look_counts_.empty()) {
-    const LookRowsReader rows(look_counts_, sections_[kLooks], sections_[kSeen], sections_[kVoids],
-                              sections_[kHits]);
-    fault = takeNext(kLooks, LookRowsReader::bytesOfHeads(look_counts_));
-    if (fault.empty()) fault = takeNext(kSeen, rows.bytesOfSeen());
-    if (fault.empty()) fault = takeNext(kVoids, rows.bytesOfVoids());
-    if (fault.empty()) fault = takeNext(kHits, rows.bytesOfHits());
+  if (look_counts_.empty()) return "";
+  if (!hasLookRows()) {
+    const std::size_t looks = std::accumulate(look_counts_.begin(), look_counts_.end(), std::size_t{0});
+    return takeNext(kLooks, kLookBytes * looks, input);
   }
+  const LookRowsReader rows(look_counts_, sections_[kLooks], sections_[kSeen], sections_[kVoids],
+                            sections_[kHits]);
+  std::string fault = takeNext(kLooks, LookRowsReader::bytesOfHeads(look_counts_), input);
+  if (fault.empty()) fault = takeNext(kSeen, rows.bytesOfSeen(), input);
+  if (fault.empty()) fault = takeNext(kVoids, rows.bytesOfVoids(), input);
+  if (fault.empty()) fault = takeNext(kHits, rows.bytesOfHits(), input);
+  return fault;
+}
+
+std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
+                              std::size_t size) {
+  clear();
+  Input input{bytes, bytes, size};
+  std::string fault = readHead(input);
+  if (fault.empty()) fault = takePlanes(entry, input);
+  if (fault.empty()) fault = takeValues(input);
+  if (fault.empty()) fault = takeLooks(input);
   if (!fault.empty()) return fault;
-  if (left > 0) return "bytes are left over";
-  joinValues(values);
+  if (input.left > 0) return "bytes are left over";
+  joinValues();
   if (checksum(key, entry) != entry.checksum) return "its checksum is wrong";
   constexpr auto kLeast = static_cast<std::uint32_t>(std::numeric_limits<EvidenceUnits>::min());
   for (const std::uint32_t value : values_) {
     if (value == 0 || value == kLeast) return "a value is out of range";
   }
-  const std::string wrong = readLooks();
-  if (wrong.empty()) blocks_ = entry.blocks;
-  return wrong;
+  fault = readLooks();
+  if (fault.empty()) blocks_ = entry.blocks;
+  return fault;
 }
 
 void TileCodec::addTo(SemanticMap& map, const TileKey& key) const {

@@ -84,7 +84,7 @@ class TileCodec {
   /// @return whether the plane holds evidence.
   bool takePlane(ClassId id, const EvidenceUnits* units);
   void splitValues();
-  void joinValues(std::size_t count);
+  void joinValues();
   /// Does not depend on the layout of the evidence.
   std::uint32_t checksum(const TileKey& key, const TileEntry& entry) const;
   /// Where the length of a section is, the n-th of those before looks.
@@ -94,6 +94,22 @@ class TileCodec {
   /// @return the length of the section in the content.
   std::size_t appendPacked(Section section);
   void takeMasks(const Looks& looks);
+
+  // Parts of unpack(), in this order. Each returns what is wrong, or "".
+  struct Input;
+  /// Reads what comes before the sections, but for their lengths.
+  std::string readHead(Input& input);
+  /// Reads kList and kMasks, and from them planes_ and look_counts_.
+  std::string takePlanes(const TileEntry& entry, Input& input);
+  std::string takeValues(Input& input);
+  std::string takeLooks(Input& input);
+  /// Reads the looks of all blocks that have any; these must have the intervals that their latest demands.
+  std::string readLooks();
+  /// Reads a section. @param length in the input. @param wanted length of the content.
+  std::string take(Section section, std::size_t length, std::size_t wanted, Input& input);
+  /// The same of the next section whose length comes before all sections, or right before it.
+  std::string takeListed(Section section, std::size_t wanted, Input& input);
+  std::string takeNext(Section section, std::size_t wanted, Input& input);
   /// Checks the list, and reads look_counts_ from it. @param[out] marked number of blocks with occlusion
   /// marks.
   std::string checkList(const TileEntry& entry, std::size_t& marked);
@@ -101,8 +117,6 @@ class TileCodec {
   // The sections of the layout:
   std::size_t endOfValues() const { return layout_ == TileLayout::kSteps ? kLooks : kValues + kBytes; }
   std::size_t endOfSections() const { return hasLookRows() ? kSections : kSeen; }
-  /// Reads the looks of all blocks that have any; these must have the intervals that their latest demands.
-  std::string readLooks();
   /// Reads looks from masks. @param[in,out] next position of the first one; then of the one after the last.
   Looks masksAt(std::size_t& next, std::size_t count) const;
 
