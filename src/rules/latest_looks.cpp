@@ -96,7 +96,7 @@ bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& ove
     decides = true;
   };
   forEachOf(may_have_stayed, [&](std::size_t v) {
-    const Stay stay = stayOf(likeliestClass(block, v).second, rules.mostVote());
+    const Stay stay = stayOf(likeliestClass(block, v).second, rules);
     if (stay == Stay::kLong || (stay == Stay::kSome && verdictOf(looks, v, stay, false) == kKept))
       overrule(v, kKept);
   });

@@ -23,13 +23,12 @@ constexpr std::uint64_t kCrossedToClear = 2;
 enum class Stay : std::uint8_t {
   kPassing,  ///< in less than about eight scans
   kSome,
-  kLong,  ///< in 160 scans or more
+  kLong,  ///< long enough to be there still if nobody has looked since
 };
-/// @param best evidence of the likeliest class. @param most_vote StateRules::mostVote, the hits of
-/// StateRules::kMostVotes scans.
-constexpr Stay stayOf(EvidenceUnits best, EvidenceUnits most_vote) {
-  if (best >= 10 * most_vote) return Stay::kLong;
-  return 2 * std::int64_t{best} >= most_vote ? Stay::kSome : Stay::kPassing;
+/// @param best evidence of the likeliest class.
+inline Stay stayOf(EvidenceUnits best, const StateRules& rules) {
+  if (best >= rules.staysFrom()) return Stay::kLong;
+  return 2 * std::int64_t{best} >= rules.mostVote() ? Stay::kSome : Stay::kPassing;
 }
 
 /// What the looks say of a voxel: kKept, kCleared, or kNotOverruled where the sum decides.

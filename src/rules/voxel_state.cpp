@@ -188,7 +188,7 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
   }
   if (rules.latestDecides() && own.best > 0) {
     const std::int32_t verdict = verdictOf(block.looks(), static_cast<std::size_t>(offset),
-                                           stayOf(own.best, rules.mostVote()), rules.canLeave(own.label));
+                                           stayOf(own.best, rules), rules.canLeave(own.label));
     if (verdict != kNotOverruled) {
       holds = verdict == kKept;
       restored = holds && !own.holds;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 
 #include "bki_mapping/core/class_table.h"
@@ -78,7 +79,14 @@ class StateRules {
   /// Whether what the latest scans saw of a voxel decides, where that is clear, and not the sum (Equation
   /// 12c).
   bool latestDecides() const { return latest_decides_; }
-  StateRules withLatest(bool decides) const;
+  /// @param stays_after number of scans with hits from which on what is not seen again is there still.
+  StateRules withLatest(bool decides, int stays_after = kStaysAfter) const;
+  static constexpr int kStaysAfter = 160;
+
+  /// The same as evidence of the likeliest class [units].
+  EvidenceUnits staysFrom() const {
+    return static_cast<EvidenceUnits>(std::int64_t{stays_after_} * mostVote() / kMostVotes);
+  }
 
   /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
   /// kMostFree scans. What has been hit in more stands until it is seen void, however long space was free
@@ -97,7 +105,7 @@ class StateRules {
   RulesConfig config_;
   std::array<float, 256> free_gains_, standing_gains_, stands_after_;
   float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
-  int neighbourhood_reach_ = 2;
+  int neighbourhood_reach_ = 2, stays_after_ = kStaysAfter;
   ClassSet fixed_, asking_;
   bool neighbourhood_is_below_ = true, latest_decides_ = false;
 };
