@@ -26,11 +26,11 @@ void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const 
     }
     moving_points_.push_back({n, added_});
     voxel.last_moved = added_;
-    if (!voxel.moved || voxel.entered_again) unseen_.push_back(n);
+    if (!voxel.moved || voxel.entered_again) not_entered_.push_back(n);
     voxel.moved = true;
     voxel.seen_again = voxel.entered_again = false;
   }
-  findSeenAgain(whole);
+  findEntered(whole);
   ++added_;
 }
 
@@ -50,8 +50,8 @@ std::vector<std::uint32_t> DynamicsEvaluation::earlyMovingPoints() const {
   return early;
 }
 
-void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
-  if (unseen_.empty()) return;
+void DynamicsEvaluation::findEntered(const Scan& scan) {
+  if (not_entered_.empty()) return;
   beams_.build(scan);
   const double edge = geometry_.resolution();
   const auto isEnteredAgain = [&](std::uint32_t n) {
@@ -63,7 +63,8 @@ void DynamicsEvaluation::findSeenAgain(const Scan& scan) {
     voxel.entered_again = beams_.anyPasses(centre, 0.5 * edge);
     return voxel.entered_again;
   };
-  unseen_.erase(std::remove_if(unseen_.begin(), unseen_.end(), isEnteredAgain), unseen_.end());
+  not_entered_.erase(std::remove_if(not_entered_.begin(), not_entered_.end(), isEnteredAgain),
+                     not_entered_.end());
 }
 
 bool DynamicsEvaluation::hasBeenLeft(const VoxelIndex& index, const Taken& taken) const {

@@ -63,8 +63,8 @@ struct DynamicsQuality : Accuracies {
   std::size_t moving_shared = 0, moving_unseen = 0;
   std::size_t decidable_points = 0;   ///< the other moving points
   std::size_t decidable_removed = 0;  ///< of these, those that the map does not keep
-  /// Of the decidable points, those in voxels that beams entered after the last moving point, and those of
-  /// them that the map does not keep.
+  /// Of the decidable points, those in voxels that a beam entered after the last moving point: it passed
+  /// within half an edge of the centre. And those of them that the map does not keep.
   std::size_t entered_points = 0, entered_removed = 0;
 
   double groundAccuracy() const { return fraction(ground_kept, ground_points); }
@@ -155,7 +155,7 @@ class DynamicsEvaluation {
   /// The number of moving points in the first half of the scans, for each voxel.
   std::vector<std::uint32_t> earlyMovingPoints() const;
   /// Notes the voxels that something moving has left and that beams of the scan come near or enter.
-  void findSeenAgain(const Scan& scan);
+  void findEntered(const Scan& scan);
 
   bool mayBeOccupied(const Voxel& voxel, const Taken& taken) const {
     return voxel.last_hit + late_ >= scans_ || (taken && taken(voxel.index));
@@ -168,8 +168,8 @@ class DynamicsEvaluation {
   std::vector<Voxel> voxels_;
   std::vector<LabelPoints> labels_;
   std::vector<MovingPoint> moving_points_;
-  std::vector<std::uint32_t> unseen_;  ///< voxels with moving points that beams have not entered again
-  PassingBeams beams_;                 ///< of the last scan
+  std::vector<std::uint32_t> not_entered_;  ///< voxels with moving points that no beam has entered since
+  PassingBeams beams_;                      ///< of the last scan
 };
 
 }  // namespace bki_mapping

@@ -211,7 +211,7 @@ void addPresence(const PresenceQuality& presence, Table& table) {
     table.percent("   standing", presence.standing[bin].accuracy(),
                   "of those of objects that could move, but stand still");
   }
-  table.percent("   with its class", presence.moving.back().namedShare(),
+  table.percent("   named", presence.moving.back().namedShare(),
                 "of the moving points in occupied voxels are in one with a class that the scan hit in it");
   if (presence.stayed > 0) {
     table.percent("PA stayed", presence.stayedShare(),
@@ -324,7 +324,7 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
                 "of the early points of moving objects are in voxels that are not occupied");
   table.percent("  decidable", d.decidableAccuracy(),
                 "of those in voxels that share no static point and that beams came near again");
-  table.percent("  entered", d.enteredAccuracy(), "of those in voxels that beams passed through again");
+  table.percent("  entered", d.enteredAccuracy(), "of those in voxels that beams entered again");
   table.percent("AA", d.accuracy(), "sqrt(SA DA)");
   table.percent("HA", d.harmonicAccuracy(), "2 SA DA / (SA + DA)");
   addPresence(quality.presence, table);

@@ -160,7 +160,7 @@ def table_of_presence(runs, sequences):
         report = runs.report(sequence, more=['--octomap', 'default'])
         pairs = ((of(report), of(report['octomap'][0])) for _, of in columns)
         cells = [' / '.join(pair) if any(pair) else '-' for pair in pairs]
-        cells[columns.index(NAMED)] = NAMED[1](report)  # an OctoMap has no classes
+        cells[columns.index(NAMED)] = NAMED[1](report) or '-'  # an OctoMap has no classes
         rows.append([drive] + cells)
     return markdown(['drive', *(title for title, _ in columns)], rows)
 
@@ -255,10 +255,10 @@ def main():
         replaced(text, name, '')  # fails before the measurement, not after it
     for scene, times in SCENES.items():
         sequences[scene] = programs.simulate(f'{scene}{times * given.scans}', scene=scene, scans=times * given.scans)
-    source = (f'Measured on {datetime.date.today()}, commit {given.commit or commit()}, {given.scans} scans of each simulated '
-              f"drive, in rooms {SCENES['rooms'] * given.scans}:\n\n")
+    source = f'Measured on {datetime.date.today()}, commit {given.commit or commit()}'
+    scans = f", {given.scans} scans of each simulated drive, in rooms {SCENES['rooms'] * given.scans}"
     for name in names:
-        table = '\n' + source + tables[name]() + '\n'
+        table = f"\n{source}{'' if name == 'longer' else scans}:\n\n{tables[name]()}\n"
         with open(given.document) as file:
             text = file.read()
         with open(given.document, 'w') as file:

@@ -27,8 +27,9 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           "stands_after", &C::stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
           Changes::kWhileMapping,
           "How many scans must hit a voxel of 0.3 m until what can be parked stands there; before that, one "
-          "scan that crosses the voxel clears it. Larger voxels take more scans, smaller ones fewer, as the "
-          "edge to the power of 1.25. If no class is flagged dynamic, all things stand after two scans, or "
+          "scan that crosses the voxel clears it. Larger voxels take more scans, smaller ones fewer, in "
+          "proportion to the edge to the power of 1.25. If no class is flagged dynamic, all things stand "
+          "after two scans, or "
           "this many if fewer. Lower it to keep what stands sooner; raise it to clear slow traffic."),
       realParameter(
           "living_stands_after", &C::living_stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",

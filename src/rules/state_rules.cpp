@@ -37,8 +37,9 @@ constexpr int kUnknownStaysAfter = 96;
 /// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in
 /// a share of the scans that grows with the edge, too. Half a hit may be missing.
 double evidenceToStand(double scans, double resolution) {
-  constexpr double kUsual = 0.3;  // [m]
-  return std::max(scans * std::pow(resolution / kUsual, 1.25) - 0.5, 0.0) * RulesConfig::kHit;
+  constexpr double kUsual = 0.3;    // [m]
+  constexpr double kGrowth = 1.25;  // with 1.5, too little of what is parked stands in voxels of 0.6 m
+  return std::max(scans * std::pow(resolution / kUsual, kGrowth) - 0.5, 0.0) * RulesConfig::kHit;
 }
 
 bool haveSameValues(const RulesConfig& a, const RulesConfig& b) {
@@ -62,7 +63,8 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
               .withRemaining(kRemaining, fixedClasses(classes))
               // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
               .withNeighbourhood(ratio, askingClasses(classes), says_what_moves, reach)
-              .withLatest(config.latest, says_what_moves ? kStaysAfter : kUnknownStaysAfter);
+              .withLatest(config.latest)
+              .withStaysAfter(says_what_moves ? kStaysAfter : kUnknownStaysAfter);
   for (const SemanticClass& c : classes.classes()) {
     if (c.free_gain) {
       *this = withFreeGain(c.id, *c.free_gain);
@@ -119,10 +121,15 @@ StateRules StateRules::withNeighbourhood(double ratio, const ClassSet& asking, b
   return rules;
 }
 
-StateRules StateRules::withLatest(bool decides, int stays_after) const {
+StateRules StateRules::withLatest(bool decides) const {
   StateRules rules = *this;
   rules.latest_decides_ = decides;
-  rules.stays_after_ = stays_after;
+  return rules;
+}
+
+StateRules StateRules::withStaysAfter(int scans) const {
+  StateRules rules = *this;
+  rules.stays_after_ = scans;
   return rules;
 }
 

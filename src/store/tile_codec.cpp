@@ -413,16 +413,17 @@ std::string TileCodec::readLooks() {
 
 /// The bytes of a packed tile while they are read.
 struct TileCodec::Input {
-  const unsigned char* const bytes;
-  const unsigned char* next = bytes;  ///< the first that has not been read
-  std::size_t left;                   ///< from there on
-  std::size_t lengths = 0;            ///< of sections before looks, that have been read
-  std::uint32_t present = 0;          ///< a bit for each section of values that is there
+  Input(const unsigned char* all, std::size_t size) : bytes(all), next(all), left(size) {}
 
-  std::size_t read(std::size_t count) {
+  const unsigned char* bytes;
+  const unsigned char* next;     ///< the first that has not been read
+  std::size_t left;              ///< number of bytes from there on
+  std::size_t lengths_read = 0;  ///< number of the lengths before all sections that have been read
+  std::uint32_t present = 0;     ///< a bit for each section of values that is there
+
+  void skip(std::size_t count) {
     next += count;
     left -= count;
-    return count;
   }
 };
 
@@ -443,7 +444,7 @@ std::string TileCodec::readHead(Input& input) {
   }
   const std::size_t head = lengthAt(kValues + static_cast<std::size_t>(__builtin_popcount(input.present)));
   if (input.left < head) return "it is too short";
-  input.read(head);
+  input.skip(head);
   return "";
 }
 
@@ -467,22 +468,22 @@ std::string TileCodec::take(Section section, std::size_t length, std::size_t wan
       return "it cannot be decompressed";
     }
   }
-  input.read(length);
+  input.skip(length);
   return "";
 }
 
 std::string TileCodec::takeListed(Section section, std::size_t wanted, Input& input) {
-  return take(section, read32(input.bytes + lengthAt(input.lengths++)), wanted, input);
+  return take(section, read32(input.bytes + lengthAt(input.lengths_read++)), wanted, input);
 }
 
 std::string TileCodec::takeNext(Section section, std::size_t wanted, Input& input) {
   if (input.left < kLengthBytes) return "it is too short";
   const std::size_t length = read32(input.next);
-  input.read(kLengthBytes);
+  input.skip(kLengthBytes);
   return take(section, length, wanted, input);
 }
 
-std::string TileCodec::takePlanes(const TileEntry& entry, Input& input) {
+std::string TileCodec::unpackPlanes(const TileEntry& entry, Input& input) {
   if (entry.blocks < 1 || entry.blocks > Region::kBlocks || entry.planes < 0) return "a count is wrong";
   const auto blocks = static_cast<std::size_t>(entry.blocks), planes = static_cast<std::size_t>(entry.planes);
   const std::size_t first_class = 4 * blocks, least = first_class + planes, listed = read32(input.bytes),
@@ -505,7 +506,7 @@ std::string TileCodec::takePlanes(const TileEntry& entry, Input& input) {
   return "";
 }
 
-std::string TileCodec::takeValues(Input& input) {
+std::string TileCodec::unpackValues(Input& input) {
   std::array<std::size_t, EvidenceSections::kKinds> of_kinds = {};
   for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
     of_kinds[kind] = EvidenceSections::count(planes_, kind);
@@ -526,7 +527,7 @@ std::string TileCodec::takeValues(Input& input) {
   return "";
 }
 
-std::string TileCodec::takeLooks(Input& input) {
+std::string TileCodec::unpackLooks(Input& input) {
   for (const Section section : {kLooks, kSeen, kVoids, kHits}) sections_[section].clear();
   if (look_counts_.empty()) return "";
   if (!hasLookRows()) {
@@ -545,11 +546,11 @@ std::string TileCodec::takeLooks(Input& input) {
 std::string TileCodec::unpack(const TileKey& key, const TileEntry& entry, const unsigned char* bytes,
                               std::size_t size) {
   clear();
-  Input input{bytes, bytes, size};
+  Input input(bytes, size);
   std::string fault = readHead(input);
-  if (fault.empty()) fault = takePlanes(entry, input);
-  if (fault.empty()) fault = takeValues(input);
-  if (fault.empty()) fault = takeLooks(input);
+  if (fault.empty()) fault = unpackPlanes(entry, input);
+  if (fault.empty()) fault = unpackValues(input);
+  if (fault.empty()) fault = unpackLooks(input);
   if (!fault.empty()) return fault;
   if (input.left > 0) return "bytes are left over";
   joinValues();

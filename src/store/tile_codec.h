@@ -100,15 +100,21 @@ class TileCodec {
   /// Reads what comes before the sections, but for their lengths.
   std::string readHead(Input& input);
   /// Reads kList and kMasks, and from them planes_ and look_counts_.
-  std::string takePlanes(const TileEntry& entry, Input& input);
-  std::string takeValues(Input& input);
-  std::string takeLooks(Input& input);
-  /// Reads the looks of all blocks that have any; these must have the intervals that their latest demands.
+  std::string unpackPlanes(const TileEntry& entry, Input& input);
+  /// Decompresses the sections of values.
+  std::string unpackValues(Input& input);
+  /// Decompresses those of looks.
+  std::string unpackLooks(Input& input);
+  /// Once the checksum is right: makes the looks of all blocks that have any; these must have the intervals
+  /// that their latest demands.
   std::string readLooks();
-  /// Reads a section. @param length in the input. @param wanted length of the content.
+
+  /// Decompresses a section. @param length in the input. @param wanted length of the content. @return what is
+  /// wrong, or "".
   std::string take(Section section, std::size_t length, std::size_t wanted, Input& input);
-  /// The same of the next section whose length comes before all sections, or right before it.
+  /// The same of a section whose length is the next one before all sections.
   std::string takeListed(Section section, std::size_t wanted, Input& input);
+  /// The same of a section whose length is right before it.
   std::string takeNext(Section section, std::size_t wanted, Input& input);
   /// Checks the list, and reads look_counts_ from it. @param[out] marked number of blocks with occlusion
   /// marks.

@@ -153,24 +153,25 @@ TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
 }
 
 TEST(DynamicsQuality, SaysWhatBeamsHaveEnteredAgain) {
-  // Of two things that moved, a beam later passes through the centre of one and 0.7 m beside the other.
-  const Eigen::Vector3f through(5.5f, 0.5f, 0.5f), beside(0.5f, 5.5f, 0.5f);
-  const Scan moving = scanOf({{through, 20}, {beside, 20}}),
-             later = scanOf({{2.0f * through, 10}, {2.0f * Eigen::Vector3f(1.2f, 5.5f, 0.5f), 10}});
+  // Of three things that moved, beams later pass through the centres of two and 0.7 m beside the third.
+  const Eigen::Vector3f through(5.5f, 0.5f, 0.5f), left(-4.5f, 0.5f, 0.5f), beside(0.5f, 5.5f, 0.5f);
+  const Scan moving = scanOf({{through, 20}, {left, 20}, {beside, 20}}),
+             later = scanOf(
+                 {{2.0f * through, 10}, {2.0f * left, 10}, {2.0f * Eigen::Vector3f(1.2f, 5.5f, 0.5f), 10}});
   const auto classes = reference::smallTable();
   DynamicsEvaluation evaluation(GridGeometry(1.0), {20}, 6, 1);
-  const SemanticMap map = mapOf({beside.cast<double>()});
+  const SemanticMap map = mapOf({left.cast<double>(), beside.cast<double>()});
   for (int round = 0; round < 2; ++round) {  // what comes back must be seen to leave again
     evaluation.add(moving, *classes);
     EXPECT_EQ(evaluation.compare(map, StateRules()).entered_points, 0u);
     evaluation.add(later, *classes);
     const DynamicsQuality quality = evaluation.compare(map, StateRules());
     const std::size_t points = round + 1;
-    EXPECT_EQ(quality.decidable_points, 2 * points);
+    EXPECT_EQ(quality.decidable_points, 3 * points);
     EXPECT_EQ(quality.decidable_removed, points);
-    EXPECT_EQ(quality.entered_points, points);
+    EXPECT_EQ(quality.entered_points, 2 * points);
     EXPECT_EQ(quality.entered_removed, points);
-    EXPECT_EQ(quality.enteredAccuracy(), 1.0);
+    EXPECT_EQ(quality.enteredAccuracy(), 0.5);
   }
 }
 

@@ -119,8 +119,9 @@ TEST(Presence, LeavesOutVoxelsThatSomethingStaticShares) {
 
 TEST(Presence, AsksForTheClassOfWhatIsPresent) {
   ScriptedDrive drive;
-  for (int n = 0; n < 2; ++n) drive.add({{9.5, 10}}, {});
-  drive.add({{5.5, 21}, {6.5, 20}}, {5});  // the map's only class is that of the ground
+  for (int n = 0; n < 2; ++n) drive.add({{5.5, 10}}, {});
+  // The map's only class is that of the ground, which the scan hits elsewhere.
+  drive.add({{5.5, 21}, {6.5, 20}, {9.5, 10}}, {5});
   const PresenceQuality quality = drive.quality();
   EXPECT_EQ(quality.moving[1].present, 1u);
   EXPECT_EQ(quality.moving[1].named, 0u);

@@ -495,6 +495,7 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_GT(rulesOf().freeGain(2, hits(3.0)), 1000.0f) << "it may pass";
   EXPECT_EQ(rulesOf().freeGain(2, hits(4.0)), 1.0f) << "it stands";
   EXPECT_EQ(rulesOf().freeGain(kFreeClass, 5.0f), 1.0f);
+  EXPECT_EQ(rulesOf().staysFrom(), 160 / 16 * rulesOf().mostVote());
   config.resolution = 0.6;  // 4 * 2^1.25 - 1/2 are 9.01 hits
   EXPECT_GT(rulesOf().freeGain(2, hits(9.0)), 1000.0f);
   EXPECT_EQ(rulesOf().freeGain(2, hits(9.1)), 1.0f);
@@ -509,7 +510,8 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_EQ(rulesOf().freeGain(2, 5.0f), 7.0f) << "its own";
   classes[2].free_gain.reset();
   classes[2].dynamic = classes[2].living = false;
-  EXPECT_GT(rulesOf().freeGain(1, hits(1.0)), 13.0f) << "nothing says what can move: all may";
+  EXPECT_EQ(rulesOf().staysFrom(), 96 / 16 * rulesOf().mostVote()) << "nothing says what can move";
+  EXPECT_GT(rulesOf().freeGain(1, hits(1.0)), 13.0f) << "all may";
   EXPECT_EQ(rulesOf().freeGain(1, hits(2.0)), 1.0f);
   EXPECT_EQ(rulesOf().freeGain(0, hits(1.0)), 1.0f) << "but what is unlabelled";
   config.rules.stands_after = 1.0;

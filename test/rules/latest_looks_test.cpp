@@ -157,7 +157,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
     const int stays_after = round % 3 == 0 ? 64 : 160;
     const EvidenceUnits long_stay = stays_after / 16 * kMost;
     const StateRules rules = StateRules()
-                                 .withLatest(true, stays_after)
+                                 .withStaysAfter(stays_after)
                                  .withHitOfScan(kMost * kEvidenceUnit / StateRules::kMostVotes)
                                  .withFreeGain(3, 2.0)
                                  .withFreeGain(7, 0.5);

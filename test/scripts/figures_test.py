@@ -94,6 +94,11 @@ class Figures(unittest.TestCase):
         right, wrong = (float(cell) for cell in row.split('|')[3:5])
         self.assertGreater(right, wrong)
         self.assertIn('`rules/together` 1.2', quality.table_of_settings(runs, {'street': self.drive}))
+        header, _, row = quality.table_of_presence(runs, sequences).splitlines()
+        self.assertEqual(row.count('|'), header.count('|'))
+        header, _, *rows_of_longer = quality.table_of_longer_drives(runs, self.programs, 2).splitlines()
+        self.assertEqual([row.split('|')[3].strip() for row in rows_of_longer], ['10', '7', '7', '7', '7', '7'])
+        self.assertEqual({row.count('|') for row in rows_of_longer}, {header.count('|')})
         with unittest.mock.patch.object(self.programs, 'evaluate', side_effect=AssertionError('measured twice')):
             self.assertEqual(quality.measured(runs, sequences, (0.2, 0.4)), rows)
 

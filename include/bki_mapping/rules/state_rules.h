@@ -79,14 +79,16 @@ class StateRules {
   /// Whether what the latest scans saw of a voxel decides, where that is clear, and not the sum (Equation
   /// 12c).
   bool latestDecides() const { return latest_decides_; }
-  /// @param stays_after number of scans with hits from which on what is not seen again is there still.
-  StateRules withLatest(bool decides, int stays_after = kStaysAfter) const;
-  static constexpr int kStaysAfter = 160;
+  StateRules withLatest(bool decides) const;
 
-  /// The same as evidence of the likeliest class [units].
+  /// Evidence of the likeliest class from which on a voxel has stayed [units]: it is occupied while nobody
+  /// has looked at it since its last hit.
   EvidenceUnits staysFrom() const {
     return static_cast<EvidenceUnits>(std::int64_t{stays_after_} * mostVote() / kMostVotes);
   }
+  /// @param scans with hits; their evidence must be known.
+  StateRules withStaysAfter(int scans) const;
+  static constexpr int kStaysAfter = 160;  ///< 16 s at 10 Hz
 
   /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
   /// kMostFree scans. What has been hit in more stands until it is seen void, however long space was free
