@@ -510,15 +510,13 @@ std::string TileCodec::unpackValues(Input& input) {
   std::array<std::size_t, EvidenceSections::kKinds> of_kinds = {};
   for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
     of_kinds[kind] = EvidenceSections::count(planes_, kind);
-  }
-  const std::size_t all = of_kinds[EvidenceSections::kFree] + of_kinds[EvidenceSections::kOther];
-  for (std::size_t n = 0; n < EvidenceSections::kSections; ++n) sections_[kValues + n].clear();
-  for (const EvidenceSections::Kind kind : {EvidenceSections::kFree, EvidenceSections::kOther}) {
     const std::uint32_t of_kind = input.present >> kind * EvidenceSections::kOfKind;
     const bool all_are_0 = of_kind % (1u << EvidenceSections::kOfKind) == 0;
     if (layout_ == TileLayout::kSteps && of_kinds[kind] > 0 && all_are_0) return "a value is out of range";
   }
+  const std::size_t all = of_kinds[EvidenceSections::kFree] + of_kinds[EvidenceSections::kOther];
   for (std::size_t n = 0; n < EvidenceSections::kSections; ++n) {
+    sections_[kValues + n].clear();
     if ((input.present >> n & 1) == 0) continue;
     const std::size_t wanted = layout_ == TileLayout::kSteps ? of_kinds[EvidenceSections::kindOf(n)] : all;
     std::string fault = takeListed(static_cast<Section>(kValues + n), wanted, input);
