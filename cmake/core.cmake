@@ -54,7 +54,7 @@ bki_mapping_core_room(parallel SOURCES gate.cpp thread_pool.cpp LINK bki_mapping
 bki_mapping_core_room(simd SOURCES instruction_sets.cpp)
 bki_mapping_core_room(map SOURCES clear_box.cpp looks.cpp semantic_map.cpp LINK bki_mapping_parallel)
 bki_mapping_core_room(rules SOURCES
-    apply_scan_rules.cpp class_sets.cpp latest_looks.cpp neighbourhood.cpp state_rules.cpp void_search.cpp voxel_state.cpp
+    apply_scan_rules.cpp class_sets.cpp latest_looks.cpp near_voxels.cpp neighbourhood.cpp state_rules.cpp void_search.cpp voxel_state.cpp
   LINK bki_mapping_map bki_mapping_simd)
 bki_mapping_core_room(kernel SOURCES kernel_table.cpp LINK bki_mapping_core bki_mapping_simd)
 bki_mapping_core_room(update SOURCES map_updater.cpp sum_sink.cpp LINK bki_mapping_rules)

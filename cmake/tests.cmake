@@ -234,7 +234,7 @@ bki_mapping_unit_tests(mapping brute_force scan_preprocessor snapshot)
 foreach(name allocation bounds laws)
   bki_mapping_unit_tests(mapping ${name})
 endforeach()
-bki_mapping_unit_tests(mapping latest parameters real_data LINK bki_mapping_sequence bki_mapping_settings)
+bki_mapping_unit_tests(mapping latest parameters real_data thin_things LINK bki_mapping_sequence bki_mapping_settings)
 # The laws with the loops for processors without AVX, which instruction_sets_test compares with brute force.
 foreach(name instruction_sets laws)
   add_test(NAME ${name}_generic_test COMMAND ${name}_test)

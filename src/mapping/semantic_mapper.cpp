@@ -128,6 +128,7 @@ struct SemanticMapper::Pipeline {
         occlusion(config.occlusion),
         height(classes) {
     rules.fixed = fixedClasses(classes);
+    if (config.rules.enabled) rules.thin_reach = thinReach(classes, config.resolution);
   }
 
   /// The threshold of free space for a scan, whose hits the preprocessor holds.

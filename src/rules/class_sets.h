@@ -12,4 +12,8 @@ ClassSet fixedClasses(const ClassTable& classes);
 /// table does not say what can move.
 ClassSet askingClasses(const ClassTable& classes);
 
+/// ScanRules::thin_reach: things may be thin where the table does not say what can move, so that all of them
+/// can be cleared; otherwise 0. @param resolution edge of a voxel [m].
+int thinReach(const ClassTable& classes, double resolution);
+
 }  // namespace bki_mapping

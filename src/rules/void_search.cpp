@@ -1,8 +1,10 @@
 #include "rules/void_search.h"
 
+#include <algorithm>
 #include <cstdint>
 
 #include "parallel/chunks.h"
+#include "rules/near_voxels.h"
 
 namespace bki_mapping {
 namespace {
@@ -67,15 +69,29 @@ VoxelMask VoidSearch::betweenIn(std::size_t b, std::size_t axis, const MaskOfBlo
   return maskOf(between(axis, bits(previous), bitsOf(maskOfBlock(b)), bits(next)));
 }
 
+template <typename Job>
+void VoidSearch::forEachBlock(ThreadPool& pool, const Job& job) const {
+  const Chunks chunks(seen_.size());
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) job(b);
+  });
+}
+
+void VoidSearch::findThin(ThreadPool& pool) {
+  forEachBlock(pool, [&](std::size_t b) {
+    thin_[b] = seen_[b].hit;
+    if (thin_[b].none()) return;
+    const std::uint32_t below = beside_[b][2][0];
+    const LayerBits empty = bitsOf(empty_[b]);
+    LayerBits above_empty = {below == kNoPosition ? 0 : bitsOf(empty_[below])[kLast]};
+    std::copy(empty.begin(), empty.end() - 1, above_empty.begin() + 1);
+    thin_[b] &= maskOf(above_empty);
+  });
+}
+
 void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
   findBlocksBeside(blocks, pool);
-  const Chunks chunks(seen_.size());
-  const auto forEachBlock = [&](const auto& job) {
-    pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-      for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) job(b);
-    });
-  };
-  forEachBlock([&](std::size_t b) {
+  forEachBlock(pool, [&](std::size_t b) {
     const SeenVoxels& seen = seen_[b];
     empty_[b] = seen.crossed;
     if (seen.crossed.any() && !seen.crossed.all()) {
@@ -85,12 +101,12 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
     open_[b] = empty_[b] | seen.bounds;
   });
   const auto open = [&](std::size_t n) -> const VoxelMask& { return open_[n]; };
-  forEachBlock([&](std::size_t b) {
+  forEachBlock(pool, [&](std::size_t b) {
     along_x_[b] = open(b);
     if (along_x_[b].any()) along_x_[b] &= betweenIn(b, 0, open);
   });
   // With both neighbours across the faces, those across an edge are two steps away, along different axes.
-  forEachBlock([&](std::size_t b) {
+  forEachBlock(pool, [&](std::size_t b) {
     const auto along_x = [&](std::size_t n) -> const VoxelMask& { return along_x_[n]; };
     const auto along_y = [&](std::size_t n) { return open(n) & betweenIn(n, 1, open); };
     VoxelMask& voids = voids_[b];
@@ -100,6 +116,9 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
     if (voids.any()) voids &= betweenIn(b, 1, along_x);
     if (voids.any()) voids &= along_y(b) & betweenIn(b, 2, along_y);
   });
+  if (thin_reach_ == 0) return;
+  findThin(pool);
+  removeNear(blocks, thin_, thin_reach_, voids_, pool);
 }
 
 }  // namespace bki_mapping

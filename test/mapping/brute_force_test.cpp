@@ -305,6 +305,10 @@ TEST_P(EveryScene, VoidsEqualBruteForce) {
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, " + mode);
     config.scan_rules.free_threshold = 0.0f;
     config.scan_rules.hits_before_misses = true;
+    config.scan_rules.thin_reach = 1;
+    if (scene_.name != "near the sensor") {
+      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, thin things, " + mode);
+    }
     config.free_space.extent = FreeSpaceExtent::kMapped;
     if (scene_.name != "near the sensor") {
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,
@@ -350,6 +354,11 @@ TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
   expectEqualsBruteForce(scan, config, "voids among dense beams");
   const std::size_t voids = countVoids(scan, config);
   EXPECT_GT(voids, 0u);
+  config.scan_rules.thin_reach = 2;  // the upper half of the hits are above voxels that are seen empty
+  expectEqualsBruteForce(scan, config, "voids among dense beams, thin things");
+  EXPECT_GT(countVoids(scan, config), voids / 4);
+  EXPECT_LT(countVoids(scan, config), voids);
+  config.scan_rules.thin_reach = 0;
   config.scan_rules.free_threshold = 1e3f;  // above all that beams add
   expectEqualsBruteForce(scan, config, "voids among dense beams, threshold");
   EXPECT_EQ(countVoids(scan, config), voids);

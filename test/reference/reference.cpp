@@ -409,10 +409,10 @@ ScanReference::Seen ScanReference::seen(const VoxelIndex& voxel) const {
   const Value free = unlimited(voxel, kFreeClass);
   const double above = free.sum - static_cast<double>(config_.scan_rules.most_free),
                tolerance = free.tolerance(scale);
-  Seen result = {Answer::kNo, Answer::kNo, Answer::kNo};
+  Seen result = {Answer::kNo, Answer::kNo, Answer::kNo, holds};
   const bool is_free = above > tolerance;
   if (close || (!fixed && !may_move && std::abs(above) <= tolerance)) {
-    result = {Answer::kUndecided, Answer::kUndecided, close ? Answer::kUndecided : Answer::kNo};
+    result = {Answer::kUndecided, Answer::kUndecided, close ? Answer::kUndecided : Answer::kNo, holds};
   } else if (!fixed && !may_move) {
     if (is_free) result.crossed = Answer::kYes;
   } else {
@@ -451,7 +451,23 @@ ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
       }
     }
   }
+  const int reach = config_.scan_rules.thin_reach;
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach && reach > 0 && answer != Answer::kNo; ++x) {
+        const Answer thin = isThin({{voxel.x + x, voxel.y + y, voxel.z + z}});
+        if (thin == Answer::kYes) return Answer::kNo;
+        if (thin == Answer::kUndecided) answer = Answer::kUndecided;
+      }
+    }
+  }
   return answer;
+}
+
+ScanReference::Answer ScanReference::isThin(const VoxelIndex& voxel) const {
+  const VoxelIndex below{{voxel.x, voxel.y, voxel.z - 1}};
+  if (!isUpdated(voxel) || !isUpdated(below)) return Answer::kNo;
+  return std::min(seen(voxel).holds, isEmpty(below));
 }
 
 Value ScanReference::evidence(const VoxelIndex& voxel, ClassId label) const {

@@ -71,6 +71,7 @@ class ScanReference {
     Answer crossed;
     Answer bounds;  ///< hits add evidence, but those of classes that can move lie in other voxels
     Answer hit;     ///< hits add evidence
+    Answer holds;   ///< contains a hit
   };
   /// What the scan says of one voxel, for isVoid.
   Seen seen(const VoxelIndex& voxel) const;
@@ -80,6 +81,8 @@ class ScanReference {
   Answer isEmpty(const VoxelIndex& voxel) const;
   /// Whether the scan sees the voxel and its neighbours across faces and edges empty.
   Answer isVoid(const VoxelIndex& voxel) const;
+  /// Whether it contains a hit above a voxel that the scan sees empty.
+  Answer isThin(const VoxelIndex& voxel) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
   /// Whether hits of a class add evidence to voxels that do not contain them.

@@ -5,6 +5,9 @@
 #include <random>
 
 #include "bki_mapping/core/grid_geometry.h"
+#include "bki_mapping/rules/scan_rules.h"
+#include "reference/scenes.h"
+#include "rules/class_sets.h"
 #include "rules/void_search.h"
 
 namespace bki_mapping {
@@ -28,9 +31,24 @@ bool isEmpty(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex&
   return crossed(0) || (!hit && crossed(-1) && crossed(1));
 }
 
-TEST(VoidSearch, EqualsALookAtAllNeighbours) {
+/// Whether a hit above an empty voxel lies up to `reach` away along each axis.
+bool isNearThin(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex& voxel, int reach) {
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
+        const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
+        if (has(blocks, search, at, &SeenVoxels::hit) && isEmpty(blocks, search, {{at.x, at.y, at.z - 1}}))
+          return true;
+      }
+    }
+  }
+  return false;
+}
+
+void expectEqualsALookAtAllNeighbours(int thin_reach) {
   std::mt19937 random(5);
   VoidSearch search;  // keeps its memory, but nothing of the scan before
+  std::size_t kept = 0;
   for (const unsigned unseen_of_thousand : {0u, 5u, 30u, 200u}) {
     for (const std::size_t threads : {1, 3}) {
       IndexNumbering added;
@@ -44,7 +62,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
       IndexNumbering blocks;  // in the order of their groups
       for (const std::uint32_t b : by_group.numbers()) blocks.insert(added.members()[b]);
       ASSERT_EQ(blocks.size(), added.size());
-      search.start(blocks.size());
+      search.start(blocks.size(), thin_reach);
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         search.at(b) = {};
         if (b % 7 == 3) continue;  // neither crossed nor hit
@@ -52,6 +70,7 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
           if (random() % 1000 < unseen_of_thousand) continue;
           const auto kind = random() % 50;
           (kind < 5 ? search.at(b).bounds : kind == 5 ? search.at(b).moving : search.at(b).crossed).set(v);
+          if (kind <= 5 && random() % 100 == 0) search.at(b).hit.set(v);
         }
       }
       ThreadPool pool(static_cast<int>(threads));
@@ -68,6 +87,10 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
             const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
             is_void = isEmpty(blocks, search, at) || has(blocks, search, at, &SeenVoxels::bounds);
           }
+          if (thin_reach > 0 && is_void && isNearThin(blocks, search, voxel, thin_reach)) {
+            is_void = false;
+            ++kept;
+          }
           ASSERT_EQ(search.voidsOf(b)[static_cast<std::size_t>(v)], is_void) << b << ' ' << v;
           count += is_void;
         }
@@ -78,6 +101,23 @@ TEST(VoidSearch, EqualsALookAtAllNeighbours) {
       }
     }
   }
+  EXPECT_EQ(kept > 0, thin_reach > 0);
+}
+
+TEST(VoidSearch, EqualsALookAtAllNeighbours) {
+  expectEqualsALookAtAllNeighbours(0);
+}
+
+TEST(VoidSearch, NothingNearThinThingsIsVoid) {
+  for (const int reach : {1, 3, ScanRules::kMostThinReach}) expectEqualsALookAtAllNeighbours(reach);
+}
+
+TEST(VoidSearch, ThingsMayBeThinWhereNoClassSaysWhatCanMove) {
+  EXPECT_EQ(thinReach(*reference::smallTable(), 0.1), 3);
+  EXPECT_EQ(thinReach(*reference::smallTable(), 0.3), 1);
+  EXPECT_EQ(thinReach(*reference::smallTable(), 1.0), 1);
+  EXPECT_EQ(thinReach(*reference::smallTable(), 0.01), ScanRules::kMostThinReach);
+  EXPECT_EQ(thinReach(*reference::tableWithDynamicClass(), 0.1), 0);
 }
 
 }  // namespace
