@@ -28,10 +28,9 @@ constexpr double kGainOfUnconfirmed = 3.0;
 constexpr double kRemaining = 0.1;
 /// Of kept to cleared evidence (12b).
 constexpr double kNeighbourhoodRatio = 1.0;
-/// The same, and the gain of what passes, and the scans after which things stand and stay, where no class
-/// says what can move: most things stand, so a scan must cross a voxel cleanly to outweigh a hit.
+/// The same, and the gain of what passes, and the scans after which things stand, where no class says what
+/// can move: most things stand, so a scan must cross a voxel cleanly to outweigh a hit.
 constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAfter = 2.0;
-constexpr int kUnknownStaysAfter = 96;
 
 /// Evidence from which on a thing stands that does so after this many scans with hits in a voxel of 0.3 m.
 /// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in
@@ -63,8 +62,7 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
               .withRemaining(kRemaining, fixedClasses(classes))
               // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
               .withNeighbourhood(ratio, askingClasses(classes), says_what_moves, reach)
-              .withLatest(config.latest)
-              .withStaysAfter(says_what_moves ? kStaysAfter : kUnknownStaysAfter);
+              .withLatest(config.latest);
   for (const SemanticClass& c : classes.classes()) {
     if (c.free_gain) {
       *this = withFreeGain(c.id, *c.free_gain);
@@ -127,17 +125,11 @@ StateRules StateRules::withLatest(bool decides) const {
   return rules;
 }
 
-StateRules StateRules::withStaysAfter(int scans) const {
-  StateRules rules = *this;
-  rules.stays_after_ = scans;
-  return rules;
-}
-
 bool StateRules::decidesAs(const StateRules& other) const {
   const auto all = [](const StateRules& r) {
     return std::tie(r.free_gains_, r.standing_gains_, r.stands_after_, r.hit_of_scan_, r.remaining_gain_,
                     r.fixed_, r.neighbourhood_ratio_, r.asking_, r.neighbourhood_is_below_,
-                    r.neighbourhood_reach_, r.latest_decides_, r.stays_after_);
+                    r.neighbourhood_reach_, r.latest_decides_);
   };
   return haveSameValues(config_, other.config_) && all(*this) == all(other);
 }

@@ -510,7 +510,6 @@ TEST(Laws, GainsFollowTheFlagsOfClasses) {
   EXPECT_EQ(rulesOf().freeGain(2, 5.0f), 7.0f) << "its own";
   classes[2].free_gain.reset();
   classes[2].dynamic = classes[2].living = false;
-  EXPECT_EQ(rulesOf().staysFrom(), 96 / 16 * rulesOf().mostVote()) << "nothing says what can move";
   EXPECT_GT(rulesOf().freeGain(1, hits(1.0)), 13.0f) << "all may";
   EXPECT_EQ(rulesOf().freeGain(1, hits(2.0)), 1.0f);
   EXPECT_EQ(rulesOf().freeGain(0, hits(1.0)), 1.0f) << "but what is unlabelled";

@@ -154,10 +154,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
         units = static_cast<EvidenceUnits>(random() % (round % 2 == 0 ? 2500 : 300));
       block.add(static_cast<ClassId>(id), plane.data());
     }
-    const int stays_after = round % 3 == 0 ? 64 : 160;
-    const EvidenceUnits long_stay = stays_after / 16 * kMost;
     const StateRules rules = StateRules()
-                                 .withStaysAfter(stays_after)
                                  .withHitOfScan(kMost * kEvidenceUnit / StateRules::kMostVotes)
                                  .withFreeGain(3, 2.0)
                                  .withFreeGain(7, 0.5);
@@ -168,7 +165,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
     bool expected_any = false;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const EvidenceUnits best = std::max(block.evidence(3)[v], block.evidence(7)[v]);
-      const Stay stay = best >= long_stay ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
+      const Stay stay = best >= 10 * kMost ? Stay::kLong : best >= kMost / 2 ? Stay::kSome : Stay::kPassing;
       const bool can_leave = best > 0 && block.evidence(3)[v] == best;
       const std::int32_t expected = slowVerdict(block.looks(), v, stay, can_leave);
       ASSERT_EQ(verdictOf(block.looks(), v, stay, can_leave), expected);

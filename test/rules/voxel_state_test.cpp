@@ -445,9 +445,6 @@ TEST(StateRules, OfOtherSettingsDecideOtherwise) {
     p.set(other, otherValue(p, other));
     EXPECT_FALSE(rulesOf(config).decidesAs(rulesOf(other))) << p.name;
   }
-  const StateRules rules = rulesOf(config), later = rules.withStaysAfter(1600);
-  EXPECT_FALSE(rules.decidesAs(later));
-  EXPECT_EQ(later.staysFrom(), 100 * rules.mostVote());
 }
 
 TEST(VoxelState, VisitsKnownVoxelsInSortedOrder) {

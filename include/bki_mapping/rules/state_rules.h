@@ -84,10 +84,9 @@ class StateRules {
   /// Evidence of the likeliest class from which on a voxel has stayed [units]: it is occupied while nobody
   /// has looked at it since its last hit.
   EvidenceUnits staysFrom() const {
-    return static_cast<EvidenceUnits>(std::int64_t{stays_after_} * mostVote() / kMostVotes);
+    static_assert(kStaysAfter % kMostVotes == 0);
+    return kStaysAfter / kMostVotes * mostVote();
   }
-  /// @param scans with hits; their evidence must be known.
-  StateRules withStaysAfter(int scans) const;
   static constexpr int kStaysAfter = 160;  ///< 16 s at 10 Hz
 
   /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
@@ -107,7 +106,7 @@ class StateRules {
   RulesConfig config_;
   std::array<float, 256> free_gains_, standing_gains_, stands_after_;
   float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
-  int neighbourhood_reach_ = 2, stays_after_ = kStaysAfter;
+  int neighbourhood_reach_ = 2;
   ClassSet fixed_, asking_;
   bool neighbourhood_is_below_ = true, latest_decides_ = false;
 };
