@@ -23,10 +23,12 @@ ClassSet askingClasses(const ClassTable& classes) {
 }
 
 int thinReach(const ClassTable& classes, double resolution) {
-  // Less than what moves is wide, so that where it was seen empty it is still void in its middle.
+  // Enough for tables in voxels of 0.1 m; what moves leaves it behind within a few scans.
   constexpr double kReach = 0.3;  // [m]
   if (classes.saysWhatMoves()) return 0;
-  return static_cast<int>(std::lround(std::clamp(kReach / resolution, 1.0, 1.0 * ScanRules::kMostThinReach)));
+  constexpr double kRounding = 1e-6;  // 0.3 / 0.1 is a little less than 3
+  return static_cast<int>(
+      std::clamp(std::floor(kReach / resolution + kRounding), 1.0, 1.0 * ScanRules::kMostThinReach));
 }
 
 }  // namespace bki_mapping

@@ -12,8 +12,9 @@ ClassSet fixedClasses(const ClassTable& classes);
 /// table does not say what can move.
 ClassSet askingClasses(const ClassTable& classes);
 
-/// ScanRules::thin_reach: things may be thin where the table does not say what can move, so that all of them
-/// can be cleared; otherwise 0. @param resolution edge of a voxel [m].
+/// ScanRules::thin_reach: 0.3 m, rounded down to voxels, but at least one, where the table does not say what
+/// can move, since voids would then clear thin things, too; otherwise 0. @param resolution edge of a voxel
+/// [m].
 int thinReach(const ClassTable& classes, double resolution);
 
 }  // namespace bki_mapping

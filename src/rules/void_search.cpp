@@ -77,15 +77,15 @@ void VoidSearch::forEachBlock(ThreadPool& pool, const Job& job) const {
   });
 }
 
-void VoidSearch::findThin(ThreadPool& pool) {
+void VoidSearch::findAboveEmpty(ThreadPool& pool) {
   forEachBlock(pool, [&](std::size_t b) {
-    thin_[b] = seen_[b].hit;
-    if (thin_[b].none()) return;
+    above_empty_[b] = seen_[b].hit;
+    if (above_empty_[b].none()) return;
     const std::uint32_t below = beside_[b][2][0];
     const LayerBits empty = bitsOf(empty_[b]);
     LayerBits above_empty = {below == kNoPosition ? 0 : bitsOf(empty_[below])[kLast]};
     std::copy(empty.begin(), empty.end() - 1, above_empty.begin() + 1);
-    thin_[b] &= maskOf(above_empty);
+    above_empty_[b] &= maskOf(above_empty);
   });
 }
 
@@ -117,8 +117,8 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
     if (voids.any()) voids &= along_y(b) & betweenIn(b, 2, along_y);
   });
   if (thin_reach_ == 0) return;
-  findThin(pool);
-  removeNear(blocks, thin_, thin_reach_, voids_, pool);
+  findAboveEmpty(pool);
+  removeNear(blocks, above_empty_, thin_reach_, voids_, pool);
 }
 
 }  // namespace bki_mapping

@@ -2,10 +2,12 @@
 /// docs/method.md, which is not in the paper.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "bki_mapping/rules/scan_rules.h"
 #include "map/blocks_by_group.h"
 #include "parallel/thread_pool.h"
 #include "rules/block_sums.h"
@@ -22,18 +24,19 @@ struct SeenVoxels {
 };
 
 /// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
-/// bridged or a bound, and away from what is thin. A bridged voxel lies between two crossed ones, below and
-/// above it, and no hit adds evidence to it. Keeps its memory from scan to scan.
+/// bridged or a bound, but not near hits above empty voxels (ScanRules::thin_reach). A bridged voxel lies
+/// between two crossed ones, below and above it, and no hit adds evidence to it. Keeps its memory from scan
+/// to scan.
 class VoidSearch {
  public:
   /// Allocates all memory for a scan. @param blocks number of those that it touches. Set at() of each before
   /// find(). @param thin_reach as in ScanRules.
   void start(std::size_t blocks, int thin_reach = 0) {
-    thin_reach_ = thin_reach;
+    thin_reach_ = std::clamp(thin_reach, 0, ScanRules::kMostThinReach);
     seen_.resize(blocks);
     beside_.resize(blocks);
     for (std::vector<VoxelMask>* masks : {&empty_, &open_, &along_x_, &voids_}) masks->resize(blocks);
-    if (thin_reach > 0) thin_.resize(blocks);
+    if (thin_reach_ > 0) above_empty_.resize(blocks);
   }
   /// What the scan says of a block; until it is set, what an earlier scan said of another one. Different
   /// threads may write to different blocks.
@@ -53,8 +56,8 @@ class VoidSearch {
   /// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
   template <typename MaskOfBlock>
   VoxelMask betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const;
-  /// Sets thin_.
-  void findThin(ThreadPool& pool);
+  /// Sets above_empty_.
+  void findAboveEmpty(ThreadPool& pool);
   template <typename Job>
   void forEachBlock(ThreadPool& pool, const Job& job) const;
 
@@ -65,7 +68,7 @@ class VoidSearch {
   std::vector<VoxelMask> open_;     ///< these, and bounds
   std::vector<VoxelMask> along_x_;  ///< open, with both neighbours along x
   std::vector<VoxelMask> voids_;
-  std::vector<VoxelMask> thin_;  ///< contain hits above empty voxels; if thin_reach_ asks for them
+  std::vector<VoxelMask> above_empty_;  ///< contain hits, above empty voxels; if thin_reach_ asks for them
 };
 
 }  // namespace bki_mapping

@@ -303,12 +303,11 @@ TEST_P(EveryScene, VoidsEqualBruteForce) {
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, " + mode);
     config.scan_rules.free_threshold = 5.0f * config.scan_rules.most_free;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, " + mode);
+    config.scan_rules.thin_reach = 1;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, thin things, " + mode);
+    config.scan_rules.thin_reach = 0;
     config.scan_rules.free_threshold = 0.0f;
     config.scan_rules.hits_before_misses = true;
-    config.scan_rules.thin_reach = 1;
-    if (scene_.name != "near the sensor") {
-      expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, thin things, " + mode);
-    }
     config.free_space.extent = FreeSpaceExtent::kMapped;
     if (scene_.name != "near the sensor") {
       expectEqualsBruteForce(withSoftLabels(scene_.scan), config,

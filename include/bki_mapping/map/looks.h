@@ -19,7 +19,7 @@ namespace bki_mapping {
 enum class Sight : std::uint8_t {
   kNothing = 0,
   kCrossed = 1,  ///< beams crossed the voxel, and none ended in it
-  kVoid = 2,     ///< it and its neighbours were seen empty (Equation 14a in docs/method.md)
+  kVoid = 2,     ///< it and what is around it was seen empty (Equation 14a in docs/method.md)
   kHit = 3,      ///< a beam ended in it
 };
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "bki_mapping/core/class_table.h"
+#include "bki_mapping/core/types.h"
 #include "bki_mapping/rules/rules_config.h"
 
 namespace bki_mapping {
@@ -14,8 +15,8 @@ namespace bki_mapping {
 /// whatever kind its evidence is.
 struct ScanRules {
   ScanRules() = default;
-  /// The rules that these settings ask for. Three members are missing: `fixed` and thin_reach, which the
-  /// class table says, and free_threshold, which each scan has for itself.
+  /// The rules that these settings ask for. Three members are missing: `fixed` and thin_reach, which
+  /// follow from the class table, and free_threshold, which each scan has for itself.
   explicit ScanRules(const RulesConfig& rules) {
     if (!rules.enabled) return;
     hits_before_misses = true;
@@ -41,10 +42,10 @@ struct ScanRules {
   /// Added to `free` in voxels that are seen empty with all around them (VoidSearch); needs most_free. 0:
   /// they count as others do.
   float void_evidence = 0.0f;
-  /// A hit above a voxel that is seen empty is one of something thin: no voxel up to this far away from its
-  /// voxel along each axis is void; at most kMostThinReach [voxels]. 0: such hits are as others.
+  /// A hit above a voxel that is seen empty counts as one of something thin: no voxel up to this far away
+  /// from its voxel along each axis is void; at most kMostThinReach [voxels]. 0: such hits are as others.
   int thin_reach = 0;
-  static constexpr int kMostThinReach = 7;
+  static constexpr int kMostThinReach = kBlockEdge - 1;
   bool keeps_looks = false;  ///< note when the scan looked at which voxels (Looks)
   ClassSet fixed;            ///< the classes that cannot move
 
