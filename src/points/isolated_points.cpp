@@ -63,9 +63,9 @@ class Profile {
 };
 
 /// Whether the beams of a strip that end near a slice are enough for a line.
-bool isLine(const Profile& strip, std::uint8_t slice) {
+bool isLine(const Profile& strip, std::uint8_t slice, float strictness) {
   const float least = IsolatedPoints::kOfStrip * strip.reaching(slice);
-  return strip.near(slice) >= std::max(least, IsolatedPoints::kLeastOfStrip);
+  return strip.near(slice) >= strictness * std::max(least, IsolatedPoints::kLeastOfStrip);
 }
 
 }  // namespace
@@ -93,8 +93,8 @@ int IsolatedPoints::sliceOf(float range) {
   return static_cast<int>(std::min<std::uint32_t>((bits >> 17) - (0x40000000u >> 17), kSlices - 1));
 }
 
-void IsolatedPoints::findPlaces(const Eigen::Vector3f* points, std::size_t count, std::uint32_t* cells,
-                                std::uint16_t* keys) const {
+void IsolatedPoints::findPlaces(const Eigen::Vector3f* points, std::size_t count, int farthest,
+                                std::uint32_t* cells, std::uint16_t* keys) const {
   constexpr std::size_t kAtOnce = 64;
   float x[kAtOnce], y[kAtOnce], z[kAtOnce], ranges[kAtOnce], rows[kAtOnce], turns[kAtOnce];
   for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
@@ -114,18 +114,18 @@ void IsolatedPoints::findPlaces(const Eigen::Vector3f* points, std::size_t count
       const auto [cell, half] =
           is_beam ? cells_.placeOf(rows[i], turns[i]) : DirectionCells::Place{kNoCell, 0};
       cells[begin + i] = cell;
-      keys[begin + i] = is_beam ? keyOf(half, sliceOf(ranges[i])) : std::uint16_t{0};
+      keys[begin + i] = is_beam ? keyOf(half, std::min(sliceOf(ranges[i]), farthest)) : std::uint16_t{0};
     }
   }
 }
 
-void IsolatedPoints::sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool) {
+void IsolatedPoints::sortIntoCells(Span<const Eigen::Vector3f> points, int farthest, ThreadPool& pool) {
   const Chunks chunks(points.size());
   cell_of_.resize(points.size());
   key_of_.resize(points.size());
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     const std::size_t begin = chunks.begin(c);
-    findPlaces(points.begin() + begin, chunks.end(c) - begin, cell_of_.data() + begin,
+    findPlaces(points.begin() + begin, chunks.end(c) - begin, farthest, cell_of_.data() + begin,
                key_of_.data() + begin);
   });
   begin_.assign(cells_.size() + 1, 0);
@@ -154,8 +154,8 @@ void IsolatedPoints::makeGroups(std::uint32_t cell) {
     const std::uint16_t key = sorted_keys_[n];
     std::uint16_t& group = known[key];
     if (group == 0) {
-      groups[count] = {static_cast<std::uint8_t>(key / kSlices), static_cast<std::uint8_t>(key % kSlices), 0,
-                       0, 0};
+      groups[count] = {
+          static_cast<std::uint8_t>(key / kSlices), static_cast<std::uint8_t>(key % kSlices), 0, 0, 1, 0};
       group = ++count;
     }
     ++groups[group - 1].beams;
@@ -186,7 +186,8 @@ bool IsolatedPoints::areAllSupported(std::uint32_t cell, const Pass& pass) const
     const Group* const groups = groups_.data() + begin_[cell];
     return std::all_of(groups, groups + group_count_[cell], [&](const Group& group) {
       const std::size_t at = group.slice + kMargin;
-      return !pass.asksFor(group) || static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= enough;
+      return !pass.asksFor(group) ||
+             static_cast<float>(beams[at - 1] + beams[at] + beams[at + 1]) >= group.strictness * enough;
     });
   };
   if (areSupported()) return true;  // by their own row, as most are
@@ -230,8 +231,9 @@ bool IsolatedPoints::compareWithAllAndRow(std::uint32_t cell, const Pass& pass) 
   for (int g = 0; g < group_count_[cell]; ++g) {
     Group& group = groups[g];
     if (!pass.asksFor(group)) continue;
-    const float enough = std::max(kOfSquareRoot * std::sqrt(all.reaching(group.slice)), 1.0f);
-    group.isolated_after = all.near(group.slice) < enough && !isLine(strip, group.slice);
+    const float strictness = group.strictness;
+    const float enough = strictness * std::max(kOfSquareRoot * std::sqrt(all.reaching(group.slice)), 1.0f);
+    group.isolated_after = all.near(group.slice) < enough && !isLine(strip, group.slice, strictness);
     any |= group.isolated_after != 0;
   }
   return any;
@@ -268,35 +270,95 @@ void IsolatedPoints::compareWithColumns(std::uint32_t cell, const Pass& pass) {
   for (Profile& strip : strips) strip.accumulate();
   Group* const groups = groups_.data() + begin_[cell];
   for (int g = 0; g < group_count_[cell]; ++g) {
-    if (pass.asksFor(groups[g]) && isLine(strips[groups[g].half], groups[g].slice))
+    if (pass.asksFor(groups[g]) && isLine(strips[groups[g].half], groups[g].slice, groups[g].strictness))
       groups[g].isolated_after = 0;
   }
+}
+
+bool IsolatedPoints::isClear(std::uint32_t cell, const Pass& pass, std::uint32_t isolated) const {
+  // It is where enough beams end in the slices that all of its groups ask about, if there are any.
+  const auto [nearest, farthest] = slicesOf(cell, {pass.last_slice, false});
+  const int first_common = farthest - kNearer, last_common = nearest + kFarther;
+  const DirectionCells::Row own = cells_.rowOf(cell);
+  std::uint32_t ends = 0;
+  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row& row) {
+    if (row.begin != own.begin) return;
+    for (std::uint32_t c = first; c <= last; ++c) {
+      const Group* const groups = groups_.data() + begin_[c];
+      for (int g = 0; g < group_count_[c]; ++g) {
+        if (groups[g].slice >= first_common && groups[g].slice <= last_common) ends += groups[g].beams;
+      }
+    }
+  });
+  return static_cast<float>(isolated) < kClear * static_cast<float>(ends);
+}
+
+bool IsolatedPoints::findStrictness(std::uint32_t cell, const Pass& pass) {
+  // Sums over the slices before each, from -kNearer on.
+  std::array<std::uint32_t, kSlices + kNearer + kFarther + 2> all, isolated;
+  const auto [nearest, farthest] = slicesOf(cell, {pass.last_slice, false});
+  const auto from = static_cast<std::size_t>(nearest),
+             to = static_cast<std::size_t>(farthest) + kNearer + kFarther + 1;
+  all.fill(0);
+  isolated.fill(0);
+  cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
+    for (std::uint32_t c = first; c <= last; ++c) {
+      const Group* const groups = groups_.data() + begin_[c];
+      for (int g = 0; g < group_count_[c]; ++g) {
+        const std::size_t at = std::clamp(std::size_t{groups[g].slice} + kNearer + 1, from, to + 1);
+        all[at] += groups[g].beams;
+        isolated[at] += groups[g].isolated ? groups[g].beams : 0;
+      }
+    }
+  });
+  for (std::size_t at = from; at < to; ++at) {
+    all[at + 1] += all[at];
+    isolated[at + 1] += isolated[at];
+  }
+  bool any = false;
+  Group* const groups = groups_.data() + begin_[cell];
+  for (int g = 0; g < group_count_[cell]; ++g) {
+    if (groups[g].slice >= pass.last_slice) continue;
+    const std::size_t before = groups[g].slice, last = before + kNearer + kFarther + 1;
+    const auto found = static_cast<float>(isolated[last] - isolated[before]);
+    const auto ends = static_cast<float>(all[last] - all[before]);
+    groups[g].strictness = (found < kClear * ends ? 0u : found > kThick * ends ? kInThick : 1u) & 3u;
+    any |= groups[g].strictness != 0;
+  }
+  return any;
 }
 
 void IsolatedPoints::decide(std::uint32_t cell, const Pass& pass) {
   Group* const groups = groups_.data() + begin_[cell];
   Group* const end = groups + group_count_[cell];
-  if (std::none_of(groups, end, [&](const Group& group) { return pass.asksFor(group); })) return;
+  const auto isNear = [&](const Group& group) { return group.slice < pass.last_slice; };
+  if (std::none_of(groups, end, isNear)) return;
   if (pass.second) {  // where no support is gone, the first pass has decided
-    bool any = false;
+    std::uint32_t isolated = 0;
     cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
-      for (std::uint32_t c = first; c <= last; ++c) any |= any_isolated_[c] != 0;
+      for (std::uint32_t c = first; c <= last; ++c) isolated += isolated_in_[c];
     });
-    if (!any) return;
+    if (isolated == 0) return;
+    if (isClear(cell, pass, isolated)) {
+      for (Group* group = groups; group != end; ++group) group->strictness = 0;
+      return;
+    }
+    if (!findStrictness(cell, pass)) return;
   }
+  if (std::none_of(groups, end, [&](const Group& group) { return pass.asksFor(group); })) return;
   if (areAllSupported(cell, pass)) return;
   if (compareWithAllAndRow(cell, pass)) compareWithColumns(cell, pass);
   if (pass.second) return;
   for (Group* group = groups; group != end; ++group) {
     group->isolated = group->isolated_after;
-    any_isolated_[cell] |= group->isolated;
+    if (group->isolated) isolated_in_[cell] += group->beams;
   }
 }
 
 void IsolatedPoints::markPoints(std::uint32_t cell) {
   const Group* const groups = groups_.data() + begin_[cell];
   for (int g = 0; g < group_count_[cell]; ++g) {
-    if (!groups[g].isolated && !groups[g].isolated_after) continue;
+    if (groups[g].strictness == 0 || !groups[g].isolated_after) continue;
     for (std::uint32_t n = begin_[cell]; n < begin_[cell + 1]; ++n) {
       if (sorted_keys_[n] == keyOf(groups[g].half, groups[g].slice)) isolated_[point_of_[n]] = 1;
     }
@@ -305,12 +367,12 @@ void IsolatedPoints::markPoints(std::uint32_t cell) {
 
 const std::vector<std::uint8_t>& IsolatedPoints::find(Span<const Eigen::Vector3f> points, float within,
                                                       ThreadPool& pool) {
-  sortIntoCells(points, pool);
+  const int last_slice = sliceOf(within);
+  sortIntoCells(points, std::min(last_slice + kFarther, kSlices - 1), pool);
   groups_.resize(point_of_.size());
   group_count_.resize(cells_.size());
-  any_isolated_.assign(cells_.size(), 0);
+  isolated_in_.assign(cells_.size(), 0);
   isolated_.assign(points.size(), 0);
-  const int last_slice = sliceOf(within);
   const auto forEachCell = [&](auto&& visit) {
     constexpr std::size_t kParts = 64;
     pool.forEach(kParts, [&](std::size_t part, std::size_t) {

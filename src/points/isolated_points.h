@@ -101,31 +101,47 @@ class IsolatedPoints {
   /// rows, those up to one half of a column away.
   static constexpr float kOfStrip = 0.15f, kLeastOfStrip = 3.0f;
   /// With fewer beams around, whatever their range, nothing is isolated.
-  static constexpr std::uint32_t kFewestAround = 10;
+  static constexpr std::uint32_t kFewestAround = 3;
+
+  /// The second pass asks how many of the beams that end about there or nearer, in the slices from so many
+  /// before to so many behind that of the point, the first one found isolated.
+  static constexpr int kNearer = 40, kFarther = 2;
+  static constexpr float kClear = 0.15f;  ///< if it is a smaller part, nothing is isolated after all
+  static constexpr float kThick = 0.3f;   ///< if it is a larger one, `kInThick` times as many must end near
+  static constexpr std::uint8_t kInThick = 3;
+  static_assert(kInThick <= 3, "Group::strictness has two bits");
 
  private:
   /// The beams of half a cell that end in the same slice.
   struct Group {
     std::uint8_t half, slice;
-    std::uint8_t isolated, isolated_after;  ///< after the first pass, and after both
+    std::uint8_t isolated;            ///< after the first pass; other threads read it during the second
+    std::uint8_t isolated_after : 1;  ///< in either pass, which says nothing where the strictness is 0
+    std::uint8_t strictness : 2;      ///< what must end near it, as a multiple
     std::uint32_t beams;
   };
   /// The half of its cell and the slice of a beam: those of a Group.
   static std::uint16_t keyOf(std::uint8_t half, int slice) {
     return static_cast<std::uint16_t>(half * kSlices + slice);
   }
-  void findPlaces(const Eigen::Vector3f* points, std::size_t count, std::uint32_t* cells,
+  /// Finds cells and keys. Slices from `farthest` on are one, since nothing asks how far such beams reach.
+  void findPlaces(const Eigen::Vector3f* points, std::size_t count, int farthest, std::uint32_t* cells,
                   std::uint16_t* keys) const;
-  void sortIntoCells(Span<const Eigen::Vector3f> points, ThreadPool& pool);
+  void sortIntoCells(Span<const Eigen::Vector3f> points, int farthest, ThreadPool& pool);
   void makeGroups(std::uint32_t cell);
-  /// The first pass asks for the support of all groups, the second one for that of those that are not
-  /// isolated after the first.
+  /// The first pass asks for the support of all groups; the second one for that of those that are not
+  /// isolated after the first, by those that are not.
   struct Pass {
     int last_slice;  ///< groups from it on are not isolated
     bool second;
     bool asksFor(const Group& group) const { return group.slice < last_slice && !(second && group.isolated); }
     std::uint32_t supportOf(const Group& group) const { return second && group.isolated ? 0 : group.beams; }
   };
+  /// Sets the strictness of the second pass. @return whether that of any group is above 0.
+  bool findStrictness(std::uint32_t cell, const Pass& pass);
+  /// Whether the beams of its row alone show that nothing in a cell is isolated after all.
+  /// @param isolated number of beams around that the first pass found.
+  bool isClear(std::uint32_t cell, const Pass& pass, std::uint32_t isolated) const;
   /// Decides about the groups of a cell.
   void decide(std::uint32_t cell, const Pass& pass);
   // Parts of decide(), by what they take: the first one decides about most cells.
@@ -136,7 +152,7 @@ class IsolatedPoints {
   bool compareWithAllAndRow(std::uint32_t cell, const Pass& pass);
   /// Of these, keeps those that the beams of their column do not support either.
   void compareWithColumns(std::uint32_t cell, const Pass& pass);
-  /// The first and the last slice of the groups of a cell for which a pass asks.
+  /// The first and the last slice of the groups of a cell for which a pass asks, of which there is one.
   std::array<int, 2> slicesOf(std::uint32_t cell, const Pass& pass) const;
   void markPoints(std::uint32_t cell);
 
@@ -148,7 +164,7 @@ class IsolatedPoints {
   std::vector<std::uint16_t> sorted_keys_;  ///< of each beam, by cell
   std::vector<Group> groups_;               ///< of each cell, from its `begin_` on
   std::vector<std::uint16_t> group_count_;  ///< of each cell
-  std::vector<std::uint8_t> any_isolated_;  ///< in each cell
+  std::vector<std::uint32_t> isolated_in_;  ///< beams of each cell that the first pass found
   std::vector<std::uint8_t> isolated_;      ///< of each point
 };
 

@@ -52,7 +52,7 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           Changes::kWhileMapping,
           "Up to which distance from the sensor a hit near which few other beams end is a raindrop, a "
           "snowflake, fog or dust: it occupies nothing, and its beam clears up to it. Hits of ground are "
-          "none. Set it to 15 in rain and snow, more in fog; a scan then takes up to a third more time. 0 "
+          "none. Set it to 15 in rain and snow, 30 in fog; a scan then takes up to half as long again. 0 "
           "lets "
           "all hits count."),
       truthParameter(

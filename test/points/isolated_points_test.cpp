@@ -81,6 +81,38 @@ TEST(IsolatedPoints, EqualAComparisonOfEachWithEach) {
   EXPECT_GT(others, 500u);
 }
 
+TEST(IsolatedPoints, EqualAComparisonOfEachWithEachAmongDenseBeams) {
+  // A part of a scan with 64 rows: a hedge 5 m away that beams pass, air that is thick or not, a wall.
+  std::mt19937 random(10);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::size_t found = 0, behind = 0;
+  for (const double particles : {0.02, 0.1, 0.3, 0.6}) {
+    PointList points;
+    std::vector<bool> is_behind;
+    for (double elevation = -8.0; elevation < 6.0; elevation += 0.5) {
+      for (double azimuth = 0.0; azimuth < 24.0; azimuth += 0.2) {
+        const bool passes = unit(random) < 0.1;
+        double range = azimuth < 10.0 ? (passes ? 5.0 + 2.0 * unit(random) : 5.0) : 12.0;
+        is_behind.push_back(range > 5.0 && azimuth < 10.0);
+        if (unit(random) < particles) {
+          range = 1.5 + 8.0 * unit(random);
+          is_behind.back() = false;
+        }
+        points.push_back(beam(azimuth * kDegree, elevation * kDegree, range));
+      }
+    }
+    const std::vector<bool> expected = reference::isolatedPoints(points, 15.0);
+    const std::vector<std::uint8_t> isolated = isolatedOf(points);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_EQ(isolated[i] != 0, expected[i]) << particles << ", " << points[i].transpose();
+      behind += is_behind[i] && !isolated[i];
+    }
+    found += countIn(isolated);
+  }
+  EXPECT_GT(found, 1000u);
+  EXPECT_GT(behind, 200u);
+}
+
 TEST(IsolatedPoints, DependOnNeitherThreadsNorOrder) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -118,6 +150,47 @@ TEST(IsolatedPoints, AreFlakesBeforeAWall) {
   }
 }
 
+TEST(IsolatedPoints, AreParticlesInThickFogBetweenTheThingsThere) {
+  // Two thirds of the beams end in the fog; there is a post of 50 cm 5 m away.
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (const int rows : {16, 64}) {
+    std::vector<bool> is_fog, is_post;
+    const PointList points = scanOf(rows, -15.0, 15.0, 1800, [&](double azimuth, double, double wall) {
+      is_post.push_back(std::abs(azimuth - 2.0) < 0.05);
+      const double range = 1.5 + 8.0 * unit(random), end = is_post.back() ? 5.0 : wall;
+      is_fog.push_back(unit(random) < 0.67 && range < end);
+      if (is_fog.back()) is_post.back() = false;
+      return is_fog.back() ? range : end;
+    });
+    const std::vector<std::uint8_t> isolated = isolatedOf(points);
+    std::size_t fog = 0, found = 0, post = 0, lost = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      fog += is_fog[i], found += is_fog[i] && isolated[i];
+      post += is_post[i], lost += is_post[i] && isolated[i];
+    }
+    EXPECT_GT(found, fog * 99 / 100) << rows << " rows";
+    EXPECT_GT(post, 20u) << rows << " rows";
+    EXPECT_LT(lost, post / 10) << rows << " rows";
+  }
+}
+
+TEST(IsolatedPoints, AreNotThosePointsThatABeamMeetsBehindSomething) {
+  // One beam in fifty passes a hedge 5 m away, and ends up to 2 m behind its face.
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto behind = [&](double azimuth, double, double wall) {
+    if (azimuth > 1.0) return wall;
+    return unit(random) < 0.02 ? 5.0 + 2.0 * unit(random) : 5.0;
+  };
+  EXPECT_EQ(countIn(isolatedOf(scanOf(64, -15.0, 15.0, 1800, behind))), 0u);
+  // Before a wall, they are.
+  const auto before = [&](double azimuth, double, double wall) {
+    return azimuth < 1.0 && unit(random) < 0.02 ? wall - 1.5 - 2.0 * unit(random) : wall;
+  };
+  EXPECT_GT(countIn(isolatedOf(scanOf(64, -15.0, 15.0, 1800, before))), 300u);
+}
+
 TEST(IsolatedPoints, AreNoPoleNoWireAndNoBar) {
   // 16 rows, 1800 columns: a pole 2.4 cm thick, and a bar as thick, 3 m away.
   const double half = std::atan(0.012 / 3.0);
@@ -142,6 +215,10 @@ TEST(IsolatedPoints, AreOnlyThoseWithinTheDistanceAndAmongOthers) {
   EXPECT_EQ(countIn(isolatedOf(flakeAt(4.0), 3.5f)), 0u);
   EXPECT_EQ(countIn(isolatedOf(flakeAt(9.0), 8.0f)), 0u);
   EXPECT_EQ(countIn(isolatedOf({{3, 0, 0}, {3, 1, 0}, {0, 5, 1}})), 0u) << "too few to tell";
+  PointList few = {beam(0, 0, 3), beam(0.01, 0, 9), beam(0.01, 0.01, 9.05), beam(0, 0.01, 9.1)};
+  EXPECT_EQ(isolatedOf(few), (std::vector<std::uint8_t>{1, 0, 0, 0})) << "three others are enough";
+  few.pop_back();
+  EXPECT_EQ(countIn(isolatedOf(few)), 0u) << "two are not";
   EXPECT_TRUE(isolatedOf({}).empty());
 }
 

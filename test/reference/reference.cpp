@@ -113,6 +113,7 @@ std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, dou
     const std::vector<bool> before = isolated;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!isBeam(i) || slices[i] >= IsolatedPoints::sliceOf(static_cast<float>(within))) continue;
+      int ends = 0, found = 0;  // about its range: all, isolated
       int beams = 0, around = 0, near = 0, in_row[2] = {0, 0}, in_column[2] = {0, 0};  // all, near
       for (std::size_t j = 0; j < points.size(); ++j) {
         if (j == i || !isBeam(j)) continue;
@@ -124,17 +125,24 @@ std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, dou
         if (std::abs(there.row - here.row) > 2 || (aside > 2 && !whole)) continue;
         const bool counts = std::abs(slices[j] - slices[i]) <= 1 && !before[j];
         ++beams;
+        if (slices[j] >= slices[i] - 40 && slices[j] <= slices[i] + 2) ++ends, found += before[j];
         if (slices[j] < slices[i] - 2) continue;
         ++around;
         near += counts;
         if (there.row == here.row) ++in_row[0], in_row[1] += counts;
         if (halves <= 1) ++in_column[0], in_column[1] += counts;
       }
-      const auto isLine = [](const int(&strip)[2]) {
-        return strip[1] >= std::max(static_cast<double>(0.15f) * strip[0], 3.0);
+      if (before[i]) ++found;
+      ++ends;
+      double strictness = 1.0;
+      if (pass == 1 && static_cast<float>(found) < 0.15f * static_cast<float>(ends)) strictness = 0.0;
+      if (pass == 1 && static_cast<float>(found) > 0.3f * static_cast<float>(ends)) strictness = 3.0;
+      const auto isLine = [strictness](const int(&strip)[2]) {
+        return strip[1] >= strictness * std::max(0.15f * static_cast<float>(strip[0]), 3.0f);
       };
-      isolated[i] = before[i] || (beams >= 10 && near < std::max(std::sqrt(around), 1.0) && !isLine(in_row) &&
-                                  !isLine(in_column));
+      isolated[i] = strictness > 0.0 &&
+                    (before[i] || (beams >= 3 && near < strictness * std::max(std::sqrt(around), 1.0) &&
+                                   !isLine(in_row) && !isLine(in_column)));
     }
   }
   return isolated;
