@@ -295,10 +295,10 @@ bool IsolatedPoints::isClear(std::uint32_t cell, const Pass& pass, std::uint32_t
 
 bool IsolatedPoints::findStrictness(std::uint32_t cell, const Pass& pass) {
   // Sums over the slices before each, from -kNearer on.
-  std::array<std::uint32_t, kSlices + kNearer + kFarther + 2> all, isolated;
+  std::array<std::uint32_t, kSlices + kNearer + kBehind + 2> all, isolated;
   const auto [nearest, farthest] = slicesOf(cell, {pass.last_slice, false});
   const auto from = static_cast<std::size_t>(nearest),
-             to = static_cast<std::size_t>(farthest) + kNearer + kFarther + 1;
+             to = static_cast<std::size_t>(farthest) + kNearer + kBehind + 1;
   all.fill(0);
   isolated.fill(0);
   cells_.visitAround(cell, [&](std::uint32_t first, std::uint32_t last, const DirectionCells::Row&) {
@@ -319,10 +319,16 @@ bool IsolatedPoints::findStrictness(std::uint32_t cell, const Pass& pass) {
   Group* const groups = groups_.data() + begin_[cell];
   for (int g = 0; g < group_count_[cell]; ++g) {
     if (groups[g].slice >= pass.last_slice) continue;
-    const std::size_t before = groups[g].slice, last = before + kNearer + kFarther + 1;
-    const auto found = static_cast<float>(isolated[last] - isolated[before]);
-    const auto ends = static_cast<float>(all[last] - all[before]);
-    groups[g].strictness = (found < kClear * ends ? 0u : found > kThick * ends ? kInThick : 1u) & 3u;
+    const auto number = [s = std::size_t{groups[g].slice} + kNearer](const auto& sums, int first, int last) {
+      return static_cast<float>(sums[s + static_cast<std::size_t>(last) + 1] -
+                                sums[static_cast<std::size_t>(static_cast<int>(s) + first)]);
+    };
+    const float ends = number(all, -kNearer, kFarther), found = number(isolated, -kNearer, kFarther);
+    const float elsewhere =
+        3.0f * (number(isolated, -kNearer, kBehind) - number(isolated, -2, 2)) / (kNearer + kBehind - 4);
+    const bool are_together = number(all, -1, 1) - 1.0f >= kTogether + kTimesElsewhere * elsewhere;
+    const bool is_there = found < kClear * ends || are_together;
+    groups[g].strictness = (is_there ? 0u : found > kThick * ends ? kInThick : 1u) & 3u;
     any |= groups[g].strictness != 0;
   }
   return any;

@@ -79,8 +79,8 @@ class DirectionCells {
   std::vector<std::uint8_t> row_of_;                 ///< of each cell
 };
 
-/// Finds isolated points, Equation 3b in docs/method.md. The result depends on the set of the points alone.
-/// Keeps its memory from scan to scan.
+/// Finds isolated points, Equations 3b and 3c in docs/method.md. The result depends on the set of the points
+/// alone. Keeps its memory from scan to scan.
 class IsolatedPoints {
  public:
   /// @param points relative to the sensor [m]; those that are not finite, or at the sensor, are no beams.
@@ -110,6 +110,12 @@ class IsolatedPoints {
   static constexpr float kThick = 0.3f;   ///< if it is a larger one, `kInThick` times as many must end near
   static constexpr std::uint8_t kInThick = 3;
   static_assert(kInThick <= 3, "Group::strictness has two bits");
+  /// Nor is a point isolated if so many others end near it, isolated ones among them, and besides
+  /// `kTimesElsewhere` times as many as of the isolated ones in as many slices elsewhere, on average: those
+  /// from kNearer before to kBehind behind its own, but for the two on either side. Slanted wires are such
+  /// points.
+  static constexpr float kTogether = 4.0f, kTimesElsewhere = 6.0f;
+  static constexpr int kBehind = 20;
 
  private:
   /// The beams of half a cell that end in the same slice.

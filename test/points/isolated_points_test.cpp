@@ -206,6 +206,28 @@ TEST(IsolatedPoints, AreNoPoleNoWireAndNoBar) {
   EXPECT_EQ(countIn(isolatedOf(scanOf(16, -15.0, 15.0, 1800, bar))), 0u);
 }
 
+TEST(IsolatedPoints, AreNoSlantedWire) {
+  // 2.4 cm thick, before the wall at x = 5 m, at a slope of 30 degrees; in clear air, and among flakes.
+  for (const double flakes : {0.0, 0.02}) {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    std::vector<bool> is_wire;
+    const PointList points = scanOf(64, -24.8, 2.0, 1800, [&](double azimuth, double elevation, double wall) {
+      const double x = 5.0, y = x * std::tan(azimuth), z = std::hypot(x, y) * std::tan(elevation);
+      const double aside = std::abs(z + 0.8 - y * std::tan(30.0 * kDegree)) * std::cos(30.0 * kDegree);
+      const bool ahead = std::cos(azimuth) > 0.3 && std::abs(y) < 1.0;
+      is_wire.push_back(ahead && aside < 0.012);
+      if (is_wire.back()) return Eigen::Vector3d(x, y, z).norm();
+      return unit(random) < flakes ? 1.5 + 7.0 * unit(random) : wall;
+    });
+    const std::vector<std::uint8_t> isolated = isolatedOf(points);
+    std::size_t wire = 0, lost = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) wire += is_wire[i], lost += is_wire[i] && isolated[i];
+    EXPECT_GT(wire, 50u);
+    EXPECT_LE(lost, wire / 20) << flakes;
+  }
+}
+
 TEST(IsolatedPoints, AreOnlyThoseWithinTheDistanceAndAmongOthers) {
   const auto flakeAt = [](double range) {
     return scanOf(16, -15.0, 15.0, 900,

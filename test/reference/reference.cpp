@@ -113,7 +113,7 @@ std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, dou
     const std::vector<bool> before = isolated;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!isBeam(i) || slices[i] >= IsolatedPoints::sliceOf(static_cast<float>(within))) continue;
-      int ends = 0, found = 0;  // about its range: all, isolated
+      int ends = 0, found = 0, together = 0, elsewhere = 0;                            // about its range
       int beams = 0, around = 0, near = 0, in_row[2] = {0, 0}, in_column[2] = {0, 0};  // all, near
       for (std::size_t j = 0; j < points.size(); ++j) {
         if (j == i || !isBeam(j)) continue;
@@ -125,7 +125,10 @@ std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, dou
         if (std::abs(there.row - here.row) > 2 || (aside > 2 && !whole)) continue;
         const bool counts = std::abs(slices[j] - slices[i]) <= 1 && !before[j];
         ++beams;
-        if (slices[j] >= slices[i] - 40 && slices[j] <= slices[i] + 2) ++ends, found += before[j];
+        const int deeper = slices[j] - slices[i];
+        if (deeper >= -40 && deeper <= 2) ++ends, found += before[j];
+        if (std::abs(deeper) <= 1) ++together;
+        if (std::abs(deeper) > 2 && deeper >= -40 && deeper <= 20) elsewhere += before[j];
         if (slices[j] < slices[i] - 2) continue;
         ++around;
         near += counts;
@@ -137,6 +140,8 @@ std::vector<bool> isolatedPoints(const std::vector<Eigen::Vector3f>& points, dou
       double strictness = 1.0;
       if (pass == 1 && static_cast<float>(found) < 0.15f * static_cast<float>(ends)) strictness = 0.0;
       if (pass == 1 && static_cast<float>(found) > 0.3f * static_cast<float>(ends)) strictness = 3.0;
+      const float by_chance = 3.0f * static_cast<float>(elsewhere) / 56.0f;
+      if (pass == 1 && static_cast<float>(together) >= 4.0f + 6.0f * by_chance) strictness = 0.0;
       const auto isLine = [strictness](const int(&strip)[2]) {
         return strip[1] >= strictness * std::max(0.15f * static_cast<float>(strip[0]), 3.0f);
       };
