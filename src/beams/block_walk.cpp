@@ -12,84 +12,101 @@ namespace {
 /// Larger boxes would take too much memory for marks [blocks].
 constexpr double kMostMarks = 1 << 27;
 
-/// A straight piece of a beam.
-struct Segment {
-  Eigen::Vector3d from, to;
+/// Beams that run nearly alike make a bundle, a pyramid with its tip in the sensor, which takes hardly longer
+/// to walk than one of them. It is at most so wide [blocks]: the narrower, the fewer blocks are listed that
+/// no beam reaches, and the more bundles there are.
+constexpr double kWidest = 0.2;
+
+/// Pieces of beams that run nearly alike. Lengths are in blocks.
+struct Bundle {
+  int main;           ///< the axis along which they run most
+  bool down;          ///< against it
+  double begin, end;  ///< of the pieces along the main axis, from the sensor
+  double low[2],
+      high[2];  ///< slopes of the outermost beams along the side axes, by distance along the main one
+
+  int sideAxis(int side) const { return (main + 1 + side) % 3; }
 };
 
-Segment segmentOf(const Beams& beams, std::size_t b, const BeamPiece& piece) {
-  const Eigen::Vector3d end = beams.ends[b].cast<double>();
-  if (!piece.shadow) return {beams.origin, beams.origin + end};
-  return {beams.origin + end, beams.origin + end * (piece.shadow_range / end.norm())};
-}
-
-/// Block coordinates in fixed point with 32 fractional bits, whose sums and floors are cheap and exact.
-using Fixed = std::int64_t;
-constexpr Fixed kOneBlock = Fixed{1} << 32;
-
-Fixed toFixed(double blocks) {
-  return static_cast<Fixed>(blocks * 0x1.0p32);
-}
-int floorOf(Fixed blocks) {
-  return static_cast<int>(blocks >> 32);
-}
-
-/// The extent of a segment on one of its two side axes, from slab to slab of its main axis. A slab is one
-/// block thick.
-struct SideWalk {
-  SideWalk(double at_first, double slope, double margin)
-      : step(toFixed(slope)),
-        low(toFixed(at_first + std::min(slope, 0.0) - margin * (1.0 + std::abs(slope)))),
-        high(toFixed(at_first + std::max(slope, 0.0) + margin * (1.0 + std::abs(slope)))) {}
-  void advance() {
-    low += step;
-    high += step;
+/// A bundle of one beam. @param end relative to the sensor [m].
+Bundle bundleOf(const Eigen::Vector3f& end, const BeamPiece& piece, double per_metre) {
+  const float x = std::abs(end.x()), y = std::abs(end.y()), z = std::abs(end.z());
+  const int main = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
+  const double along = std::abs(static_cast<double>(end[main])), inverse = along > 0.0 ? 1.0 / along : 0.0;
+  Bundle bundle = {main, end[main] < 0.0f, 0.0, along * per_metre, {}, {}};
+  for (int side = 0; side < 2; ++side) {
+    bundle.low[side] = bundle.high[side] = static_cast<double>(end[bundle.sideAxis(side)]) * inverse;
   }
-  /// Whether the extent, which is the same in all slabs, reaches two blocks at most.
-  bool isNarrow() const { return high - low < kOneBlock; }
-
-  Fixed step, low, high;  ///< low to high: the extent of the segment in the slab, with the margin
-};
-
-/// The slabs of a segment, `first` to `last`, and its extent in the first of them.
-struct SlabWalk {
-  int main, side1, side2;  ///< axes
-  int first, last;
-  SideWalk walk1, walk2;
-};
-
-/// The blocks that have a voxel centre within `reach` of a segment, and some around those.
-SlabWalk slabsAlong(const GridGeometry& geometry, const Segment& segment, double reach) {
-  // In units of blocks. Voxel centres are at least half a voxel from the block's faces.
-  const double per_metre = 1.0 / geometry.blockSize();
-  const double margin = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-6;
-  const Eigen::Vector3d a = segment.from * per_metre, d = (segment.to - segment.from) * per_metre;
-  int main = 0;
-  d.cwiseAbs().maxCoeff(&main);
-  const int side1 = (main + 1) % 3, side2 = (main + 2) % 3;
-  const double inverse = d[main] != 0.0 ? 1.0 / d[main] : 0.0;
-  const int first = floorToInt(std::min(a[main], a[main] + d[main]) - margin),
-            last = floorToInt(std::max(a[main], a[main] + d[main]) + margin);
-  const double slope1 = d[side1] * inverse, slope2 = d[side2] * inverse, to_first = first - a[main];
-  return {main,
-          side1,
-          side2,
-          first,
-          last,
-          {a[side1] + to_first * slope1, slope1, margin},
-          {a[side2] + to_first * slope2, slope2, margin}};
+  if (!piece.shadow) return bundle;
+  const double to = bundle.end * (piece.shadow_range / end.cast<double>().norm());
+  bundle.begin = std::min(bundle.end, to);
+  bundle.end = std::max(bundle.end, to);
+  return bundle;
 }
 
-/// Calls visit(x, y, z) for the blocks of a walk.
+/// Adds a beam to a bundle unless that would make it too wide.
+bool join(const Bundle& beam, Bundle& to) {
+  if (beam.main != to.main || beam.down != to.down || std::abs(beam.begin - to.begin) > 1.0) return false;
+  Bundle joined = to;
+  joined.begin = std::min(to.begin, beam.begin);
+  joined.end = std::max(to.end, beam.end);
+  for (int side = 0; side < 2; ++side) {
+    joined.low[side] = std::min(to.low[side], beam.low[side]);
+    joined.high[side] = std::max(to.high[side], beam.high[side]);
+    if ((joined.high[side] - joined.low[side]) * joined.end > kWidest) return false;
+  }
+  to = joined;
+  return true;
+}
+
+/// Calls visit(bundle, beam) for bundles of the beams `first` to `last` - 1. @param beam the last of a
+/// bundle.
 template <typename Visit>
-void forEachBlockOf(SlabWalk walk, Visit&& visit) {
-  int block[3];
-  int &main = block[walk.main], &side1 = block[walk.side1], &side2 = block[walk.side2];
-  for (main = walk.first; main <= walk.last; ++main, walk.walk1.advance(), walk.walk2.advance()) {
-    const int last1 = floorOf(walk.walk1.high), last2 = floorOf(walk.walk2.high);
-    for (side1 = floorOf(walk.walk1.low); side1 <= last1; ++side1) {
-      for (side2 = floorOf(walk.walk2.low); side2 <= last2; ++side2) visit(block[0], block[1], block[2]);
+void forEachBundle(const Beams& beams, std::size_t first, std::size_t last, const BeamPiece& piece,
+                   double per_metre, Visit&& visit) {
+  if (first == last) return;
+  Bundle bundle = bundleOf(beams.ends[first], piece, per_metre);
+  for (std::size_t b = first + 1; b < last; ++b) {
+    const Bundle beam = bundleOf(beams.ends[b], piece, per_metre);
+    if (join(beam, bundle)) continue;
+    visit(bundle, b - 1);
+    bundle = beam;
+  }
+  visit(bundle, last - 1);
+}
+
+/// The blocks of a slab of a bundle, one block thick: those at `main` along its main axis, and from low to
+/// high along each side axis.
+struct Slab {
+  int main, low[2], high[2];
+};
+
+/// Calls visit(slab) for the blocks that have a voxel centre within reach of a bundle, and some around those.
+/// @param origin of the beams, from the corner of a box that holds them all. @param margin reach from a
+/// block's faces.
+template <typename Visit>
+[[gnu::always_inline]] inline void forEachSlab(const Bundle& bundle, const Eigen::Vector3d& origin,
+                                               double margin, Visit&& visit) {
+  const double at = origin[bundle.main], end = bundle.end + margin;
+  Slab slab;
+  slab.main = static_cast<int>(bundle.down ? at - bundle.begin + margin : at + bundle.begin - margin);
+  double low[2], high[2];  // of the bundle, if it had no slope
+  for (int side = 0; side < 2; ++side) {
+    const double room = margin * (1.0 + std::max(std::abs(bundle.low[side]), std::abs(bundle.high[side])));
+    low[side] = origin[bundle.sideAxis(side)] - room;
+    high[side] = origin[bundle.sideAxis(side)] + room;
+  }
+  // The slab's near face, from the sensor.
+  for (double near = bundle.down ? at - slab.main - 1.0 : slab.main - at; near <= end; near += 1.0) {
+    const double from = std::min(std::max(near, bundle.begin), bundle.end),
+                 to = std::min(std::max(near + 1.0, bundle.begin), bundle.end);
+    for (int side = 0; side < 2; ++side) {  // coordinates in the box are not negative
+      slab.low[side] = static_cast<int>(low[side] + std::min(from * bundle.low[side], to * bundle.low[side]));
+      slab.high[side] =
+          static_cast<int>(high[side] + std::max(from * bundle.high[side], to * bundle.high[side]));
     }
+    visit(slab);
+    slab.main += bundle.down ? -1 : 1;
   }
 }
 
@@ -101,38 +118,33 @@ void set(std::uint8_t& mark) {
   __atomic_store_n(&mark, std::uint8_t{1}, __ATOMIC_RELAXED);
 }
 
-/// Where the mark of a block is: origin + x stride[0] + y stride[1] + z stride[2].
-struct MarkLayout {
-  std::ptrdiff_t origin, stride[3];
-};
-
-/// Marks the blocks of a walk. Most beams reach two blocks at most along each side axis of a slab. Then a
+/// Marks the blocks of a bundle. In most slabs it reaches two blocks at most along each side axis. Then a
 /// slab is four marks, some of them the same, without a loop whose end the processor would have to guess; and
 /// nearly always other beams have set all four.
-void markBlocks(SlabWalk walk, const MarkLayout& layout, std::uint8_t* marks) {
-  const std::ptrdiff_t(&stride)[3] = layout.stride;
-  if (!walk.walk1.isNarrow() || !walk.walk2.isNarrow()) {
-    forEachBlockOf(walk, [&](int x, int y, int z) {
-      // Reading first avoids taking the mark's cache line from other threads.
-      std::uint8_t& mark = marks[layout.origin + x * stride[0] + y * stride[1] + z * stride[2]];
-      if (!isMarked(mark)) set(mark);
-    });
-    return;
-  }
-  const std::ptrdiff_t stride1 = stride[walk.side1], stride2 = stride[walk.side2];
-  std::ptrdiff_t slab = layout.origin + walk.first * stride[walk.main];
-  for (int n = walk.first; n <= walk.last; ++n, slab += stride[walk.main]) {
-    const std::ptrdiff_t low = slab + floorOf(walk.walk1.low) * stride1,
-                         high = slab + floorOf(walk.walk1.high) * stride1,
-                         low2 = floorOf(walk.walk2.low) * stride2, high2 = floorOf(walk.walk2.high) * stride2;
-    std::uint8_t* const four[4] = {marks + (low + low2), marks + (low + high2), marks + (high + low2),
-                                   marks + (high + high2)};
-    if (!(isMarked(*four[0]) & isMarked(*four[1]) & isMarked(*four[2]) & isMarked(*four[3]))) {
-      for (std::uint8_t* const mark : four) set(*mark);
+/// @param strides from mark to mark along each axis.
+void markBlocks(const Bundle& bundle, const Eigen::Vector3d& origin, double margin,
+                const std::ptrdiff_t (&strides)[3], std::uint8_t* marks) {
+  const std::ptrdiff_t main = strides[bundle.main], side0 = strides[bundle.sideAxis(0)],
+                       side1 = strides[bundle.sideAxis(1)];
+  forEachSlab(bundle, origin, margin, [&](const Slab& slab) {
+    std::uint8_t* const first = marks + slab.main * main;
+    if ((slab.high[0] - slab.low[0] <= 1) & (slab.high[1] - slab.low[1] <= 1)) {
+      std::uint8_t *const low = first + slab.low[0] * side0, *const high = first + slab.high[0] * side0;
+      std::uint8_t* const four[4] = {low + slab.low[1] * side1, low + slab.high[1] * side1,
+                                     high + slab.low[1] * side1, high + slab.high[1] * side1};
+      if (!(isMarked(*four[0]) & isMarked(*four[1]) & isMarked(*four[2]) & isMarked(*four[3]))) {
+        for (std::uint8_t* const mark : four) set(*mark);
+      }
+      return;
     }
-    walk.walk1.advance();
-    walk.walk2.advance();
-  }
+    for (int n = slab.low[0]; n <= slab.high[0]; ++n) {
+      for (int m = slab.low[1]; m <= slab.high[1]; ++m) {
+        // Reading first avoids taking the mark's cache line from other threads.
+        std::uint8_t& mark = first[n * side0 + m * side1];
+        if (!isMarked(mark)) set(mark);
+      }
+    }
+  });
 }
 
 }  // namespace
@@ -182,28 +194,41 @@ void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams
   const Eigen::Array3d first = ((low - margin + beams.origin.array()) / geometry.blockSize()).floor();
   const Eigen::Array3d size =
       ((high + margin + beams.origin.array()) / geometry.blockSize()).floor() + 1.0 - first;
+  // In blocks. Voxel centres are at least half a voxel from the block's faces.
+  const double per_metre = 1.0 / geometry.blockSize();
+  const Eigen::Vector3d origin = beams.origin * per_metre - first.matrix();
+  const double from_face = std::max(0.0, reach - 0.5 * geometry.resolution()) * per_metre + 1e-6;
+  const Box box{first.cast<int>(), size.cast<int>()};
   if (size.prod() > kMostMarks) {
     unmarked_.clear();
-    for (std::size_t b = 0; b < beams.ends.size(); ++b) {
-      const double fraction = static_cast<double>(b + 1) / static_cast<double>(beams.ends.size());
-      forEachBlockOf(slabsAlong(geometry, segmentOf(beams, b, piece), reach), [&](int x, int y, int z) {
-        unmarked_.insert({x, y, z});
-        limitBlocks(unmarked_.size(), most, fraction);
+    const std::size_t count = beams.ends.size();
+    forEachBundle(beams, 0, count, piece, per_metre, [&](const Bundle& bundle, std::size_t beam) {
+      forEachSlab(bundle, origin, from_face, [&](const Slab& slab) {
+        Eigen::Array3i block;
+        block[bundle.main] = slab.main;
+        for (int n = slab.low[0]; n <= slab.high[0]; ++n) {
+          for (int m = slab.low[1]; m <= slab.high[1]; ++m) {
+            block[bundle.sideAxis(0)] = n;
+            block[bundle.sideAxis(1)] = m;
+            const Eigen::Array3i index = box.low + block;
+            unmarked_.insert({index.x(), index.y(), index.z()});
+            limitBlocks(unmarked_.size(), most, static_cast<double>(beam + 1) / static_cast<double>(count));
+          }
+        }
       });
-    }
+    });
     blocks.insert(blocks.end(), unmarked_.members().begin(), unmarked_.members().end());
     return;
   }
-  const Box box{first.cast<int>(), size.cast<int>()};
   const auto count = static_cast<std::size_t>(size.prod());
   clearMarks(count);
-  const std::ptrdiff_t row = box.size.x(), layer = row * box.size.y();
-  const MarkLayout layout = {-(box.low.x() + box.low.y() * row + box.low.z() * layer), {1, row, layer}};
+  const std::ptrdiff_t strides[3] = {1, box.size.x(), std::ptrdiff_t{box.size.x()} * box.size.y()};
   const Chunks chunks(beams.ends.size());
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
-    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
-      markBlocks(slabsAlong(geometry, segmentOf(beams, b, piece), reach), layout, marks_.get());
-    }
+    forEachBundle(beams, chunks.begin(c), chunks.end(c), piece, per_metre,
+                  [&](const Bundle& bundle, std::size_t) {
+                    markBlocks(bundle, origin, from_face, strides, marks_.get());
+                  });
   });
   limitBlocks(std::accumulate(marks_.get(), marks_.get() + count, std::size_t{0}), most);
   listMarked(box, blocks);
