@@ -64,7 +64,7 @@ BeamBox BeamField::boxOf(const BlockGroup& group) const {
 }
 
 void BeamField::findRangesNear(const BlockGroup& group, NearBeams& near) const {
-  // A ball about the bounding box of the group's blocks.
+  // The bounding box of the group's blocks.
   Eigen::Array3d low = Eigen::Array3d::Constant(kGroupEdge), high = Eigen::Array3d::Zero();
   for (std::uint64_t left = group.blocks; left != 0; left &= left - 1) {
     const int n = __builtin_ctzll(left);
@@ -74,9 +74,11 @@ void BeamField::findRangesNear(const BlockGroup& group, NearBeams& near) const {
   }
   const BeamBox box = boxOf(group);
   const Eigen::Array3d first = Eigen::Array3d(box.first[0], box.first[1], box.first[2]) - 0.5;
-  const Eigen::Vector3d centre = first + 0.5 * kBlockEdge * (low + high);
-  const double half_diagonal = 0.5 * kBlockEdge * (high - low).matrix().norm();
-  findRangesNear(centre * geometry_.resolution(), (half_diagonal + box.reach) * geometry_.resolution(), near);
+  const Eigen::AlignedBox3d reached(
+      ((first + kBlockEdge * low - box.reach) * geometry_.resolution()).matrix(),
+      ((first + kBlockEdge * high + box.reach) * geometry_.resolution()).matrix());
+  if (rtree_) return findRangesNear(reached.center(), 0.5 * reached.diagonal().norm(), near);
+  table_.query(reached, near.ranges);
 }
 
 void BeamField::findRangesNear(const BlockIndex& index, NearBeams& near) const {

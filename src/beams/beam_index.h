@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "beams/beam_cells.h"
 #include "bki_mapping/beams/beam_config.h"
@@ -37,6 +38,8 @@ class BeamTable : public BeamIndex {
   void build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order);
 
   void query(const Eigen::Vector3f& centre, float radius, std::vector<BeamRange>& ranges) const override;
+  /// The same for the half-lines that pass through a box. @param box relative to the sensor [m].
+  void query(const Eigen::AlignedBox3d& box, std::vector<BeamRange>& ranges) const;
   /// Most ranges of a query: two in each row if it crosses the seam.
   static constexpr std::size_t kMostRanges = 2 * kBeamRows;
 
@@ -44,6 +47,11 @@ class BeamTable : public BeamIndex {
   const std::vector<std::uint32_t>& begin() const { return begin_; }
 
  private:
+  /// The columns from `first` on, counterclockwise, to `last`, which may be across the seam.
+  struct Columns {
+    int first, last;
+  };
+  void listCells(int first_row, int last_row, const Columns& columns, std::vector<BeamRange>& ranges) const;
   void appendCells(int row, int first_column, int last_column, std::vector<BeamRange>& ranges) const;
 
   std::vector<std::uint32_t> begin_;

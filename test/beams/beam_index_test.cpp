@@ -1,7 +1,9 @@
-// The beam table and the R-tree find every beam through a ball: at the seam, the poles and the sensor.
+// The beam table and the R-tree find every beam through a ball, and the table through a box: at the seam, the
+// poles and the sensor.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -113,6 +115,89 @@ TEST_P(BothIndices, AllBeamsAtTheSensorAndNoneOfNone) {
   EXPECT_EQ(query(*makeBeamIndex(GetParam(), directions), near, 0.2f).size(), directions.size());
   EXPECT_TRUE(query(*makeBeamIndex(GetParam(), {}), far, 0.2f).empty());
   EXPECT_TRUE(query(*makeBeamIndex(GetParam(), {}), near, 0.2f).empty());
+}
+
+/// Whether a half-line meets a box, by the parts of it between the planes of each pair of faces.
+bool meets(const Eigen::Vector3d& u, const Eigen::AlignedBox3d& box) {
+  double enter = 0.0, leave = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min()[axis], high = box.max()[axis];
+    if (u[axis] == 0.0) {
+      if (low > 0.0 || high < 0.0) return false;
+      continue;
+    }
+    enter = std::max(enter, std::min(low / u[axis], high / u[axis]));
+    leave = std::min(leave, std::max(low / u[axis], high / u[axis]));
+  }
+  return enter <= leave;
+}
+
+std::vector<std::uint32_t> query(const BeamTable& table, const Eigen::AlignedBox3d& box) {
+  std::vector<BeamRange> ranges;
+  std::vector<std::uint32_t> beams;
+  table.query(box, ranges);
+  EXPECT_LE(ranges.size(), BeamTable::kMostRanges);
+  for (const BeamRange& range : ranges) {
+    for (std::uint32_t b = range.first; b < range.last; ++b) beams.push_back(b);
+  }
+  return beams;
+}
+
+TEST(BeamTable, FindsAllBeamsOfEveryBox) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> side(0.0f, 2.0f);
+  for (const reference::Scene& scene : reference::nastyScenes(400)) {
+    const auto directions = directionsOf(scene.scan);
+    const SortedTable sorted_table = sortedTable(directions);
+    for (int trial = 0; trial < 300; ++trial) {
+      // Boxes with a corner on a beam; across coordinate planes, and so the seam and the poles; with the
+      // sensor on a face or inside.
+      Eigen::Vector3f corner = scene.scan.points[random() % scene.scan.points.size()] * side(random);
+      const Eigen::Vector3f sides(side(random), side(random), trial % 5 == 0 ? 20.0f : side(random));
+      if (trial % 3 == 1) corner[static_cast<int>(random() % 3)] = trial % 2 == 0 ? 0.0f : -0.5f;
+      if (trial % 7 == 0) corner = -0.5f * sides;
+      const Eigen::AlignedBox3d box(corner.cast<double>(), (corner + sides).cast<double>());
+      const std::vector<std::uint32_t> beams = query(*sorted_table.table, box);
+      const std::set<std::uint32_t> found(beams.begin(), beams.end());
+      EXPECT_EQ(found.size(), beams.size()) << scene.name << ": a beam is found twice";
+      for (std::uint32_t b = 0; b < directions.size(); ++b) {
+        ASSERT_TRUE(found.count(b) || !meets(directions[b].cast<double>(), box))
+            << scene.name << ": beam " << b << " is missing at " << box.min().transpose() << " to "
+            << box.max().transpose();
+      }
+    }
+  }
+}
+
+/// A ball around the box finds twice as many.
+TEST(BeamTable, FindsFewOtherBeamsOfABox) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  std::vector<Eigen::Vector3f> directions;
+  for (int i = 0; i < 20000; ++i) {
+    directions.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
+  }
+  const SortedTable sorted_table = sortedTable(sorted(directions));
+  directions = sorted(directions);
+  std::size_t found = 0, needed = 0, of_ball = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Vector3f centre = 10.0f * directions[static_cast<std::size_t>(97 * trial)];
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(1.0), c = centre.cast<double>();
+    const Eigen::AlignedBox3d box(c - half, c + half);
+    found += query(*sorted_table.table, box).size();
+    of_ball += query(static_cast<const BeamIndex&>(*sorted_table.table), centre, std::sqrt(3.0f)).size();
+    for (const Eigen::Vector3f& u : directions) needed += meets(u.cast<double>(), box);
+  }
+  EXPECT_LT(found, 2 * needed);
+  EXPECT_LT(2 * found, of_ball + of_ball / 4);
+}
+
+TEST(BeamTable, FindsNoneOfNone) {
+  const Eigen::AlignedBox3d near(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1)),
+      far(Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(2, 2, 2));
+  EXPECT_TRUE(query(*sortedTable({}).table, near).empty());
+  EXPECT_TRUE(query(*sortedTable({}).table, far).empty());
+  EXPECT_TRUE(query(BeamTable(), far).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Indices, BothIndices, testing::Values(BeamIndexType::kTable, BeamIndexType::kRtree));

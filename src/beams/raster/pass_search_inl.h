@@ -58,6 +58,7 @@ class BoxSearch {
     const FloatVec end = LoadU(beams.end + b), centre = TableLookup(main_, axis);
     FloatVec low = Max(Min(FloatVec{}, end) - reach_ - centre, Set(-kHalf)),
              high = Min(Max(FloatVec{}, end) + reach_ - centre, Set(kHalf));
+    if (!AnyTrue(low - slack_ <= high + slack_)) return to;  // all end before the box, or run away from it
     const Across side = across(LoadU(beams.slope_side + b), TableLookup(side_, axis), centre),
                  height = across(LoadU(beams.slope_height + b), TableLookup(height_, axis), centre);
     for (const Across* each : {&side, &height}) {
@@ -161,6 +162,15 @@ class BoxSearch {
 /// near the core, and passes skip beams.
 constexpr std::size_t kAhead = 8;
 
+/// Ranges are short, and far from each other in memory.
+inline void prefetch(const LineSetupArrays& beams, std::uint32_t b) {
+  __builtin_prefetch(beams.axis + b);
+  __builtin_prefetch(beams.end + b);
+  __builtin_prefetch(beams.slope_side + b);
+  __builtin_prefetch(beams.slope_height + b);
+  __builtin_prefetch(beams.shear + b);
+}
+
 /// Finds the passes of beams through a box, in the order of the beams. `sums` has room for all of them
 /// (GroupSums::reserve). The kAhead passes after the last may be read; their values are arbitrary.
 inline void findPasses(const LineSetupArrays& beams, const BeamRange* ranges, std::size_t count,
@@ -169,6 +179,7 @@ inline void findPasses(const LineSetupArrays& beams, const BeamRange* ranges, st
   static_assert(kLanes <= GroupSums::kPassPadding && kAhead <= GroupSums::kPassPadding);
   BeamPass* to = sums.passes.data();
   for (std::size_t r = 0; r < count; ++r) {
+    if (r + 1 < count) prefetch(beams, ranges[r + 1].first);
     for (BeamRange left = ranges[r]; left.first < left.last; left.first += kLanes) {
       to = search.find(beams, left, to);
     }
