@@ -22,8 +22,9 @@ struct Bundle {
   int main;           ///< the axis along which they run most
   bool down;          ///< against it
   double begin, end;  ///< of the pieces along the main axis, from the sensor
-  double low[2],
-      high[2];  ///< slopes of the outermost beams along the side axes, by distance along the main one
+  double last_begin;  ///< of the piece that begins last
+  /// Slopes of the outermost beams along the side axes, by distance along the main one.
+  double low[2], high[2];
 
   int sideAxis(int side) const { return (main + 1 + side) % 3; }
 };
@@ -33,22 +34,24 @@ Bundle bundleOf(const Eigen::Vector3f& end, const BeamPiece& piece, double per_m
   const float x = std::abs(end.x()), y = std::abs(end.y()), z = std::abs(end.z());
   const int main = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
   const double along = std::abs(static_cast<double>(end[main])), inverse = along > 0.0 ? 1.0 / along : 0.0;
-  Bundle bundle = {main, end[main] < 0.0f, 0.0, along * per_metre, {}, {}};
+  Bundle bundle = {main, end[main] < 0.0f, 0.0, along * per_metre, 0.0, {}, {}};
   for (int side = 0; side < 2; ++side) {
     bundle.low[side] = bundle.high[side] = static_cast<double>(end[bundle.sideAxis(side)]) * inverse;
   }
   if (!piece.shadow) return bundle;
   const double to = bundle.end * (piece.shadow_range / end.cast<double>().norm());
-  bundle.begin = std::min(bundle.end, to);
+  bundle.begin = bundle.last_begin = std::min(bundle.end, to);
   bundle.end = std::max(bundle.end, to);
   return bundle;
 }
 
-/// Adds a beam to a bundle unless that would make it too wide.
+/// Adds a beam to a bundle unless that would make it too wide, or list blocks before where beams begin.
 bool join(const Bundle& beam, Bundle& to) {
-  if (beam.main != to.main || beam.down != to.down || std::abs(beam.begin - to.begin) > 1.0) return false;
+  if (beam.main != to.main || beam.down != to.down) return false;
   Bundle joined = to;
   joined.begin = std::min(to.begin, beam.begin);
+  joined.last_begin = std::max(to.last_begin, beam.last_begin);
+  if (joined.last_begin - joined.begin > 1.0) return false;
   joined.end = std::max(to.end, beam.end);
   for (int side = 0; side < 2; ++side) {
     joined.low[side] = std::min(to.low[side], beam.low[side]);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <set>
 #include <vector>
@@ -12,18 +13,32 @@
 namespace bki_mapping {
 namespace {
 
-/// Distance of a point from the beam from the origin to `end` [m].
-double distanceOf(const Eigen::Vector3d& point, const Eigen::Vector3d& origin, const Eigen::Vector3f& end) {
+/// The piece of a beam that is walked, from `begin` to `end` as parts of its length.
+struct Part {
+  double begin = 0.0, end = 1.0;
+};
+
+Part partOf(const Eigen::Vector3f& end, const BeamPiece& piece) {
+  if (!piece.shadow) return {};
+  const double to = piece.shadow_range / end.cast<double>().norm();
+  return {std::min(1.0, to), std::max(1.0, to)};
+}
+
+/// Distance of a point from a part of the beam from the origin to `end` [m].
+double distanceOf(const Eigen::Vector3d& point, const Eigen::Vector3d& origin, const Eigen::Vector3f& end,
+                  const Part& part) {
   const Eigen::Vector3d p = point - origin, d = end.cast<double>();
-  const double along = d.squaredNorm() > 0.0 ? std::clamp(p.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0.0;
+  const double along =
+      d.squaredNorm() > 0.0 ? std::clamp(p.dot(d) / d.squaredNorm(), part.begin, part.end) : 0.0;
   return (p - along * d).norm();
 }
 
 /// Whether a block has a voxel centre within reach of a beam.
-bool isReached(const GridGeometry& geometry, const BlockIndex& block, const Beams& beams, double reach) {
+bool isReached(const GridGeometry& geometry, const BlockIndex& block, const Beams& beams, const Part& part,
+               double reach) {
   for (int v = 0; v < kBlockVoxels; ++v) {
     const Eigen::Vector3d centre = geometry.voxelCentre(GridGeometry::voxelOf(block, v));
-    if (distanceOf(centre, beams.origin, beams.ends[0]) < reach) return true;
+    if (distanceOf(centre, beams.origin, beams.ends[0], part) < reach) return true;
   }
   return false;
 }
@@ -46,28 +61,57 @@ Beams randomBeams(std::mt19937& random, int count) {
 TEST(BlockWalk, ListsTheBlocksAlongBeams) {
   std::mt19937 random(5);
   const GridGeometry geometry(0.3);
-  for (const double reach : {0.05, 0.3, 0.9, 3.0}) {
-    const Beams all = randomBeams(random, 20);
-    for (const Eigen::Vector3f& end : all.ends) {
-      const Beams beams = {all.origin, {end}};
-      ThreadPool pool(1);
-      std::vector<GridIndex> blocks;
-      BlockWalk().listBlocksAlong(geometry, beams, BeamPiece(), reach, 1 << 20, pool, blocks);
-      const std::set<GridIndex> listed(blocks.begin(), blocks.end());
-      const BlockIndex centre = GridGeometry::blockOf(geometry.voxelAt(all.origin));
-      for (int n = 0; n < 15 * 15 * 15; ++n) {
-        const BlockIndex block{
-            {centre.x + n % 15 - 7, centre.y + n / 15 % 15 - 7, centre.z + n / (15 * 15) - 7}};
-        const bool is_listed = listed.count(block) > 0;
-        const double distance = distanceOf(geometry.blockCentre(block), beams.origin, end);
-        if (distance < reach + geometry.blockSize()) {  // others cannot be reached
-          EXPECT_TRUE(is_listed || !isReached(geometry, block, beams, reach))
-              << reach << ", " << end.transpose();
+  for (const BeamPiece& piece : {BeamPiece(), BeamPiece{true, 7.0}}) {
+    for (const double reach : {0.05, 0.3, 0.9, 3.0}) {
+      const Beams all = randomBeams(random, 20);
+      for (const Eigen::Vector3f& end : all.ends) {
+        if (piece.shadow && end.norm() < 0.1f) continue;  // casts none
+        const Beams beams = {all.origin, {end}};
+        const Part part = partOf(end, piece);
+        ThreadPool pool(1);
+        std::vector<GridIndex> blocks;
+        BlockWalk().listBlocksAlong(geometry, beams, piece, reach, 1 << 20, pool, blocks);
+        const std::set<GridIndex> listed(blocks.begin(), blocks.end());
+        const BlockIndex centre = GridGeometry::blockOf(geometry.voxelAt(all.origin));
+        for (int n = 0; n < 15 * 15 * 15; ++n) {
+          const BlockIndex block{
+              {centre.x + n % 15 - 7, centre.y + n / 15 % 15 - 7, centre.z + n / (15 * 15) - 7}};
+          const bool is_listed = listed.count(block) > 0;
+          const double distance = distanceOf(geometry.blockCentre(block), beams.origin, end, part);
+          if (distance < reach + geometry.blockSize()) {  // others cannot be reached
+            EXPECT_TRUE(is_listed || !isReached(geometry, block, beams, part, reach))
+                << reach << ", " << end.transpose();
+          }
+          EXPECT_TRUE(!is_listed || distance < 3.0 * (reach + geometry.blockSize())) << distance;
         }
-        EXPECT_TRUE(!is_listed || distance < 3.0 * (reach + geometry.blockSize())) << distance;
       }
     }
   }
+}
+
+/// Beams so long that there is no memory for a mark of each block around them.
+TEST(BlockWalk, ListsTheBlocksAlongVeryLongBeams) {
+  const GridGeometry geometry(0.3);
+  const Beams beams = {{0.1, 0.2, 0.3}, {{3000.0f, 2900.0f, 2800.0f}, {-3000.0f, 2900.0f, 2800.0f}}};
+  ThreadPool pool(1);
+  std::vector<GridIndex> blocks;
+  BlockWalk().listBlocksAlong(geometry, beams, BeamPiece(), 0.3, 1 << 20, pool, blocks);
+  const std::set<GridIndex> listed(blocks.begin(), blocks.end());
+  EXPECT_EQ(listed.size(), blocks.size());
+  for (const Eigen::Vector3f& end : beams.ends) {
+    for (double part = 0.0; part <= 1.0; part += 1e-4) {
+      const Eigen::Vector3d point = beams.origin + part * end.cast<double>();
+      ASSERT_EQ(listed.count(GridGeometry::blockOf(geometry.voxelAt(point))), 1u) << point.transpose();
+    }
+  }
+  for (const GridIndex& block : listed) {
+    const Eigen::Vector3d centre = geometry.blockCentre({block});
+    EXPECT_LT(std::min(distanceOf(centre, beams.origin, beams.ends[0], {}),
+                       distanceOf(centre, beams.origin, beams.ends[1], {})),
+              3.0 * (0.3 + geometry.blockSize()));
+  }
+  EXPECT_THROW(BlockWalk().listBlocksAlong(geometry, beams, BeamPiece(), 0.3, 100, pool, blocks),
+               TooMuchWork);
 }
 
 TEST(BlockWalk, DoesNotDependOnThreads) {
