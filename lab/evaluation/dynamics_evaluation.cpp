@@ -3,18 +3,6 @@
 #include <algorithm>
 
 namespace bki_mapping {
-namespace {
-
-/// Whether any of the 26 voxels around one is occupied.
-bool isBesideOccupied(const VoxelIndex& index, Occupants& map) {
-  for (int n = 0; n < 27; ++n) {
-    if (map.at({{index.x + n % 3 - 1, index.y + n / 3 % 3 - 1, index.z + n / 9 - 1}})) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
@@ -121,16 +109,14 @@ DynamicsQuality DynamicsEvaluation::compare(Occupants& map, const Taken& taken) 
       if (occupied) of_label.kept += labels_[l].points;
     }
     quality.floor_voxels += voxel.ground_points > 0;
-    const std::size_t static_points = voxel.ground_points + voxel.standing_points + voxel.other_points;
-    const bool near = occupied || (static_points > 0 && isBesideOccupied(voxel.index, map));
-    if (near) quality.static_near += static_points;
-    quality.floor_gaps += voxel.ground_points > 0 && !near;
     if (occupied) {
       quality.ground_kept += voxel.ground_points;
       quality.standing_kept += voxel.standing_points;
       quality.other_kept += voxel.other_points;
-    } else {
-      quality.floor_holes += voxel.ground_points > 0;
+    } else if (voxel.ground_points > 0) {
+      const VoxelIndex& at = voxel.index;
+      ++quality.floor_holes;
+      quality.floor_open_holes += !map.at({at.x, at.y, at.z + 1}) && !map.at({at.x, at.y, at.z - 1});
     }
     if (moving == 0 || mayBeOccupied(voxel, taken)) continue;
     quality.moving_points += moving;

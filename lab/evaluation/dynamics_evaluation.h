@@ -58,8 +58,8 @@ struct DynamicsQuality : Accuracies {
   std::map<std::uint32_t, KeptPoints> by_label;
   std::size_t floor_voxels = 0;  ///< voxels with static points of ground
   std::size_t floor_holes = 0;   ///< of these, those that are not occupied
-  std::size_t floor_gaps = 0;    ///< of the holes, those without an occupied voxel among the 26 around
-  std::size_t static_near = 0;   ///< static points in occupied voxels, or with one among the 26 around theirs
+  std::size_t floor_open_holes =
+      0;  ///< of the holes, those above and below which no voxel is occupied, either
   /// Moving points that no map can tell to be gone: those in voxels shared with static points, and those in
   /// other voxels that no beam came near after the last moving point.
   std::size_t moving_shared = 0, moving_unseen = 0;
@@ -73,8 +73,7 @@ struct DynamicsQuality : Accuracies {
   double standingAccuracy() const { return fraction(standing_kept, standing_points); }
   double otherAccuracy() const { return fraction(other_kept, other_points); }
   double holes() const { return fraction(floor_holes, floor_voxels); }
-  double gaps() const { return fraction(floor_gaps, floor_voxels); }
-  double nearAccuracy() const { return fraction(static_near, static_points); }
+  double openHoles() const { return fraction(floor_open_holes, floor_voxels); }
   double decidableAccuracy() const { return fraction(decidable_removed, decidable_points); }
   double enteredAccuracy() const { return fraction(entered_removed, entered_points); }
 };

@@ -80,25 +80,15 @@ Json dynamicsJson(const DynamicsQuality& d) {
   Json by_label = Json::array();
   for (const auto& [label, kept] : d.by_label)
     by_label.push_back({{"label", label}, {"static_points", kept.points}, {"sa", kept.accuracy()}});
-  return {{"static_points", d.static_points},
-          {"static_kept", d.static_kept},
-          {"moving_points", d.moving_points},
-          {"moving_removed", d.moving_removed},
-          {"floor_voxels", d.floor_voxels},
-          {"floor_holes", d.holes()},
-          {"floor_gaps", d.gaps()},
-          {"sa", d.staticAccuracy()},
-          {"sa_near", d.nearAccuracy()},
-          {"sa_ground", d.groundAccuracy()},
-          {"sa_standing", d.standingAccuracy()},
-          {"sa_other", d.otherAccuracy()},
-          {"sa_by_label", by_label},
-          {"da", d.dynamicAccuracy()},
-          {"da_decidable", d.decidableAccuracy()},
-          {"da_entered", d.enteredAccuracy()},
-          {"moving_shared", d.moving_shared},
-          {"moving_unseen", d.moving_unseen},
-          {"aa", d.accuracy()},
+  return {{"static_points", d.static_points},  {"static_kept", d.static_kept},
+          {"moving_points", d.moving_points},  {"moving_removed", d.moving_removed},
+          {"floor_voxels", d.floor_voxels},    {"floor_holes", d.holes()},
+          {"floor_open_holes", d.openHoles()}, {"sa", d.staticAccuracy()},
+          {"sa_ground", d.groundAccuracy()},   {"sa_standing", d.standingAccuracy()},
+          {"sa_other", d.otherAccuracy()},     {"sa_by_label", by_label},
+          {"da", d.dynamicAccuracy()},         {"da_decidable", d.decidableAccuracy()},
+          {"da_entered", d.enteredAccuracy()}, {"moving_shared", d.moving_shared},
+          {"moving_unseen", d.moving_unseen},  {"aa", d.accuracy()},
           {"ha", d.harmonicAccuracy()}};
 }
 

@@ -48,7 +48,7 @@ def delay(report, name):
 SA, PARKED, HOLES, DA, DECIDABLE = (('SA', lambda r: share(r, 'sa')), ('parked', lambda r: share(r, 'sa_standing')),
                                     ('holes', lambda r: share(r, 'floor_holes')), ('DA', lambda r: share(r, 'da')),
                                     ('DA where decidable', lambda r: share(r, 'da_decidable')))
-NEAR, GAPS = ('SA near', lambda r: share(r, 'sa_near')), ('gaps', lambda r: share(r, 'floor_gaps'))
+OPEN = ('open holes', lambda r: share(r, 'floor_open_holes'))
 ENTERED = ('DA where entered', lambda r: share(r, 'da_entered'))
 PA20, PA50 = ((f'PA to {distance} m', lambda r, n=n: share(r, 'presence', 'by_distance', n, 'pa_moving'))
               for n, distance in enumerate((20, 50)))
@@ -182,13 +182,13 @@ def tables_of(runs, programs, given, sequences):
             for kind in ('even', 'network', 'objects')])
 
     def shaken():
-        columns = (SA, NEAR, PARKED, HOLES, GAPS, DA)
+        columns = (SA, PARKED, HOLES, OPEN, DA)
         fine, few = ('--pose-noise', '0.02,0.1'), some('04', '05', 'traffic')
         return by_drive(runs, few, [
-            ('`resolution` 0.1', {'settings': ['resolution=0.1'], 'more': SHAKEN}, columns),
-            ('`resolution` 0.6', {'settings': ['resolution=0.6'], 'more': SHAKEN}, columns),
-            ('2 cm, 0.1 degrees', {'more': fine}, columns),
-            ('the same, `resolution` 0.1', {'settings': ['resolution=0.1'], 'more': fine}, columns)])
+            ('5 cm, `resolution` 0.1', {'settings': ['resolution=0.1'], 'more': SHAKEN}, columns),
+            ('5 cm, `resolution` 0.6', {'settings': ['resolution=0.6'], 'more': SHAKEN}, columns),
+            ('2 cm, `resolution` 0.3', {'more': fine}, columns),
+            ('2 cm, `resolution` 0.1', {'settings': ['resolution=0.1'], 'more': fine}, columns)])
 
     def calibration():
         variants = [(f'{kind}, `{preset}`{wrong}', {'preset': preset, 'more': more}, (of,))
@@ -208,7 +208,7 @@ def tables_of(runs, programs, given, sequences):
                                                      ('0.3 wrong', {'more': noise}, (*robot, MIOU, INPUT))]),
         'errors': kinds,
         'poses': lambda: by_drive(runs, sequences, [('true', {}, robot),
-                                                    ('independent', {'more': SHAKEN}, (SA, NEAR, PARKED, HOLES, GAPS, DA, PA50)),
+                                                    ('independent', {'more': SHAKEN}, (SA, PARKED, HOLES, OPEN, DA, PA50)),
                                                     ('accumulating', {'more': ('--pose-drift', '0.01,0.05')}, robot)]),
         'shaken': shaken,
         'calibration': calibration,

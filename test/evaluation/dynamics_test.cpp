@@ -114,12 +114,12 @@ TEST(DynamicsQuality, TellsGroundAndStandingThingsApart) {
   EXPECT_DOUBLE_EQ(quality.staticAccuracy(), 0.5);
   EXPECT_EQ(quality.floor_voxels, 2u);
   EXPECT_DOUBLE_EQ(quality.holes(), 0.5);
-  EXPECT_DOUBLE_EQ(quality.gaps(), 0.0);                // the hole at 1.5 is beside occupied voxels
-  EXPECT_DOUBLE_EQ(quality.nearAccuracy(), 5.0 / 6.0);  // all but 4.5
-  const DynamicsQuality less = evaluation.compare(mapOf({{2.5, 0, 0}}), StateRules());
-  EXPECT_DOUBLE_EQ(less.holes(), 1.0);
-  EXPECT_DOUBLE_EQ(less.gaps(), 0.5);  // at 0.5
-  EXPECT_DOUBLE_EQ(less.nearAccuracy(), 0.5);
+  EXPECT_DOUBLE_EQ(quality.openHoles(), 0.5);  // that beside it does not help
+  for (const double z : {-1.0, 1.0, 2.0}) {
+    const DynamicsQuality moved = evaluation.compare(mapOf({{0.5, 0, 0}, {1.5, 0, z}}), StateRules());
+    EXPECT_DOUBLE_EQ(moved.holes(), 0.5);
+    EXPECT_DOUBLE_EQ(moved.openHoles(), z > 1.0 ? 0.5 : 0.0) << z;
+  }
 }
 
 TEST(DynamicsQuality, SaysWhatNoMapCanTell) {
