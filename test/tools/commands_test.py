@@ -6,8 +6,10 @@ nothing else is built; those of other pages are for all targets.
 A block of commands is what a user types: what does not end by itself (roslaunch, rviz) goes on in a terminal of its own
 until the block's last command has ended. Launch files must map what is played to them.
 """
+import http.client
 import importlib
 import os
+import random
 import re
 import shutil
 import signal
@@ -148,9 +150,15 @@ def status_of(launch):
 
 
 def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
+    """A port below 32768: from there on, Linux gives ports to programs that ask for any, before the master takes one."""
+    while True:
+        port = random.randint(15000, 32767)
+        with socket.socket() as probe:
+            try:
+                probe.bind(('localhost', port))
+            except OSError:
+                continue
+            return port
 
 
 def send(process, what):
@@ -258,7 +266,7 @@ class Shell:
         try:
             with xmlrpc.client.ServerProxy(self.master) as master:
                 code, _, (_, subscribers, _) = master.getSystemState('/commands_test')
-        except OSError:
+        except (OSError, http.client.HTTPException):
             return None
         return dict(subscribers).get(topic, []) if code == 1 else None
 
