@@ -3,6 +3,7 @@
 #include <algorithm>
 
 namespace bki_mapping {
+
 void DynamicsEvaluation::add(const Scan& scan, const ClassTable& classes, const Scan& whole) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();

@@ -58,8 +58,8 @@ struct DynamicsQuality : Accuracies {
   std::map<std::uint32_t, KeptPoints> by_label;
   std::size_t floor_voxels = 0;  ///< voxels with static points of ground
   std::size_t floor_holes = 0;   ///< of these, those that are not occupied
-  std::size_t floor_open_holes =
-      0;  ///< of the holes, those above and below which no voxel is occupied, either
+  /// Of the holes, those above and below which no voxel is occupied, either.
+  std::size_t floor_open_holes = 0;
   /// Moving points that no map can tell to be gone: those in voxels shared with static points, and those in
   /// other voxels that no beam came near after the last moving point.
   std::size_t moving_shared = 0, moving_unseen = 0;
