@@ -4,13 +4,14 @@
 #include <atomic>
 
 #include "core/stopwatch.h"
+#include "parallel/chunks.h"
 
 namespace bki_mapping {
 namespace {
 
-/// How far ahead blocks are prefetched [jobs], and half as far their planes; long enough to hide the latency
-/// of memory.
-constexpr std::size_t kAhead = 4;
+/// How far ahead what a block points to is prefetched [jobs], and twice as far the block: long enough to hide
+/// the latency of memory.
+constexpr std::size_t kAhead = 6;
 
 }  // namespace
 
@@ -55,17 +56,20 @@ void MapUpdater::collect(SemanticMap& map, const UpdateLimits& limits, ThreadPoo
       positions[job] = static_cast<std::uint32_t>(b);
     }
   }
-  groupJobs();
+  groupJobs(pool);
 }
 
-void MapUpdater::groupJobs() {
+void MapUpdater::groupJobs(ThreadPool& pool) {
   by_group_.sort();
-  sorted_.clear();
-  sorted_.reserve(jobs_.size());
-  for (const std::uint32_t number : by_group_.numbers()) {
-    sorted_.push_back(std::move(jobs_[number]));
-    sorted_.back().number = number;
-  }
+  sorted_.resize(jobs_.size());
+  const Chunks chunks(jobs_.size());
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    for (std::size_t j = chunks.begin(c); j < chunks.end(c); ++j) {
+      const std::uint32_t number = by_group_.numbers()[j];
+      sorted_[j] = std::move(jobs_[number]);
+      sorted_[j].number = number;
+    }
+  });
   jobs_.swap(sorted_);
   groups_.clear();
   for (std::size_t n = 0; n < by_group_.groups().size(); ++n) {
@@ -75,6 +79,19 @@ void MapUpdater::groupJobs() {
   }
   std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
     return a.cost != b.cost ? a.cost > b.cost : a.position < b.position;
+  });
+}
+
+template <typename Prefetch, typename Visit>
+void MapUpdater::forEachJob(ThreadPool& pool, const Prefetch& prefetch, const Visit& visit) {
+  const Chunks chunks(jobs_.size());
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t worker) {
+    const std::size_t end = chunks.end(c);
+    for (std::size_t j = chunks.begin(c); j < end; ++j) {
+      if (end - j > 2 * kAhead) jobs_[j + 2 * kAhead].block->prefetchHead();
+      if (end - j > kAhead) prefetch(j + kAhead);
+      visit(j, worker);
+    }
   });
 }
 
@@ -103,22 +120,16 @@ std::size_t MapUpdater::reserveBlocks(const UpdateLimits& limits, std::ptrdiff_t
   std::atomic<std::size_t> most_classes{0};
   const auto most = static_cast<std::ptrdiff_t>(
       std::min<std::size_t>(limits.bytes, std::numeric_limits<std::ptrdiff_t>::max()));
-  pool.forEach(groups_.size(), [&](std::size_t g, std::size_t) {
-    std::ptrdiff_t of_group = 0;
-    std::size_t classes = 0;
-    const std::size_t position = groups_[g].position;
-    for (std::size_t j = by_group_.begin(position); j != by_group_.end(position); ++j) {
-      const std::size_t left = by_group_.end(position) - j;
-      if (left > kAhead) __builtin_prefetch(jobs_[j + kAhead].block);
-      if (left > kAhead / 2) jobs_[j + kAhead / 2].block->looks().prefetch();
-      BlockJob& job = jobs_[j];
-      classes = std::max(classes, reservePlanes(job));
-      of_group += static_cast<std::ptrdiff_t>(job.block->bytes() - job.bytes_before);
-    }
+  const auto prefetch = [&](std::size_t j) { jobs_[j].block->looks().prefetch(); };
+  forEachJob(pool, prefetch, [&](std::size_t j, std::size_t) {
+    BlockJob& job = jobs_[j];
+    const std::size_t classes = reservePlanes(job);
     for (std::size_t known = most_classes; known < classes;) {
       if (most_classes.compare_exchange_weak(known, classes)) break;
     }
-    const std::ptrdiff_t sum = bytes += of_group;
+    const auto of_job = static_cast<std::ptrdiff_t>(job.block->bytes() - job.bytes_before);
+    if (of_job == 0) return;
+    const std::ptrdiff_t sum = bytes += of_job;
     if (sum > most) throw TooMuchWork(TooMuchWork::What::kBytes, static_cast<double>(sum));
   });
   return most_classes;
@@ -169,6 +180,7 @@ BlockGroup MapUpdater::selectBlocks(const Task& task, const Group& group, Worker
     const BlockJob& job = jobs_[j];
     const std::uint32_t touched = task.positionOf(job.number);
     if (touched == kNoPosition) continue;
+    job.block->prefetchHead();
     selected.blocks |= std::uint64_t{1} << slotInGroup(job.index);
     to.blocks.emplace_back(job.index, touched, job.block, rules_.seeksVoids() ? &voids_.at(j) : nullptr,
                            rules_.asksBelow() ? &seams_[j] : nullptr);
@@ -200,7 +212,9 @@ void MapUpdater::addGroup(const Group& group, std::size_t worker) {
 void MapUpdater::add(ThreadPool& pool) {
   const auto add_group = [&](std::size_t g, std::size_t worker) {
     addGroup(groups_[g], worker);
-    if (!mends()) finishGroup(groups_[g]);
+    if (mends()) return;
+    const std::size_t position = groups_[g].position;
+    for (std::size_t j = by_group_.begin(position); j != by_group_.end(position); ++j) finish(jobs_[j]);
   };
   if (!groups_.empty() && groups_.front().cost > 0.0) {
     pool.forEachInOrder(groups_.size(), add_group);
@@ -211,12 +225,20 @@ void MapUpdater::add(ThreadPool& pool) {
 
 void MapUpdater::mend(ThreadPool& pool) {
   if (rules_.seeksVoids()) voids_.find(by_group_, pool);
+  if (rules_.asksBelow()) {
+    pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) { mendSeams(groups_[g], worker); });
+  }
   const EvidenceUnits of_void = roundedUnits(rules_.void_evidence);
-  pool.forEach(groups_.size(), [&](std::size_t g, std::size_t worker) {
-    if (rules_.asksBelow()) mendSeams(groups_[g], worker);
-    if (of_void > 0) addVoids(groups_[g], of_void, worker);
-    if (keeps_looks_) addLooks(groups_[g], of_void > 0);
-    finishGroup(groups_[g]);
+  EvidenceUnits of_layer[kBlockEdge * kBlockEdge];
+  std::fill(std::begin(of_layer), std::end(of_layer), of_void);
+  const auto prefetch = [&](std::size_t j) {
+    if (of_void > 0 && voids_.voidsOf(j).any()) jobs_[j].block->prefetch();
+    if (keeps_looks_) jobs_[j].block->looks().prefetch();
+  };
+  forEachJob(pool, prefetch, [&](std::size_t j, std::size_t worker) {
+    if (of_void > 0) addVoids(j, of_layer, worker);
+    if (keeps_looks_) addLooks(j, of_void > 0);
+    finish(jobs_[j]);
   });
 }
 
@@ -243,45 +265,28 @@ void MapUpdater::mendSeams(const Group& group, std::size_t worker) {
   }
 }
 
-void MapUpdater::addVoids(const Group& group, EvidenceUnits units, std::size_t worker) {
-  SumCounts& counts = workers_[worker].mended;
+void MapUpdater::addVoids(std::size_t job, const EvidenceUnits* units, std::size_t worker) {
+  const VoxelMask& voids = voids_.voidsOf(job);
+  if (voids.none()) return;
   const auto add = withdraws_ ? kernels_.withdraw_units : kernels_.add_units;
-  EvidenceUnits of_layer[kBlockEdge * kBlockEdge];
-  std::fill(std::begin(of_layer), std::end(of_layer), units);
-  const std::size_t end = by_group_.end(group.position);
-  for (std::size_t j = by_group_.begin(group.position); j != end; ++j) {
-    if (end - j > kAhead) __builtin_prefetch(jobs_[j + kAhead].block);
-    if (end - j > kAhead / 2 && voids_.voidsOf(j + kAhead / 2).any()) jobs_[j + kAhead / 2].block->prefetch();
-    const VoxelMask& voids = voids_.voidsOf(j);
-    if (voids.none()) continue;
-    const LayerBits layers = bitsOf(voids);
-    jobs_[j].block->change(kFreeClass, [&](EvidenceUnits* plane) {
-      return add(layers.data(), kBlockEdge, of_layer, plane, counts);
-    });
-  }
+  const LayerBits layers = bitsOf(voids);
+  jobs_[job].block->change(kFreeClass, [&](EvidenceUnits* plane) {
+    return add(layers.data(), kBlockEdge, units, plane, workers_[worker].mended);
+  });
 }
 
-void MapUpdater::addLooks(const Group& group, bool voids_add) noexcept {
-  const std::size_t end = by_group_.end(group.position);
-  for (std::size_t j = by_group_.begin(group.position); j != end; ++j) {
-    if (end - j > kAhead) __builtin_prefetch(&jobs_[j + kAhead].block->looks());
-    if (end - j > kAhead / 2) jobs_[j + kAhead / 2].block->looks().prefetch();
-    const SeenVoxels& seen = voids_.at(j);
-    // A block exists where scans add evidence: whether others have done so must make no difference to this
-    // one.
-    if (!seen.adds && !(voids_add && voids_.voidsOf(j).any())) continue;
-    jobs_[j].block->looks().add(Look(tick_, voids_.emptyOf(j), voids_.voidsOf(j), seen.hit));
-  }
+void MapUpdater::addLooks(std::size_t job, bool voids_add) noexcept {
+  const SeenVoxels& seen = voids_.at(job);
+  // A block exists where scans add evidence: whether others have done so must make no difference to this one.
+  if (!seen.adds && !(voids_add && voids_.voidsOf(job).any())) return;
+  jobs_[job].block->looks().add(Look(tick_, voids_.emptyOf(job), voids_.voidsOf(job), seen.hit));
 }
 
-void MapUpdater::finishGroup(const Group& group) {
-  for (std::size_t j = by_group_.begin(group.position); j != by_group_.end(group.position); ++j) {
-    BlockJob& job = jobs_[j];
-    if (withdraws_) job.block->shrink();
-    job.empty = job.block->empty();
-    const std::size_t after = job.empty ? 0 : job.block->bytes();
-    job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
-  }
+void MapUpdater::finish(BlockJob& job) {
+  if (withdraws_) job.block->shrink();
+  job.empty = job.block->empty();
+  const std::size_t after = job.empty ? 0 : job.block->bytes();
+  job.bytes = static_cast<std::ptrdiff_t>(after) - static_cast<std::ptrdiff_t>(job.bytes_before);
 }
 
 MapUpdateStats MapUpdater::update(SemanticMap& map, const ScanEvidence& scan, ThreadPool& pool,

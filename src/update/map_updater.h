@@ -103,10 +103,15 @@ class MapUpdater {
   void add(ThreadPool& pool);
   void mend(ThreadPool& pool);
 
+  /// Calls visit(job, worker) for each job, in parallel, by its position. @param prefetch called as
+  /// prefetch(job) some jobs before, when the block itself, without planes and looks, is near the core.
+  template <typename Prefetch, typename Visit>
+  void forEachJob(ThreadPool& pool, const Prefetch& prefetch, const Visit& visit);
+
   // Parts of collect():
   /// @return the position of a block's job in jobs_; creates the job, and the block, if missing.
   std::uint32_t jobOf(SemanticMap& map, const BlockIndex& index);
-  void groupJobs();
+  void groupJobs(ThreadPool& pool);
   // Of reserve():
   /// Reserves the planes of a job's block.
   /// @return the number of classes to which this scan may add in the block.
@@ -125,15 +130,16 @@ class MapUpdater {
   // Of mend():
   /// Adds to the bottom layer of a group what the threshold has taken above crossed voxels, or withdraws it.
   void mendSeams(const Group& group, std::size_t worker);
-  /// Adds evidence for `free` to the void voxels of a group, or takes it back. @param units of evidence.
-  void addVoids(const Group& group, EvidenceUnits units, std::size_t worker);
-  /// Notes what the scan saw of the voxels of a group, in the blocks to which it adds evidence.
-  /// @param voids_add whether it does so in void voxels.
-  void addLooks(const Group& group, bool voids_add) noexcept;
+  /// Adds evidence for `free` to the void voxels of a job's block, or takes it back. @param units of
+  /// evidence, 64 times.
+  void addVoids(std::size_t job, const EvidenceUnits* units, std::size_t worker);
+  /// Notes what the scan saw of the voxels of a job's block, if it adds evidence there. @param voids_add
+  /// whether it does so in void voxels.
+  void addLooks(std::size_t job, bool voids_add) noexcept;
 
   bool mends() const { return rules_.seeksVoids() || rules_.asksBelow(); }
-  /// Counts the memory of a group, and returns that of planes that are gone.
-  void finishGroup(const Group& group);
+  /// Counts the memory of a job's block, and returns that of planes that are gone.
+  void finish(BlockJob& job);
 
   const SumKernels& kernels_ = sumKernelsFor("");
   std::vector<GridIndex> touched_;  ///< blocks, in the order in which jobs were collected

@@ -2,6 +2,7 @@
 /// of blocks; SumSink, of a piece of evidence. Each needs the one before.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
@@ -89,7 +90,9 @@ class SumSink {
 
   /// @param blocks must stay as they are while this exists.
   SumSink(GroupInWork& group, Kind kind, const std::vector<GroupBlock>& blocks)
-      : work_(group.workspace_), kind_(kind), blocks_(blocks) {}
+      : work_(group.workspace_), kind_(kind), blocks_(blocks) {
+    for (std::size_t i = 0; i < std::min(kAhead, blocks.size()); ++i) blocks[i].block_->prefetch();
+  }
 
   /// The voxels of the i-th block that take no evidence from what is added now.
   VoxelMask protectedOf(std::size_t i) const {
@@ -100,9 +103,6 @@ class SumSink {
   /// Adds to the i-th block what `fill(BlockSums&)` puts into its empty sums. Call it by rising i.
   template <typename Fill>
   void add(std::size_t i, Fill&& fill) {
-    // Prefetch planes while the sums of the blocks before are computed.
-    constexpr std::size_t kAhead = 2;
-    if (i + 2 * kAhead < blocks_.size()) __builtin_prefetch(blocks_[i + 2 * kAhead].block_);
     if (i + kAhead < blocks_.size()) blocks_[i + kAhead].block_->prefetch();
     work_.sums_.clear();
     std::forward<Fill>(fill)(work_.sums_);
@@ -110,6 +110,9 @@ class SumSink {
   }
 
  private:
+  /// So many blocks ahead, planes are prefetched while the sums of the blocks before are computed.
+  static constexpr std::size_t kAhead = 2;
+
   void addSums(const GroupBlock& to);
   /// Also fills the seam of the block, and reached_top_. @return the voxels whose evidence for `free` reaches
   /// its limit.

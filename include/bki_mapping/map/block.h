@@ -117,6 +117,12 @@ class Block {
     }
   }
 
+  /// Prefetches the block itself, without its planes and looks.
+  void prefetchHead() const {
+    __builtin_prefetch(this);
+    __builtin_prefetch(&looks_);
+  }
+
   /// The voxels that the last scan to reach them saw only beyond the ends of its beams.
   const Occlusion& occlusion() const { return occlusion_; }
   void setOcclusion(const Occlusion& occlusion) { occlusion_ = occlusion; }

@@ -183,7 +183,10 @@ class Looks {
   void clear() noexcept { words_.clear(); }
 
   /// Prefetches the latest look for writing.
-  void prefetch() const { __builtin_prefetch(words_.data(), 1); }
+  void prefetch() const {
+    constexpr std::size_t kLine = 64 / sizeof(std::uint64_t);
+    for (std::size_t n = 0; n < StoredLook::kMostWords; n += kLine) __builtin_prefetch(words_.data() + n, 1);
+  }
 
   bool operator==(const Looks& other) const { return words_ == other.words_; }
   std::size_t bytes() const { return words_.capacity() * sizeof(std::uint64_t); }
