@@ -11,6 +11,7 @@
 #include "free_space/free_space_parameters.h"
 #include "kernel/kernel_parameters.h"
 #include "mapping/former_parameters.h"
+#include "rules/class_sets.h"
 #include "rules/rules_parameters.h"
 #include "rules/scan_limit_parameters.h"
 
@@ -122,6 +123,7 @@ MapperConfig applied(const MapperConfig& config) {
   result.prior = RulesConfig::kPrior;
   result.kernel.scale = RulesConfig::kPeak;
   result.scan_rules = ScanRules(config.rules);
+  result.scan_rules.void_margin = voidMargin(config.rules.void_margin, config.resolution);
   if (config.downsample_resolution > 0.0) {
     const double cells = std::round(config.resolution / config.downsample_resolution);
     result.downsample_resolution = config.resolution / std::max(cells, 2.0);

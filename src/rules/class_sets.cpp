@@ -6,6 +6,15 @@
 #include "bki_mapping/rules/scan_rules.h"
 
 namespace bki_mapping {
+namespace {
+
+/// A distance, rounded down, and at most ScanRules::kMostReach [voxels].
+int wholeVoxels(double metres, double resolution) {
+  constexpr double kRounding = 1e-6;  // 0.3 / 0.1 is a little less than 3
+  return static_cast<int>(std::min(std::floor(metres / resolution + kRounding), 1.0 * ScanRules::kMostReach));
+}
+
+}  // namespace
 
 ClassSet fixedClasses(const ClassTable& classes) {
   ClassSet fixed;
@@ -25,10 +34,11 @@ ClassSet askingClasses(const ClassTable& classes) {
 int thinReach(const ClassTable& classes, double resolution) {
   // Enough for tables in voxels of 0.1 m; what moves leaves it behind within a few scans.
   constexpr double kReach = 0.3;  // [m]
-  if (classes.saysWhatMoves()) return 0;
-  constexpr double kRounding = 1e-6;  // 0.3 / 0.1 is a little less than 3
-  return static_cast<int>(
-      std::clamp(std::floor(kReach / resolution + kRounding), 1.0, 1.0 * ScanRules::kMostThinReach));
+  return classes.saysWhatMoves() ? 0 : std::max(wholeVoxels(kReach, resolution), 1);
+}
+
+int voidMargin(double margin, double resolution) {
+  return wholeVoxels(margin, resolution);
 }
 
 }  // namespace bki_mapping

@@ -17,4 +17,7 @@ ClassSet askingClasses(const ClassTable& classes);
 /// [m].
 int thinReach(const ClassTable& classes, double resolution);
 
+/// ScanRules::void_margin, rounded down. @param margin, resolution [m].
+int voidMargin(double margin, double resolution);
+
 }  // namespace bki_mapping

@@ -79,13 +79,13 @@ void VoidSearch::forEachBlock(ThreadPool& pool, const Job& job) const {
 
 void VoidSearch::findAboveEmpty(ThreadPool& pool) {
   forEachBlock(pool, [&](std::size_t b) {
-    above_empty_[b] = seen_[b].hit;
-    if (above_empty_[b].none()) return;
+    near_hits_[b] = seen_[b].hit;
+    if (near_hits_[b].none()) return;
     const std::uint32_t below = beside_[b][2][0];
     const LayerBits empty = bitsOf(empty_[b]);
     LayerBits above_empty = {below == kNoPosition ? 0 : bitsOf(empty_[below])[kLast]};
     std::copy(empty.begin(), empty.end() - 1, above_empty.begin() + 1);
-    above_empty_[b] &= maskOf(above_empty);
+    near_hits_[b] &= maskOf(above_empty);
   });
 }
 
@@ -116,9 +116,14 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
     if (voids.any()) voids &= betweenIn(b, 1, along_x);
     if (voids.any()) voids &= along_y(b) & betweenIn(b, 2, along_y);
   });
-  if (thin_reach_ == 0) return;
-  findAboveEmpty(pool);
-  removeNear(blocks, above_empty_, thin_reach_, voids_, pool);
+  if (thin_reach_ > 0) {
+    findAboveEmpty(pool);
+    removeNear(blocks, near_hits_, thin_reach_, voids_, pool);
+  }
+  if (margin_ > 0) {
+    forEachBlock(pool, [&](std::size_t b) { near_hits_[b] = seen_[b].moving; });
+    removeNear(blocks, near_hits_, margin_, voids_, pool);
+  }
 }
 
 }  // namespace bki_mapping

@@ -24,19 +24,20 @@ struct SeenVoxels {
 };
 
 /// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
-/// bridged or a bound, but not near hits above empty voxels (ScanRules::thin_reach). A bridged voxel lies
-/// between two crossed ones, below and above it, and no hit adds evidence to it. Keeps its memory from scan
-/// to scan.
+/// bridged or a bound, but not near hits above empty voxels (ScanRules::thin_reach), nor near those of what
+/// can move (ScanRules::void_margin). A bridged voxel lies between two crossed ones, below and above it, and
+/// no hit adds evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {
  public:
   /// Allocates all memory for a scan. @param blocks number of those that it touches. Set at() of each before
-  /// find(). @param thin_reach as in ScanRules.
-  void start(std::size_t blocks, int thin_reach = 0) {
-    thin_reach_ = std::clamp(thin_reach, 0, ScanRules::kMostThinReach);
+  /// find(). @param thin_reach, margin as in ScanRules.
+  void start(std::size_t blocks, int thin_reach = 0, int margin = 0) {
+    thin_reach_ = std::clamp(thin_reach, 0, ScanRules::kMostReach);
+    margin_ = std::clamp(margin, 0, ScanRules::kMostReach);
     seen_.resize(blocks);
     beside_.resize(blocks);
     for (std::vector<VoxelMask>* masks : {&empty_, &open_, &along_x_, &voids_}) masks->resize(blocks);
-    if (thin_reach_ > 0) above_empty_.resize(blocks);
+    if (thin_reach_ > 0 || margin_ > 0) near_hits_.resize(blocks);
   }
   /// What the scan says of a block; until it is set, what an earlier scan said of another one. Different
   /// threads may write to different blocks.
@@ -56,19 +57,19 @@ class VoidSearch {
   /// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
   template <typename MaskOfBlock>
   VoxelMask betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const;
-  /// Sets above_empty_.
+  /// Sets near_hits_ to the voxels that contain hits and lie above empty ones.
   void findAboveEmpty(ThreadPool& pool);
   template <typename Job>
   void forEachBlock(ThreadPool& pool, const Job& job) const;
 
-  int thin_reach_ = 0;
+  int thin_reach_ = 0, margin_ = 0;  ///< [voxels]
   std::vector<SeenVoxels> seen_;
   std::vector<Beside> beside_;
   std::vector<VoxelMask> empty_;    ///< crossed or bridged
   std::vector<VoxelMask> open_;     ///< these, and bounds
   std::vector<VoxelMask> along_x_;  ///< open, with both neighbours along x
   std::vector<VoxelMask> voids_;
-  std::vector<VoxelMask> above_empty_;  ///< contain hits, above empty voxels; if thin_reach_ asks for them
+  std::vector<VoxelMask> near_hits_;  ///< hits near which no voxel is void; if a rule asks for them
 };
 
 }  // namespace bki_mapping

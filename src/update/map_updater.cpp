@@ -155,7 +155,7 @@ void MapUpdater::reserve(const UpdateLimits& limits, std::ptrdiff_t index_bytes,
     worker.mended = {};
   }
   if (rules_.asksBelow()) reserveSeams();
-  if (rules_.seeksVoids()) voids_.start(jobs_.size(), rules_.thin_reach);
+  if (rules_.seeksVoids()) voids_.start(jobs_.size(), rules_.thin_reach, rules_.void_margin);
 }
 
 void MapUpdater::useCopies(SemanticMap& map) noexcept {

@@ -282,17 +282,20 @@ TEST_P(EveryScene, HitsThatStayInTheirVoxelsEqualBruteForce) {
   }
 }
 
-/// The number of voxels that a scan alone sees empty with all their neighbours.
-std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
-  SemanticMapper mapper(config, reference::smallTable());
+/// The number of voxels that a scan alone sees empty with all their neighbours. @param evidence of a void.
+std::size_t countVoids(const Scan& scan, SemanticMapper& mapper, float evidence) {
+  mapper.reset();
   mapper.integrate(scan);
   std::size_t count = 0;
   for (const auto& entry : mapper.map().entries()) {
     const EvidenceUnits* const free = entry.block->evidence(kFreeClass);
-    for (int v = 0; free && v < kBlockVoxels; ++v)
-      count += evidenceOf(free[v]) >= config.scan_rules.void_evidence;
+    for (int v = 0; free && v < kBlockVoxels; ++v) count += evidenceOf(free[v]) >= evidence;
   }
   return count;
+}
+std::size_t countVoids(const Scan& scan, const MapperConfig& config) {
+  SemanticMapper mapper(config, reference::smallTable());
+  return countVoids(scan, mapper, config.scan_rules.void_evidence);
 }
 
 TEST_P(EveryScene, VoidsEqualBruteForce) {
@@ -306,6 +309,10 @@ TEST_P(EveryScene, VoidsEqualBruteForce) {
     config.scan_rules.thin_reach = 1;
     expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, thin things, " + mode);
     config.scan_rules.thin_reach = 0;
+    config.scan_rules.void_margin = 2;
+    expectEqualsBruteForce(scene_.scan, config, scene_.name + ", voids, threshold, margin, " + mode,
+                           reference::tableWithDynamicClass());
+    config.scan_rules.void_margin = 0;
     config.scan_rules.free_threshold = 0.0f;
     config.scan_rules.hits_before_misses = true;
     config.free_space.extent = FreeSpaceExtent::kMapped;
@@ -336,7 +343,8 @@ TEST_P(EveryScene, NoReturnsEqualBruteForce) {
   expectEqualsBruteForce(scan, withMode("line"), scene_.name + ", points at the maximum, line");
 }
 
-TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
+/// Hits of all classes on a sphere around the sensor.
+Scan denseHits() {
   Scan scan;
   scan.origin = {0.1, 0.2, 0.3};
   for (int row = -8; row <= 8; ++row) {
@@ -347,6 +355,11 @@ TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
       scan.labels.push_back(static_cast<std::uint32_t>(10 * (column % 4)));
     }
   }
+  return scan;
+}
+
+TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
+  const Scan scan = denseHits();
   MapperConfig config = withMode("line");
   config.scan_rules.most_free = 1e-3f;
   config.scan_rules.void_evidence = 0.5f;
@@ -358,11 +371,37 @@ TEST(Voids, LieBetweenTheSensorAndDenseHitsAndEqualBruteForce) {
   EXPECT_GT(countVoids(scan, config), voids / 4);
   EXPECT_LT(countVoids(scan, config), voids);
   config.scan_rules.thin_reach = 0;
+  config.scan_rules.void_margin = 2;
+  expectEqualsBruteForce(scan, config, "voids among dense beams, margin");
+  expectEqualsBruteForce(scan, config, "voids among dense beams, margin, what can move",
+                         reference::tableWithDynamicClass());
+  const std::size_t voids_far_away = countVoids(scan, config);
+  EXPECT_LT(voids_far_away, voids);
+  EXPECT_GT(voids_far_away, 0u);
+  config.scan_rules.void_margin = 0;
   config.scan_rules.free_threshold = 1e3f;  // above all that beams add
   expectEqualsBruteForce(scan, config, "voids among dense beams, threshold");
   EXPECT_EQ(countVoids(scan, config), voids);
   config.scan_rules.most_free = ScanRules().most_free;  // nothing says what counts as seen empty
   EXPECT_EQ(countVoids(scan, config), 0u);
+}
+
+TEST(Voids, KeepTheMarginOfTheRulesFromHitsOfWhatCanMove) {
+  const Scan scan = denseHits();
+  MapperConfig config = withMode("line");
+  config.rules.enabled = true;
+  SemanticMapper mapper(config, reference::tableWithDynamicClass());
+  const auto voids = [&](double margin) {
+    config.rules.void_margin = margin;
+    mapper.reconfigure(config);
+    return countVoids(scan, mapper, static_cast<float>(config.rules.emptiness()));
+  };
+  const std::size_t all = voids(0.0);
+  EXPECT_GT(all, 0u);
+  EXPECT_EQ(voids(0.9 * config.resolution), all) << "it is rounded down";
+  EXPECT_LT(voids(2.0 * config.resolution), all);
+  EXPECT_GT(voids(2.0 * config.resolution), 0u);
+  EXPECT_EQ(voids(0.0), all);
 }
 
 INSTANTIATE_TEST_SUITE_P(Nasty, EveryScene, testing::Range<std::size_t>(0, reference::nastyScenes(1).size()));

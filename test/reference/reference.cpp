@@ -464,17 +464,29 @@ ScanReference::Answer ScanReference::isVoid(const VoxelIndex& voxel) const {
       }
     }
   }
-  const int reach = config_.scan_rules.thin_reach;
-  for (int z = -reach; z <= reach; ++z) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach && reach > 0 && answer != Answer::kNo; ++x) {
-        const Answer thin = isThin({{voxel.x + x, voxel.y + y, voxel.z + z}});
-        if (thin == Answer::kYes) return Answer::kNo;
-        if (thin == Answer::kUndecided) answer = Answer::kUndecided;
+  const auto keepAway = [&](int reach, auto&& keepsAway) {
+    for (int z = -reach; z <= reach; ++z) {
+      for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach && reach > 0 && answer != Answer::kNo; ++x) {
+          const Answer is_near = keepsAway(VoxelIndex{{voxel.x + x, voxel.y + y, voxel.z + z}});
+          if (is_near == Answer::kYes) answer = Answer::kNo;
+          if (is_near == Answer::kUndecided) answer = Answer::kUndecided;
+        }
       }
     }
-  }
+  };
+  keepAway(config_.scan_rules.thin_reach, [&](const VoxelIndex& at) { return isThin(at); });
+  keepAway(config_.scan_rules.void_margin, [&](const VoxelIndex& at) { return isMoving(at); });
   return answer;
+}
+
+ScanReference::Answer ScanReference::isMoving(const VoxelIndex& voxel) const {
+  if (!isUpdated(voxel)) return Answer::kNo;
+  const Seen own = seen(voxel);
+  const Answer is_no_bound = own.bounds == Answer::kUndecided ? Answer::kUndecided
+                             : own.bounds == Answer::kNo      ? Answer::kYes
+                                                              : Answer::kNo;
+  return std::min(own.hit, is_no_bound);
 }
 
 ScanReference::Answer ScanReference::isThin(const VoxelIndex& voxel) const {

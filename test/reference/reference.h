@@ -83,6 +83,8 @@ class ScanReference {
   Answer isVoid(const VoxelIndex& voxel) const;
   /// Whether it contains a hit above a voxel that the scan sees empty.
   Answer isThin(const VoxelIndex& voxel) const;
+  /// Whether it contains a hit, and takes evidence from hits of what can move.
+  Answer isMoving(const VoxelIndex& voxel) const;
   Eigen::Vector3d relativeCentre(const VoxelIndex& voxel) const;
   Value pointEvidence(const std::vector<Point>& points, const VoxelIndex& voxel, int label) const;
   /// Whether hits of a class add evidence to voxels that do not contain them.

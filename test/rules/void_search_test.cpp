@@ -31,24 +31,24 @@ bool isEmpty(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex&
   return crossed(0) || (!hit && crossed(-1) && crossed(1));
 }
 
-/// Whether a hit above an empty voxel lies up to `reach` away along each axis.
-bool isNearThin(const IndexNumbering& blocks, VoidSearch& search, const VoxelIndex& voxel, int reach) {
+/// Whether a voxel for which keepsAway() is true lies up to `reach` away along each axis.
+template <typename KeepsAway>
+bool isNear(const VoxelIndex& voxel, int reach, KeepsAway&& keepsAway) {
   for (int z = -reach; z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
       for (int x = -reach; x <= reach; ++x) {
-        const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
-        if (has(blocks, search, at, &SeenVoxels::hit) && isEmpty(blocks, search, {{at.x, at.y, at.z - 1}}))
-          return true;
+        if (keepsAway(VoxelIndex{{voxel.x + x, voxel.y + y, voxel.z + z}})) return true;
       }
     }
   }
   return false;
 }
 
-void expectEqualsALookAtAllNeighbours(int thin_reach) {
+void expectEqualsALookAtAllNeighbours(int thin_reach, int margin) {
+  const unsigned moving_of_thousand = margin > 2 ? 10 : 1000;  // so that something is void
   std::mt19937 random(5);
   VoidSearch search;  // keeps its memory, but nothing of the scan before
-  std::size_t removed = 0;
+  std::size_t near_thin = 0, near_moving = 0;
   for (const unsigned unseen_of_thousand : {0u, 5u, 30u, 200u}) {
     for (const std::size_t threads : {1, 3}) {
       IndexNumbering added;
@@ -62,14 +62,15 @@ void expectEqualsALookAtAllNeighbours(int thin_reach) {
       IndexNumbering blocks;  // in the order of their groups
       for (const std::uint32_t b : by_group.numbers()) blocks.insert(added.members()[b]);
       ASSERT_EQ(blocks.size(), added.size());
-      search.start(blocks.size(), thin_reach);
+      search.start(blocks.size(), thin_reach, margin);
       for (std::size_t b = 0; b < blocks.size(); ++b) {
         search.at(b) = {};
         if (b % 7 == 3) continue;  // neither crossed nor hit
         for (std::size_t v = 0; v < kBlockVoxels; ++v) {
           if (random() % 1000 < unseen_of_thousand) continue;
           const auto kind = random() % 50;
-          (kind < 5 ? search.at(b).bounds : kind == 5 ? search.at(b).moving : search.at(b).crossed).set(v);
+          const bool is_moving = kind == 5 && random() % 1000 < moving_of_thousand;
+          (kind < 5 ? search.at(b).bounds : is_moving ? search.at(b).moving : search.at(b).crossed).set(v);
           if (kind <= 5 && random() % 100 == 0) search.at(b).hit.set(v);
         }
       }
@@ -87,9 +88,20 @@ void expectEqualsALookAtAllNeighbours(int thin_reach) {
             const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
             is_void = isEmpty(blocks, search, at) || has(blocks, search, at, &SeenVoxels::bounds);
           }
-          if (thin_reach > 0 && is_void && isNearThin(blocks, search, voxel, thin_reach)) {
+          const auto isThin = [&](const VoxelIndex& at) {
+            return has(blocks, search, at, &SeenVoxels::hit) &&
+                   isEmpty(blocks, search, {{at.x, at.y, at.z - 1}});
+          };
+          const auto isMoving = [&](const VoxelIndex& at) {
+            return has(blocks, search, at, &SeenVoxels::moving);
+          };
+          if (thin_reach > 0 && is_void && isNear(voxel, thin_reach, isThin)) {
             is_void = false;
-            ++removed;
+            ++near_thin;
+          }
+          if (margin > 0 && is_void && isNear(voxel, margin, isMoving)) {
+            is_void = false;
+            ++near_moving;
           }
           ASSERT_EQ(search.voidsOf(b)[static_cast<std::size_t>(v)], is_void) << b << ' ' << v;
           count += is_void;
@@ -101,15 +113,30 @@ void expectEqualsALookAtAllNeighbours(int thin_reach) {
       }
     }
   }
-  EXPECT_EQ(removed > 0, thin_reach > 0);
+  EXPECT_EQ(near_thin > 0, thin_reach > 0);
+  EXPECT_EQ(near_moving > 0, margin > 0);
 }
 
 TEST(VoidSearch, EqualsALookAtAllNeighbours) {
-  expectEqualsALookAtAllNeighbours(0);
+  expectEqualsALookAtAllNeighbours(0, 0);
 }
 
 TEST(VoidSearch, NothingNearThinThingsIsVoid) {
-  for (const int reach : {1, 3, ScanRules::kMostThinReach}) expectEqualsALookAtAllNeighbours(reach);
+  for (const int reach : {1, 3, ScanRules::kMostReach}) expectEqualsALookAtAllNeighbours(reach, 0);
+}
+
+TEST(VoidSearch, NothingNearWhatCanMoveIsVoid) {
+  for (const int margin : {1, 2, ScanRules::kMostReach}) expectEqualsALookAtAllNeighbours(0, margin);
+  expectEqualsALookAtAllNeighbours(1, 2);
+}
+
+TEST(VoidSearch, TheMarginIsRoundedDownToVoxels) {
+  EXPECT_EQ(voidMargin(0.2, 0.1), 2);
+  EXPECT_EQ(voidMargin(0.2, 0.15), 1);
+  EXPECT_EQ(voidMargin(0.2, 0.3), 0);
+  EXPECT_EQ(voidMargin(0.3, 0.1), 3) << "0.3 / 0.1 is a little less than 3";
+  EXPECT_EQ(voidMargin(0.0, 0.1), 0);
+  EXPECT_EQ(voidMargin(2.0, 0.1), ScanRules::kMostReach);
 }
 
 TEST(VoidSearch, ThingsMayBeThinWhereNoClassSaysWhatCanMove) {
@@ -118,7 +145,7 @@ TEST(VoidSearch, ThingsMayBeThinWhereNoClassSaysWhatCanMove) {
   EXPECT_EQ(thinReach(*reference::smallTable(), 0.2), 1) << "no more than 0.3 m";
   EXPECT_EQ(thinReach(*reference::smallTable(), 0.3), 1);
   EXPECT_EQ(thinReach(*reference::smallTable(), 1.0), 1);
-  EXPECT_EQ(thinReach(*reference::smallTable(), 0.01), ScanRules::kMostThinReach);
+  EXPECT_EQ(thinReach(*reference::smallTable(), 0.01), ScanRules::kMostReach);
   EXPECT_EQ(thinReach(*reference::tableWithDynamicClass(), 0.1), 0);
 }
 

@@ -2,6 +2,7 @@
 /// in time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bitset>
 #include <cstddef>
@@ -185,7 +186,8 @@ class Looks {
   /// Prefetches the latest look for writing.
   void prefetch() const {
     constexpr std::size_t kLine = 64 / sizeof(std::uint64_t);
-    for (std::size_t n = 0; n < StoredLook::kMostWords; n += kLine) __builtin_prefetch(words_.data() + n, 1);
+    const std::size_t end = std::min(words_.size(), StoredLook::kMostWords);
+    for (std::size_t n = 0; n < end; n += kLine) __builtin_prefetch(words_.data() + n, 1);
   }
 
   bool operator==(const Looks& other) const { return words_ == other.words_; }

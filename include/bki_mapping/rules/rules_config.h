@@ -9,6 +9,7 @@ namespace bki_mapping {
 struct RulesConfig {
   bool enabled = false;
   double void_outweighs = 30.0;       ///< number of scans that hit a voxel, to outweigh one that sees it void
+  double void_margin = 0.0;           ///< no voxel this near to a hit of what can move is void [m]
   double stands_after = 8.0;          ///< number of scans with hits from which on what can be parked stands
   double living_stands_after = 20.0;  ///< the same for classes flagged living
   double fixed_stands_after = 1.0;    ///< for classes that cannot move and are no ground

@@ -15,8 +15,8 @@ namespace bki_mapping {
 /// whatever kind its evidence is.
 struct ScanRules {
   ScanRules() = default;
-  /// The rules that these settings ask for. Three members are missing: `fixed` and thin_reach, which
-  /// follow from the class table, and free_threshold, which each scan has for itself.
+  /// The rules that these settings ask for. Some members are missing: `fixed` and thin_reach follow from the
+  /// class table, void_margin also from the resolution, and each scan has a free_threshold for itself.
   explicit ScanRules(const RulesConfig& rules) {
     if (!rules.enabled) return;
     hits_before_misses = true;
@@ -43,9 +43,12 @@ struct ScanRules {
   /// they count as others do.
   float void_evidence = 0.0f;
   /// A hit above a voxel that is seen empty counts as one of something thin: no voxel up to this far away
-  /// from its voxel along each axis is void; at most kMostThinReach [voxels]. 0: such hits are as others.
+  /// from its voxel along each axis is void; at most kMostReach [voxels]. 0: such hits are as others.
   int thin_reach = 0;
-  static constexpr int kMostThinReach = kBlockEdge - 1;
+  /// No voxel up to this far away along each axis from one that contains a hit and takes evidence from hits
+  /// of what can move, or has no label, is void; at most kMostReach [voxels].
+  int void_margin = 0;
+  static constexpr int kMostReach = kBlockEdge - 1;
   bool keeps_looks = false;  ///< note when the scan looked at which voxels (Looks)
   ClassSet fixed;            ///< the classes that cannot move
 
