@@ -261,9 +261,12 @@ def main():
     for scene, times in SCENES.items():
         sequences[scene] = programs.simulate(f'{scene}{times * given.scans}', scene=scene, scans=times * given.scans)
     source = f'Measured on {datetime.date.today()}, commit {given.commit or commit()}'
-    scans = f", {given.scans} scans of each simulated drive, in rooms {SCENES['rooms'] * given.scans}"
     for name in names:
-        table = f"\n{source}{'' if name == 'longer' else scans}:\n\n{tables[name]()}\n"
+        rows = tables[name]()
+        scans = '' if name == 'longer' else f', {given.scans} scans of each simulated drive'
+        if scans and '\n| rooms' in rows:
+            scans += f", in rooms {SCENES['rooms'] * given.scans}"
+        table = f'\n{source}{scans}:\n\n{rows}\n'
         with open(given.document) as file:
             text = file.read()
         with open(given.document, 'w') as file:
