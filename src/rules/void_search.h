@@ -24,7 +24,7 @@ struct SeenVoxels {
 };
 
 /// Finds void voxels: crossed or bridged, with 18 neighbours across faces and edges of which each is crossed,
-/// bridged or a bound, but not near hits above empty voxels (ScanRules::thin_reach), nor near those of what
+/// bridged or a bound, but not near hits above empty voxels (ScanRules::thin_reach), nor near hits of what
 /// can move (ScanRules::void_margin). A bridged voxel lies between two crossed ones, below and above it, and
 /// no hit adds evidence to it. Keeps its memory from scan to scan.
 class VoidSearch {

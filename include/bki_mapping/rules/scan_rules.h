@@ -15,8 +15,9 @@ namespace bki_mapping {
 /// whatever kind its evidence is.
 struct ScanRules {
   ScanRules() = default;
-  /// The rules that these settings ask for. Some members are missing: `fixed` and thin_reach follow from the
-  /// class table, void_margin also from the resolution, and each scan has a free_threshold for itself.
+  /// The rules that these settings ask for. Some members are missing: `fixed` follows from the class table,
+  /// thin_reach also from the resolution, void_margin from its setting and the resolution, and each scan has
+  /// a free_threshold for itself.
   explicit ScanRules(const RulesConfig& rules) {
     if (!rules.enabled) return;
     hits_before_misses = true;
@@ -46,7 +47,7 @@ struct ScanRules {
   /// from its voxel along each axis is void; at most kMostReach [voxels]. 0: such hits are as others.
   int thin_reach = 0;
   /// No voxel up to this far away along each axis from one that contains a hit and takes evidence from hits
-  /// of what can move, or has no label, is void; at most kMostReach [voxels].
+  /// of what can move or has no label is void; at most kMostReach [voxels].
   int void_margin = 0;
   static constexpr int kMostReach = kBlockEdge - 1;
   bool keeps_looks = false;  ///< note when the scan looked at which voxels (Looks)
