@@ -79,13 +79,13 @@ void VoidSearch::forEachBlock(ThreadPool& pool, const Job& job) const {
 
 void VoidSearch::findAboveEmpty(ThreadPool& pool) {
   forEachBlock(pool, [&](std::size_t b) {
-    near_hits_[b] = seen_[b].hit;
-    if (near_hits_[b].none()) return;
+    guards_[b] = seen_[b].hit;
+    if (guards_[b].none()) return;
     const std::uint32_t below = beside_[b][2][0];
     const LayerBits empty = bitsOf(empty_[b]);
     LayerBits above_empty = {below == kNoPosition ? 0 : bitsOf(empty_[below])[kLast]};
     std::copy(empty.begin(), empty.end() - 1, above_empty.begin() + 1);
-    near_hits_[b] &= maskOf(above_empty);
+    guards_[b] &= maskOf(above_empty);
   });
 }
 
@@ -118,11 +118,11 @@ void VoidSearch::find(const BlocksByGroup& blocks, ThreadPool& pool) {
   });
   if (thin_reach_ > 0) {
     findAboveEmpty(pool);
-    removeNear(blocks, near_hits_, thin_reach_, voids_, pool);
+    removeNear(blocks, guards_, thin_reach_, voids_, pool);
   }
   if (margin_ > 0) {
-    forEachBlock(pool, [&](std::size_t b) { near_hits_[b] = seen_[b].moving; });
-    removeNear(blocks, near_hits_, margin_, voids_, pool);
+    forEachBlock(pool, [&](std::size_t b) { guards_[b] = seen_[b].moving; });
+    removeNear(blocks, guards_, margin_, voids_, pool);
   }
 }
 

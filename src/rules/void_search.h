@@ -37,7 +37,7 @@ class VoidSearch {
     seen_.resize(blocks);
     beside_.resize(blocks);
     for (std::vector<VoxelMask>* masks : {&empty_, &open_, &along_x_, &voids_}) masks->resize(blocks);
-    if (thin_reach_ > 0 || margin_ > 0) near_hits_.resize(blocks);
+    if (thin_reach_ > 0 || margin_ > 0) guards_.resize(blocks);
   }
   /// What the scan says of a block; until it is set, what an earlier scan said of another one. Different
   /// threads may write to different blocks.
@@ -57,7 +57,7 @@ class VoidSearch {
   /// The voxels of a block between members along an axis. @param maskOfBlock the members, by position.
   template <typename MaskOfBlock>
   VoxelMask betweenIn(std::size_t b, std::size_t axis, const MaskOfBlock& maskOfBlock) const;
-  /// Sets near_hits_ to the voxels that contain hits and lie above empty ones.
+  /// Sets guards_ to the voxels that contain hits and lie above empty ones.
   void findAboveEmpty(ThreadPool& pool);
   template <typename Job>
   void forEachBlock(ThreadPool& pool, const Job& job) const;
@@ -69,7 +69,7 @@ class VoidSearch {
   std::vector<VoxelMask> open_;     ///< these, and bounds
   std::vector<VoxelMask> along_x_;  ///< open, with both neighbours along x
   std::vector<VoxelMask> voids_;
-  std::vector<VoxelMask> near_hits_;  ///< hits near which no voxel is void; if a rule asks for them
+  std::vector<VoxelMask> guards_;  ///< hits near which no voxel is void; if a rule asks for them
 };
 
 }  // namespace bki_mapping
