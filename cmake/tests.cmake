@@ -273,7 +273,7 @@ if(BKI_MAPPING_LAB)
     COST 80)
   bki_mapping_long_tests(navigation_test traffic_test)
   bki_mapping_long_programs(navigation_test)
-  bki_mapping_unit_tests(evaluation cloud dynamics noise occupancy octomap_mapper presence semantics trace truth)
+  bki_mapping_unit_tests(evaluation cloud dynamics left_out noise occupancy octomap_mapper presence semantics trace truth)
 endif()
 
 # Tests in Python: the programs as a user calls them, and the layering of the rooms.

@@ -22,6 +22,15 @@ JUDGED = ('stands_after=4', 'stands_after=16', 'living_stands_after=10', 'living
           'together=0.3', 'together=1.2')
 MEASURED = ('void_outweighs=0', 'void_outweighs=20', 'void_outweighs=60')
 FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81}  # raw labels in rooms
+# Rules of evaluate_map --without, alone or together, and where in docs/method.md they are. At 0.1 m only some.
+RULES = (('hits_stay', '3a'), ('hits_first', ''), ('hit_limit', '14'), ('threshold', '14'), ('voids', '14a'), ('passing', '12'),
+         ('standing', '12'), ('living', '12'), ('fixed_gain', '12'), ('edge', '12'), ('remaining', '12a'), ('neighbours', '12b'),
+         ('vote_limit', '12b'), ('looks', '12c'), ('has_stayed', '12c'), ('free_sum_limit', '12c'))
+PAIRS = ('remaining neighbours', 'neighbours looks', 'neighbours standing', 'neighbours passing', 'voids neighbours',
+         'voids looks', 'threshold looks', 'hits_first neighbours', 'hits_first looks')
+FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours', 'vote_limit', 'looks', 'has_stayed',
+        'free_sum_limit', 'neighbours looks')
+LEAST_CHANGE = 0.3  # that a table of rules has [percentage points]
 SHAKEN = ('--pose-noise', '0.05,0.3')
 
 
@@ -33,7 +42,9 @@ def share(report, *path):
 
 
 def emptiness(report):
-    """The least fraction of free voxels that are mostly empty, of all distances, in percent."""
+    """The least fraction of free voxels that are mostly empty, of all distances, in percent; '' if no truth is known."""
+    if not report.get('truth'):
+        return ''
     of_distances = (each['free_precision'] for each in report['truth']['by_distance'])
     return f'{100 * min(each for each in of_distances if each is not None):.1f}'
 
@@ -139,6 +150,31 @@ def table_of_settings(runs, sequences):
     return markdown(['setting', *drives], rows)
 
 
+def change(without, every):
+    """What a figure that is not the same without a rule has more or less than with every rule; '' if it is hardly anything."""
+    if not (without and every):
+        return ''
+    more = float(without) - float(every)
+    return f'{more:+.1f}'.replace('-', '−') if abs(more) >= LEAST_CHANGE - 1e-9 else ''
+
+
+def table_of_rules(runs, sequences, drives, rules, settings=()):
+    """For each rule that is left out, or several, and each drive: all figures that change."""
+    columns = (SA, PARKED, HOLES, DA, ('PA', PA50[1]), STAYED, ('empty', EMPTY[1]))
+    drives = {drive: sequences[drive] for drive in drives if drive in sequences}
+    rows = []
+    for left_out in rules:
+        names, equation = left_out.split(), dict(RULES).get(left_out)
+        row = [', '.join(f'`{name}`' for name in names) + (f' ({equation})' if equation else '')]
+        more = [word for name in names for word in ('--without', name)]
+        for sequence in drives.values():
+            with_all, without = runs.report(sequence, settings), runs.report(sequence, settings, more)
+            changes = ((title, change(of(without), of(with_all))) for title, of in columns)
+            row.append(', '.join(f'{title} {value}' for title, value in changes if value))
+        rows.append(row)
+    return markdown(['without', *drives], rows)
+
+
 def table_without_labels(runs, sequences):
     """If no point has a label, and the height of the sensor is set; in rooms with several settings."""
     columns = (SA, DA, DECIDABLE, PA50)
@@ -201,6 +237,9 @@ def tables_of(runs, programs, given, sequences):
         'paper': lambda: by_drive(runs, sequences, [('', {'preset': 'paper_line'}, (*robot, DECIDABLE, PA50))]),
         'longer': lambda: table_of_longer_drives(runs, programs, given.scans),
         'sensors': lambda: table_of_sensors(runs, programs, given.scans),
+        'rules': lambda: table_of_rules(runs, sequences, ('04', '05', '07', 'street', 'crowd', 'traffic', 'arrivals', 'rooms'),
+                                        [name for name, _ in RULES] + list(PAIRS)),
+        'rules, 0.1 m': lambda: table_of_rules(runs, sequences, ('04', '05', '07', 'crowd', 'rooms'), FINE, ['resolution=0.1']),
         'settings': lambda: table_of_settings(runs, sequences),
         'no labels': lambda: table_without_labels(runs, sequences),
         'presence': lambda: table_of_presence(runs, {d: s for d, s in sequences.items() if d not in ('street', 'rooms')}),

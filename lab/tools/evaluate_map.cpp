@@ -2,7 +2,6 @@
 // calibration.
 #include <filesystem>
 #include <iostream>
-#include <list>
 #include <sstream>
 
 #include "bki_mapping/core/named_parameter.h"
@@ -11,10 +10,9 @@
 #include "bki_mapping/sequence/sequence.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"
-#include "evaluation/cloud_evaluation.h"
+#include "evaluation/left_out.h"
+#include "evaluation/map_evaluation.h"
 #include "evaluation/noise.h"
-#include "evaluation/octomap_mapper.h"
-#include "evaluation/presence_evaluation.h"
 #include "evaluation/quality_report.h"
 #include "journal/sensor_scan.h"
 #include "settings/label_watch.h"
@@ -47,6 +45,7 @@ std::string decidingParameters() {
 po::options_description options() {
   const std::string judge =
       "also give SA and DA of the same map with other values of " + decidingParameters() + "; repeatable";
+  const std::string without = "leave out one of the mapper's rules: " + namesOfRules() + "; repeatable";
   po::options_description options("Options");
   options.add_options()("json", po::value<std::string>()->value_name("FILE.json"),
                         "JSON file for the figures")(
@@ -82,156 +81,13 @@ po::options_description options() {
       "also map the same points with OctoMap, with these settings or the default ones of octomap_server, "
       "called default, and measure that map; repeatable")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
-      judge.c_str())("noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
-                     "seed of the errors");
+      judge.c_str())("without", po::value<std::vector<std::string>>()->composing()->value_name("RULE"),
+                     without.c_str())(
+      "noise-seed", tools::countOption("--noise-seed", 0)->value_name("N")->default_value(1),
+      "seed of the errors");
   options.add(tools::sequenceOptions()).add(tools::mapperOptions());
   return options;
 }
-
-std::string voxelRow(const GridGeometry& geometry, const VoxelIndex& voxel, const std::string& what) {
-  const Eigen::Vector3d p = geometry.voxelCentre(voxel);
-  return numberText(p.x()) + "," + numberText(p.y()) + "," + numberText(p.z()) + "," + what + "\n";
-}
-
-/// Follows what is not there on a simulated drive.
-struct TracesEvaluation {
-  explicit TracesEvaluation(const GridGeometry& geometry)
-      : particles(geometry, simulation::isParticle, simulation::isNothing),
-        images(geometry, simulation::isImage, simulation::isNothing) {}
-  void add(const Scan& scan, Occupants& map) {
-    particles.add(scan, map);
-    images.add(scan, map);
-  }
-  TracesOfKinds quality(Occupants& map) const { return {particles.quality(map), images.quality(map)}; }
-  TraceEvaluation particles, images;
-};
-
-/// An OctoMap of the same scans, and what only it has.
-struct OctomapRun {
-  OctomapRun(const std::string& given, const GridGeometry& geometry, const KittiLabels& moving)
-      : settings(given),
-        mapper(geometry.resolution(), octomapSettings(given)),
-        presence(geometry, moving),
-        traces(geometry) {}
-  std::string settings;  ///< as given
-  OctomapMapper mapper;
-  PresenceEvaluation presence;
-  TracesEvaluation traces;
-  ScanTimes times;
-};
-
-/// The measures of one run.
-struct Evaluation {
-  DynamicsEvaluation dynamics;
-  PresenceEvaluation presence;
-  SemanticEvaluation semantics;
-  OccupancyEvaluation occupancy;
-  std::optional<TruthEvaluation> truth;
-  std::optional<TracesEvaluation> traces;  ///< of a simulated drive
-  std::optional<CloudEvaluation> cloud;
-  std::list<OctomapRun> octomaps;
-  double end = 0.0;  ///< time of the last scan since the start of the drive [s]
-
-  std::size_t labels = 0, unknown_labels = 0;
-  std::uint32_t unknown_label = 0;
-
-  /// @param predicted the labels given to the mapper.
-  void add(const Scan& scan, const std::vector<std::uint32_t>& predicted, const ClassTable& classes) {
-    dynamics.add(scan, classes);
-    semantics.add(scan, predicted, classes);
-    occupancy.add(scan);
-    addPoints(scan);
-    labels += scan.labels.size();
-    for (const std::uint32_t label : scan.labels) {
-      if (classes.classOf(label, labelValues(scan))) continue;
-      ++unknown_labels;
-      unknown_label = label;
-    }
-  }
-
-  /// The same for a scan without labels: the ground-truth cloud, if there is one, says what moves.
-  void addUnlabelled(const Scan& scan, const ClassTable& classes) {
-    dynamics.add(cloud ? cloud->labelled(scan) : Scan(), classes, scan);
-    addPoints(scan);
-  }
-
-  void addPoints(const Scan& scan) {
-    if (truth) truth->add(scan);
-    if (cloud) cloud->add(scan);
-  }
-
-  /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known.
-  DynamicsEvaluation::Taken taken() const {
-    if (!truth) return {};
-    return [this](const VoxelIndex& voxel) { return truth->isTaken(voxel, end); };
-  }
-
-  /// Call once `truth` and `octomaps` are there. This must then stay where it is.
-  void tellTruth() {
-    const auto is_taken = [this](const VoxelIndex& voxel, double time) {
-      return truth->isTaken(voxel, time - 1e-9 * static_cast<double>(Sequence::kFirstStamp));
-    };
-    presence.setTruth(is_taken);
-    for (OctomapRun& octomap : octomaps) octomap.presence.setTruth(is_taken);
-  }
-
-  MapQuality compare(const SemanticMapper& mapper) {
-    const SemanticMap& map = mapper.map();
-    const StateRules& rules = mapper.rules();
-    MapQuality quality;
-    quality.dynamics = dynamics.compare(map, rules, taken());
-    MapOccupants occupants(map, rules);
-    quality.presence = presence.quality(occupants);
-    if (traces) quality.traces = traces->quality(occupants);
-    const auto left = [&](const VoxelIndex& voxel) { return dynamics.hasBeenLeft(voxel, taken()); };
-    const auto still_there = [&](const VoxelIndex& voxel) { return dynamics.isStillThere(voxel, taken()); };
-    quality.semantics = semantics.compare(map, rules, still_there);
-    quality.occupancy = occupancy.compare(map, rules, left);
-    if (truth) quality.truth = truth->compare(map, rules, end);
-    for (OctomapRun& octomap : octomaps) {
-      std::optional<TruthQuality> space;
-      if (truth) space = truth->compare(octomap.mapper, end);
-      quality.octomaps.push_back({octomap.settings, dynamics.compare(octomap.mapper, taken()),
-                                  octomap.presence.quality(octomap.mapper),
-                                  occupancy.compare(octomap.mapper, left), space, std::nullopt,
-                                  octomap.times.median(), octomap.mapper.bytes()});
-      if (traces) quality.octomaps.back().traces = octomap.traces.quality(octomap.mapper);
-    }
-    quality.bytes = map.bytes();
-    if (cloud) quality.cloud = cloud->compare(map, rules);
-    quality.labels = labels;
-    quality.unknown_labels = unknown_labels;
-    quality.unknown_label = unknown_label;
-    forEachKnownVoxel(map, rules, [&](const VoxelIndex&, const VoxelView& view) {
-      if (view.state == VoxelState::kOccupied) ++quality.voxels_by_class[view.label];
-    });
-    return quality;
-  }
-
-  /// One row per voxel with points: its centre and its outcome.
-  std::string fateRows(const GridGeometry& geometry, Occupants& map) const {
-    std::string csv = "x,y,z,what\n";
-    constexpr const char* kNames[] = {"kept", "lost", "forgotten", "left"};
-    for (const auto& [voxel, fate] : dynamics.fates(map, taken()))
-      csv += voxelRow(geometry, voxel, kNames[static_cast<int>(fate)]);
-    return csv;
-  }
-
-  /// The same with all other errors, which come last, so that they are drawn on top.
-  std::string errorRows(const SemanticMapper& mapper) const {
-    const SemanticMap& map = mapper.map();
-    const StateRules& rules = mapper.rules();
-    MapOccupants occupants(map, rules);
-    std::string csv = fateRows(map.geometry(), occupants);
-    const auto add = [&](const VoxelIndex& voxel, const char* what) {
-      csv += voxelRow(map.geometry(), voxel, what);
-    };
-    for (const VoxelIndex& voxel : semantics.wrongVoxels(map, rules)) add(voxel, "wrong class");
-    if (!truth) return csv;
-    for (const VoxelIndex& voxel : truth->ghosts(map, rules, end)) add(voxel, "ghost");
-    return csv;
-  }
-};
 
 std::optional<PoseNoise> poseNoise(const po::variables_map& given) {
   if (given.count("pose-noise") && given.count("pose-drift")) {
@@ -322,9 +178,18 @@ Scan asKept(const Scan& scan, const SequenceFrame& frame, const po::variables_ma
   return place(rounded.scan, rounded.T_map_sensor);
 }
 
+MapperConfig configOf(const po::variables_map& given) {
+  MapperConfig config = tools::mapperConfig(given);
+  if (!given.count("without")) return config;
+  for (const std::string& rule : given["without"].as<std::vector<std::string>>()) {
+    config = withoutRule(config, rule);
+  }
+  return config;
+}
+
 int evaluate(const po::variables_map& given) {
   const tools::Interruption interruption;
-  SemanticMapper mapper(tools::mapperConfig(given), tools::classTable(given));
+  SemanticMapper mapper(configOf(given), tools::classTable(given));
   const std::vector<Judgement> others = judgements(given, mapper.config());
   const Sequence sequence = tools::openSequence(given);
   const auto [first, last] = tools::frameRange(given, sequence);
@@ -351,14 +216,8 @@ int evaluate(const po::variables_map& given) {
   }
   const GridGeometry& geometry = mapper.map().geometry();
   const auto moving = KittiLabels::moving();
-  Evaluation evaluation{DynamicsEvaluation(geometry, moving, last - first, tools::count(given, "late")),
-                        PresenceEvaluation(geometry, moving),
-                        SemanticEvaluation(geometry, moving),
-                        OccupancyEvaluation(geometry, moving),
-                        std::nullopt,
-                        std::nullopt,
-                        cloudEvaluation(given, sequence, mapper.config()),
-                        {}};
+  MapEvaluation evaluation(geometry, moving, last - first, tools::count(given, "late"),
+                           cloudEvaluation(given, sequence, mapper.config()));
   if (given.count("octomap")) {
     for (const std::string& settings : given["octomap"].as<std::vector<std::string>>())
       evaluation.octomaps.emplace_back(settings, geometry, moving);

@@ -134,6 +134,7 @@ struct SemanticMapper::Pipeline {
   /// The threshold of free space for a scan, whose hits the preprocessor holds.
   float thresholdFor(const ScanView& scan) {
     if (!config.rules.enabled) return config.scan_rules.free_threshold;
+    if (!config.rules.has(Rule::kThreshold)) return 0.0f;
     double above = scan.sensor_model.value_or(config.sensor_model).height;
     if (!(above > 0.0)) above = height.in(preprocessor.hitGroups());
     if (!(above > 0.0)) return 0.0f;

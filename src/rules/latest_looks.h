@@ -28,7 +28,7 @@ enum class Stay : std::uint8_t {
 /// @param best evidence of the likeliest class.
 inline Stay stayOf(EvidenceUnits best, const StateRules& rules) {
   if (best >= rules.staysFrom()) return Stay::kLong;
-  return 2 * std::int64_t{best} >= rules.mostVote() ? Stay::kSome : Stay::kPassing;
+  return best >= rules.arrivedStaysFrom() ? Stay::kSome : Stay::kPassing;
 }
 
 /// What the looks say of a voxel: kKept, kCleared, or kNotOverruled where the sum decides.

@@ -35,15 +35,17 @@ constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAft
 /// Evidence from which on a thing stands that does so after this many scans with hits in a voxel of 0.3 m.
 /// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in
 /// a share of the scans that grows with the edge, too. Half a hit may be missing.
-double evidenceToStand(double scans, double resolution) {
+double evidenceToStand(const RulesConfig& config, double scans, double resolution) {
   constexpr double kUsual = 0.3;    // [m]
   constexpr double kGrowth = 1.25;  // with 1.5, too little of what is parked stands in voxels of 0.6 m
-  return std::max(scans * std::pow(resolution / kUsual, kGrowth) - 0.5, 0.0) * RulesConfig::kHit;
+  const double growth = config.has(Rule::kEdge) ? std::pow(resolution / kUsual, kGrowth) : 1.0;
+  return std::max(scans * growth - 0.5, 0.0) * RulesConfig::kHit;
 }
 
 bool haveSameValues(const RulesConfig& a, const RulesConfig& b) {
   const auto parameters = rulesParameters();
-  return std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) { return p.equal(a, b); });
+  return a.without == b.without &&
+         std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) { return p.equal(a, b); });
 }
 
 }  // namespace
@@ -59,7 +61,7 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
                        : says_what_moves        ? kNeighbourhoodRatio
                                                 : kRatioOfUnknown;
   *this = withHitOfScan(RulesConfig::kHit)
-              .withRemaining(kRemaining, fixedClasses(classes))
+              .withRemaining(config.has(Rule::kRemaining) ? kRemaining : 0.0, fixedClasses(classes))
               // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
               .withNeighbourhood(ratio, askingClasses(classes), says_what_moves, reach)
               .withLatest(config.latest);
@@ -71,9 +73,9 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
                            : c.living       ? config.living_stands_after
                                             : config.stands_after;
       *this = withFreeGain(c.id, says_what_moves ? kGainOfPassing : kGainOfUnknown,
-                           evidenceToStand(scans, resolution));
+                           evidenceToStand(config, scans, resolution));
     } else if (!c.unlabelled) {
-      *this = withFreeGain(c.id, kGainOfFixed);
+      *this = withFreeGain(c.id, config.has(Rule::kFixedGain) ? kGainOfFixed : 1.0);
       const double confirmed = config.fixed_stands_after;  // half a hit may be missing
       if (confirmed > 1.0 && !c.ground)
         *this = withConfirmation(c.id, kGainOfUnconfirmed, (confirmed - 0.5) * RulesConfig::kHit);

@@ -94,6 +94,11 @@ class Figures(unittest.TestCase):
         right, wrong = (float(cell) for cell in row.split('|')[3:5])
         self.assertGreater(right, wrong)
         self.assertIn('`rules/together` 1.2', quality.table_of_settings(runs, {'street': self.drive}))
+        header, _, looks, both = quality.table_of_rules(runs, sequences, ('drive', 'missing'), ('looks', 'voids looks')).splitlines()
+        self.assertEqual(header, '| without | drive |')
+        self.assertIn('| `looks` (12c) |', looks)
+        self.assertRegex(looks, r'PA −[1-9]')
+        self.assertIn('| `voids`, `looks` |', both)
         header, _, row = quality.table_of_presence(runs, sequences).splitlines()
         self.assertEqual(row.count('|'), header.count('|'))
         header, _, *rows_of_longer = quality.table_of_longer_drives(runs, self.programs, 2).splitlines()
@@ -101,6 +106,10 @@ class Figures(unittest.TestCase):
         self.assertEqual({row.count('|') for row in rows_of_longer}, {header.count('|')})
         with unittest.mock.patch.object(self.programs, 'evaluate', side_effect=AssertionError('measured twice')):
             self.assertEqual(quality.measured(runs, sequences, (0.2, 0.4)), rows)
+
+    def test_changes_are_listed_from_a_least_one_on(self):
+        self.assertEqual([quality.change(*each) for each in (('99.0', '98.7'), ('98.7', '99.0'), ('98.8', '99.0'), ('', '99.0'))],
+                         ['+0.3', '−0.3', '', ''])
 
     def test_a_table_of_quality_replaces_that_between_its_marks(self):
         begin, end = quality.marks('x')

@@ -272,6 +272,18 @@ class Tools(ProgramTest):
         self.fails('given twice', 'evaluate_map', *sequence, '--judge', 'rules/together=1,rules/together=2')
         self.fails('rules/together only', 'evaluate_map', *sequence, '--judge', 'rules/stand_after=1')
 
+    def test_rules_are_left_out(self):
+        given = ('rules/enabled=true', 'rules/latest=true')
+        def unlike(figures):  # times differ from run to run
+            return {name: value for name, value in figures.items() if not name.endswith('_ms')}
+        every = self.evaluation(*given)
+        without = self.evaluation(*given, more=('--without', 'looks', '--without', 'voids'))
+        self.assertEqual(unlike(without), unlike(self.evaluation('rules/enabled=true', 'rules/latest=false', 'rules/void_outweighs=0')))
+        self.assertNotEqual(unlike(without), unlike(every))
+        self.fails("there is no rule 'void' to leave out; known: hits_stay, ", 'evaluate_map', '--sequence', self.drive,
+                   '--set', 'rules/enabled=true', '--without', 'void')
+        self.fails('rules/enabled is false', 'evaluate_map', '--sequence', self.drive, '--without', 'voids')
+
     def cloud_figures(self, drive, *more):
         result = call('evaluate_map', '--sequence', drive, '--late', '1', '--cloud', '--json', self.path('figures.json'), *more)
         self.assertEqual((result.returncode, result.stderr), (0, ''))

@@ -20,9 +20,9 @@ struct ScanRules {
   /// a free_threshold for itself.
   explicit ScanRules(const RulesConfig& rules) {
     if (!rules.enabled) return;
-    hits_before_misses = true;
-    static_spread = false;
-    most_hits = static_cast<float>(RulesConfig::kHit);
+    hits_before_misses = rules.has(Rule::kHitsFirst);
+    static_spread = !rules.has(Rule::kHitsStay);
+    if (rules.has(Rule::kHitLimit)) most_hits = static_cast<float>(RulesConfig::kHit);
     most_free = static_cast<float>(RulesConfig::kCrossing);
     void_evidence = static_cast<float>(rules.emptiness());
     keeps_looks = rules.latest;

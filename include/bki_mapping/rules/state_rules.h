@@ -67,10 +67,7 @@ class StateRules {
   StateRules withHitOfScan(double evidence) const;
   /// The most that one voxel counts for in a neighbourhood [units]: the hits of kMostVotes scans; beyond
   /// that, further hits say nothing new.
-  EvidenceUnits mostVote() const {
-    if (!(hit_of_scan_ > 0.0f)) return kMostVote;
-    return std::max(unitsOf(std::min(kMostVotes * hit_of_scan_, kMostVote * kEvidenceUnit)), 1);
-  }
+  EvidenceUnits mostVote() const { return config_.has(Rule::kVoteLimit) ? evidenceOfVotes() : kMostVote; }
   static constexpr int kMostVotes = 16;
   /// The same where the evidence of a scan is not known or large; sums over a neighbourhood then still fit 32
   /// bits.
@@ -85,15 +82,19 @@ class StateRules {
   /// has looked at it since its last hit.
   EvidenceUnits staysFrom() const {
     static_assert(kStaysAfter % kMostVotes == 0);
-    return kStaysAfter / kMostVotes * mostVote();
+    return config_.has(Rule::kHasStayed) ? kStaysAfter / kMostVotes * evidenceOfVotes() : kMostUnits;
   }
   static constexpr int kStaysAfter = 160;  ///< 16 s at 10 Hz
+  /// The same for a voxel that an earlier visit saw, but did not hit [units].
+  EvidenceUnits arrivedStaysFrom() const {
+    return config_.has(Rule::kHasStayed) ? (evidenceOfVotes() + 1) / 2 : kMostUnits;
+  }
 
   /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
   /// kMostFree scans. What has been hit in more stands until it is seen void, however long space was free
   /// before it came.
   EvidenceUnits mostFree() const {
-    if (!latest_decides_ || !(hit_of_scan_ > 0.0f)) return kMostUnits;
+    if (!latest_decides_ || !(hit_of_scan_ > 0.0f) || !config_.has(Rule::kFreeSumLimit)) return kMostUnits;
     return unitsOf(kMostFree * std::min(static_cast<double>(hit_of_scan_), 1.0));
   }
   static constexpr int kMostFree = 300;
@@ -103,6 +104,12 @@ class StateRules {
   bool decidesAs(const StateRules& other) const;
 
  private:
+  /// Of the hits of kMostVotes scans [units].
+  EvidenceUnits evidenceOfVotes() const {
+    if (!(hit_of_scan_ > 0.0f)) return kMostVote;
+    return std::max(unitsOf(std::min(kMostVotes * hit_of_scan_, kMostVote * kEvidenceUnit)), 1);
+  }
+
   RulesConfig config_;
   std::array<float, 256> free_gains_, standing_gains_, stands_after_;
   float hit_of_scan_ = 0.0f, remaining_gain_ = 0.0f, neighbourhood_ratio_ = 0.0f;
