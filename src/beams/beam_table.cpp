@@ -18,11 +18,21 @@ int columnOf(const Eigen::Vector2d& v) {
 
 void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::uint32_t>& order) {
   constexpr std::size_t kCells = kBeamRows * kBeamColumns;
-  begin_.assign(kCells + 1, 0);
+  const auto count = static_cast<std::uint32_t>(cells.size());
+  order.resize(count);
+  begin_.resize(kCells + 1);
+  // Lidars have beams in a part of the rows only: above and below them, nothing is counted.
+  std::uint32_t low = kCells, high = 0;
+  for (const std::uint32_t cell : cells) {
+    low = std::min(low, cell);
+    high = std::max(high, cell + 1);
+  }
+  std::fill(begin_.begin(), begin_.begin() + std::max(low, high) + 1, 0u);
+  std::fill(begin_.begin() + std::max(low, high) + 1, begin_.end(), count);
+  if (count == 0) return;
   for (const std::uint32_t cell : cells) ++begin_[cell + 1];
-  order.resize(cells.size());
-  groupBy(kCells, begin_.data(), [&](auto&& positionOf) {
-    for (std::uint32_t b = 0; b < cells.size(); ++b) order[positionOf(cells[b])] = b;
+  groupBy(high - low, begin_.data() + low, [&](auto&& positionOf) {
+    for (std::uint32_t b = 0; b < count; ++b) order[positionOf(cells[b] - low)] = b;
   });
 }
 

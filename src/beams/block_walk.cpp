@@ -113,6 +113,22 @@ template <typename Visit>
   }
 }
 
+/// The box that holds the sensor and the ends of the beams, relative to the sensor [m].
+Eigen::AlignedBox3d boxAround(const Beams& beams, const Chunks& chunks, ThreadPool& pool) {
+  Eigen::AlignedBox3f boxes[Chunks::kMost];
+  pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
+    Eigen::Array3f low = Eigen::Array3f::Zero(), high = Eigen::Array3f::Zero();
+    for (std::size_t b = chunks.begin(c); b < chunks.end(c); ++b) {
+      low = low.min(beams.ends[b].array());
+      high = high.max(beams.ends[b].array());
+    }
+    boxes[c] = {low.matrix(), high.matrix()};
+  });
+  Eigen::AlignedBox3f all(Eigen::Vector3f::Zero());
+  for (std::size_t c = 0; c < chunks.count(); ++c) all.extend(boxes[c]);
+  return all.cast<double>();
+}
+
 /// Marks are bytes that several threads set at once, to the same value.
 bool isMarked(const std::uint8_t& mark) {
   return __atomic_load_n(&mark, __ATOMIC_RELAXED) != 0;
@@ -184,11 +200,9 @@ void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams
                                 double reach, std::size_t most, ThreadPool& pool,
                                 std::vector<GridIndex>& blocks) {
   if (beams.ends.empty()) return;
-  Eigen::Array3d low = Eigen::Array3d::Zero(), high = Eigen::Array3d::Zero();
-  for (const Eigen::Vector3f& end : beams.ends) {
-    low = low.min(end.array().cast<double>());
-    high = high.max(end.array().cast<double>());
-  }
+  const Chunks chunks(beams.ends.size());
+  const Eigen::AlignedBox3d around = boxAround(beams, chunks, pool);
+  Eigen::Array3d low = around.min(), high = around.max();
   if (piece.shadow) {
     low = low.min(-piece.shadow_range);
     high = high.max(piece.shadow_range);
@@ -226,7 +240,6 @@ void BlockWalk::listBlocksAlong(const GridGeometry& geometry, const Beams& beams
   const auto count = static_cast<std::size_t>(size.prod());
   clearMarks(count);
   const std::ptrdiff_t strides[3] = {1, box.size.x(), std::ptrdiff_t{box.size.x()} * box.size.y()};
-  const Chunks chunks(beams.ends.size());
   pool.forEach(chunks.count(), [&](std::size_t c, std::size_t) {
     forEachBundle(beams, chunks.begin(c), chunks.end(c), piece, per_metre,
                   [&](const Bundle& bundle, std::size_t) {

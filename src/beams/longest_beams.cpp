@@ -48,24 +48,28 @@ void spread(int width, float* ring, int columns, const LineKernels& kernels, flo
 
 }  // namespace
 
-void LongestBeams::findLengths(const BeamField& field) {
-  fine_.levels[0].assign(fine_.at(kBeamRows), 0.0f);
-  coarse_.levels[0].assign(coarse_.at(kBeamRows), 0.0f);
+void LongestBeams::findLengths(const BeamField& field, ThreadPool& pool) {
   const std::size_t count = field.beams().ends.size();
-  if (count == 0) {
-    with_beams_ = {0, -1};
-    return;
-  }
-  const auto per_metre = static_cast<float>(1.0 / field.geometry().resolution());
-  for (std::size_t b = 0; b < count; ++b) {
-    const float length = per_metre / field.inverseLengthOf(b);
-    const std::uint32_t cell = field.cellOf(b);
-    float &of_cell = fine_.levels[0][cell], &of_some = coarse_.levels[0][cell >> coarse_.shift];
-    of_cell = std::max(of_cell, length);
-    of_some = std::max(of_some, length);
-  }
+  with_beams_ = {0, -1};
+  if (count == 0) return;
   const auto rowOf = [&](std::size_t b) { return static_cast<int>(field.cellOf(b)) / kBeamColumns; };
   with_beams_ = {rowOf(0), rowOf(count - 1)};
+  for (Grid* grid : {&fine_, &coarse_}) grid->levels[0].resize(grid->at(kBeamRows));
+  const auto per_metre = static_cast<float>(1.0 / field.geometry().resolution());
+  const int rows = with_beams_.last - with_beams_.first + 1;
+  pool.forEach(static_cast<std::size_t>(rows), [&](std::size_t n, std::size_t) {
+    const int row = with_beams_.first + static_cast<int>(n);
+    for (Grid* grid : {&fine_, &coarse_})
+      std::fill_n(grid->levels[0].data() + grid->at(row), grid->columns, 0.0f);
+    const std::size_t first_cell = fine_.at(row), last_cell = fine_.at(row + 1) - 1;
+    for (std::size_t b = field.beamsIn(first_cell).first; b < field.beamsIn(last_cell).last; ++b) {
+      const float length = per_metre / field.inverseLengthOf(b);
+      const std::uint32_t cell = field.cellOf(b);
+      float &of_cell = fine_.levels[0][cell], &of_some = coarse_.levels[0][cell >> coarse_.shift];
+      of_cell = std::max(of_cell, length);
+      of_some = std::max(of_some, length);
+    }
+  });
 }
 
 LongestBeams::Rows LongestBeams::rowsNear(int row, const Shell& shell) const {
@@ -145,7 +149,7 @@ void LongestBeams::set(const BeamField& field, float reach, float farthest, cons
                        ThreadPool& pool) {
   placeShells(reach, farthest);
   if (shells_.empty()) return;
-  findLengths(field);
+  findLengths(field, pool);
   // Each grid's first shell has the largest angle. Windows span its sine in both directions.
   const auto setLevelsOf = [&](Grid& grid) {
     const auto isOf = [&](const Shell& shell) { return shell.grid == &grid; };
@@ -154,7 +158,8 @@ void LongestBeams::set(const BeamField& field, float reach, float farthest, cons
   };
   setLevelsOf(coarse_);
   setLevelsOf(fine_);
-  for (Shell& shell : shells_) {
+  pool.forEach(shells_.size(), [&](std::size_t n, std::size_t) {
+    Shell& shell = shells_[n];
     Rows rows = {0, kBeamRows - 1};
     const auto isPassed = [&](int row) {
       const Rows near = rowsNear(row, shell);
@@ -164,7 +169,7 @@ void LongestBeams::set(const BeamField& field, float reach, float farthest, cons
     while (rows.first <= rows.last && !isPassed(rows.last)) --rows.last;
     shell.first = rows.first * kBeamColumns;
     shell.last = (rows.last + 1) * kBeamColumns - 1;
-  }
+  });
   constexpr std::size_t kRows = kBeamRows;
   pool.forEach(shells_.size() * kRows, [&](std::size_t n, std::size_t) {
     const Shell& shell = shells_[n / kRows];

@@ -59,7 +59,7 @@ class LongestBeams {
     int first, last;
   };
 
-  void findLengths(const BeamField& field);
+  void findLengths(const BeamField& field, ThreadPool& pool);
   void placeShells(float reach, float farthest);
   /// The rows with beams that pass a row of a shell; none if `first` is after `last`.
   Rows rowsNear(int row, const Shell& shell) const;

@@ -203,5 +203,24 @@ TEST(BeamTable, FindsNoneOfNone) {
 
 INSTANTIATE_TEST_SUITE_P(Indices, BothIndices, testing::Values(BeamIndexType::kTable, BeamIndexType::kRtree));
 
+TEST(BeamTable, CountsTheBeamsBeforeEachBin) {
+  constexpr std::uint32_t kBins = kBeamRows * kBeamColumns;
+  BeamTable table;  // keeps its memory, so what earlier beams left in it must not matter
+  std::vector<std::uint32_t> order;
+  for (const std::vector<std::uint32_t>& cells :
+       {std::vector<std::uint32_t>{kBins - 1, 0, 7, 7}, {70000, 3000, 3000}, {}, {kBins - 1}, {0}, {5}}) {
+    table.build(cells, order);
+    std::vector<std::uint32_t> sorted_cells = cells;
+    std::sort(sorted_cells.begin(), sorted_cells.end());
+    ASSERT_EQ(table.begin().size(), kBins + 1);
+    for (std::uint32_t bin = 0; bin <= kBins; ++bin) {
+      const auto before = std::lower_bound(sorted_cells.begin(), sorted_cells.end(), bin);
+      ASSERT_EQ(table.begin()[bin], before - sorted_cells.begin()) << bin;
+    }
+    ASSERT_EQ(order.size(), cells.size());
+    for (std::size_t n = 0; n < order.size(); ++n) EXPECT_EQ(cells[order[n]], sorted_cells[n]);
+  }
+}
+
 }  // namespace
 }  // namespace bki_mapping
