@@ -6,6 +6,7 @@ A table replaces what the document has between its two marker lines; it says the
 import argparse
 import datetime
 import os
+import re
 
 from .programs import ROOT, Programs, commit
 from .tables import markdown
@@ -30,6 +31,7 @@ PAIRS = ('remaining neighbours', 'neighbours looks', 'neighbours standing', 'nei
          'voids looks', 'threshold looks', 'hits_first neighbours', 'hits_first looks')
 FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours', 'vote_limit', 'looks', 'has_stayed',
         'free_sum_limit', 'neighbours looks')
+LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'free_sum_limit')  # on longer drives
 LEAST_CHANGE = 0.3  # that a table of rules has [percentage points]
 SHAKEN = ('--pose-noise', '0.05,0.3')
 
@@ -122,14 +124,17 @@ def table_of_sensors(runs, programs, scans):
     return markdown(['scene', 'height [m]'] + [f'{rows} rows' for rows in LIDARS.values()], rows)
 
 
-def table_of_longer_drives(runs, programs, scans):
-    columns = (SA, PARKED, HOLES, DA, DECIDABLE, ENTERED, PA50, NAMED, STAYED)
-    rows = []
+def longer_drives(programs, scans):
+    """Scene, rows, number of scans, and folder of each."""
     for scene, times, lidar in LONGER:
         count = round(times * scans)
-        drive = programs.simulate(f'{scene}{count}_{lidar}', scene=scene, scans=count, lidar=lidar)
-        report = runs.report(drive)
-        rows.append([scene, str(LIDARS[lidar]), str(count)] + [of(report) or '-' for _, of in columns])
+        yield scene, LIDARS[lidar], count, programs.simulate(f'{scene}{count}_{lidar}', scene=scene, scans=count, lidar=lidar)
+
+
+def table_of_longer_drives(runs, programs, scans):
+    columns = (SA, PARKED, HOLES, DA, DECIDABLE, ENTERED, PA50, NAMED, STAYED)
+    rows = [[scene, str(beams), str(count)] + [of(runs.report(drive)) or '-' for _, of in columns]
+            for scene, beams, count, drive in longer_drives(programs, scans)]
     return markdown(['scene', 'rows', 'scans', *(title for title, _ in columns)], rows)
 
 
@@ -161,18 +166,23 @@ def change(without, every):
 def table_of_rules(runs, sequences, drives, rules, settings=()):
     """For each rule that is left out, or several, and each drive: all figures that change."""
     columns = (SA, PARKED, HOLES, DA, ('PA', PA50[1]), STAYED, ('empty', EMPTY[1]))
-    drives = {drive: sequences[drive] for drive in drives if drive in sequences}
+    measured_on = {drive: sequences[drive] for drive in drives if drive in sequences}
     rows = []
     for left_out in rules:
         names, equation = left_out.split(), dict(RULES).get(left_out)
         row = [', '.join(f'`{name}`' for name in names) + (f' ({equation})' if equation else '')]
         more = [word for name in names for word in ('--without', name)]
-        for sequence in drives.values():
+        for sequence in measured_on.values():
             with_all, without = runs.report(sequence, settings), runs.report(sequence, settings, more)
             changes = ((title, change(of(without), of(with_all))) for title, of in columns)
             row.append(', '.join(f'{title} {value}' for title, value in changes if value))
         rows.append(row)
-    return markdown(['without', *drives], rows)
+    return markdown(['without', *measured_on], rows)
+
+
+def rules_on_longer_drives(runs, programs, scans):
+    drives = {f'{scene}, {beams} rows': drive for scene, beams, _, drive in longer_drives(programs, scans)}
+    return table_of_rules(runs, drives, drives, LASTING)
 
 
 def table_without_labels(runs, sequences):
@@ -240,6 +250,7 @@ def tables_of(runs, programs, given, sequences):
         'rules': lambda: table_of_rules(runs, sequences, ('04', '05', '07', 'street', 'crowd', 'traffic', 'arrivals', 'rooms'),
                                         [name for name, _ in RULES] + list(PAIRS)),
         'rules, 0.1 m': lambda: table_of_rules(runs, sequences, ('04', '05', '07', 'crowd', 'rooms'), FINE, ['resolution=0.1']),
+        'rules, longer drives': lambda: rules_on_longer_drives(runs, programs, given.scans),
         'settings': lambda: table_of_settings(runs, sequences),
         'no labels': lambda: table_without_labels(runs, sequences),
         'presence': lambda: table_of_presence(runs, {d: s for d, s in sequences.items() if d not in ('street', 'rooms')}),
@@ -302,8 +313,8 @@ def main():
     source = f'Measured on {datetime.date.today()}, commit {given.commit or commit()}'
     for name in names:
         rows = tables[name]()
-        scans = '' if name == 'longer' else f', {given.scans} scans of each simulated drive'
-        if scans and '\n| rooms' in rows:
+        scans = '' if 'longer' in name else f', {given.scans} scans of each simulated drive'
+        if scans and re.search(r'\| rooms\b', rows):
             scans += f", in rooms {SCENES['rooms'] * given.scans}"
         table = f'\n{source}{scans}:\n\n{rows}\n'
         with open(given.document) as file:

@@ -99,6 +99,7 @@ class Figures(unittest.TestCase):
         self.assertIn('| `looks` (12c) |', looks)
         self.assertRegex(looks, r'PA −[1-9]')
         self.assertIn('| `voids`, `looks` |', both)
+        self.assertIn('| without | street, 64 rows | traffic, 64 rows |', quality.rules_on_longer_drives(runs, self.programs, 2))
         header, _, row = quality.table_of_presence(runs, sequences).splitlines()
         self.assertEqual(row.count('|'), header.count('|'))
         header, _, *rows_of_longer = quality.table_of_longer_drives(runs, self.programs, 2).splitlines()
