@@ -12,30 +12,24 @@ void without(RulesConfig& rules) {
   rules.without.set(static_cast<std::size_t>(kRule));
 }
 
-void standAfter(double scans, RulesConfig& rules) {
-  rules.stands_after = rules.living_stands_after = scans;
-}
-
-constexpr double kMostScans = 1000.0;  // the most that a parameter may be
-
 struct NamedRule {
   const char* name;
   void (*leave_out)(RulesConfig& rules);
 };
 /// In the order of docs/method.md.
-constexpr NamedRule kRules[] = {
+constexpr NamedRule kNamedRules[] = {
     {"hits_stay", without<Rule::kHitsStay>},
     {"hits_first", without<Rule::kHitsFirst>},
     {"hit_limit", without<Rule::kHitLimit>},
     {"threshold", without<Rule::kThreshold>},
     {"voids", [](RulesConfig& rules) { rules.void_outweighs = 0.0; }},
-    {"passing", [](RulesConfig& rules) { standAfter(0.0, rules); }},
-    {"standing", [](RulesConfig& rules) { standAfter(kMostScans, rules); }},
-    {"living", [](RulesConfig& rules) { rules.living_stands_after = rules.stands_after; }},
+    {"passing", without<Rule::kPassing>},
+    {"standing", without<Rule::kStanding>},
+    {"living", without<Rule::kLiving>},
     {"fixed_gain", without<Rule::kFixedGain>},
     {"edge", without<Rule::kEdge>},
     {"remaining", without<Rule::kRemaining>},
-    {"neighbours", [](RulesConfig& rules) { rules.together = 0.0; }},
+    {"neighbours", without<Rule::kNeighbours>},
     {"vote_limit", without<Rule::kVoteLimit>},
     {"looks", [](RulesConfig& rules) { rules.latest = false; }},
     {"has_stayed", without<Rule::kHasStayed>},
@@ -46,14 +40,14 @@ constexpr NamedRule kRules[] = {
 
 std::string namesOfRules() {
   std::string all;
-  for (const NamedRule& rule : kRules) all += (all.empty() ? "" : ", ") + std::string(rule.name);
+  for (const NamedRule& rule : kNamedRules) all += (all.empty() ? "" : ", ") + std::string(rule.name);
   return all;
 }
 
 MapperConfig withoutRule(MapperConfig config, const std::string& name) {
-  const auto* const rule =
-      std::find_if(std::begin(kRules), std::end(kRules), [&](const NamedRule& r) { return r.name == name; });
-  if (rule == std::end(kRules)) {
+  const auto* const rule = std::find_if(std::begin(kNamedRules), std::end(kNamedRules),
+                                        [&](const NamedRule& r) { return r.name == name; });
+  if (rule == std::end(kNamedRules)) {
     throw std::invalid_argument("there is no rule '" + name + "' to leave out; known: " + namesOfRules());
   }
   if (!config.rules.enabled) {

@@ -45,6 +45,8 @@ struct MapEvaluation {
   /// @param scans number of scans of the run. @param late as in DynamicsEvaluation.
   MapEvaluation(const GridGeometry& geometry, const KittiLabels& moving, std::size_t scans, std::size_t late,
                 std::optional<CloudEvaluation> ground_truth_cloud);
+  MapEvaluation(const MapEvaluation&) = delete;
+  MapEvaluation& operator=(const MapEvaluation&) = delete;
 
   DynamicsEvaluation dynamics;
   PresenceEvaluation presence;

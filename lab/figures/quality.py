@@ -23,7 +23,7 @@ JUDGED = ('stands_after=4', 'stands_after=16', 'living_stands_after=10', 'living
           'together=0.3', 'together=1.2')
 MEASURED = ('void_outweighs=0', 'void_outweighs=20', 'void_outweighs=60')
 FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81}  # raw labels in rooms
-# Rules of evaluate_map --without, alone or together, and where in docs/method.md they are. At 0.1 m only some.
+# Rules of evaluate_map --without, and where in docs/method.md they are; some together, and some at 0.1 m.
 RULES = (('hits_stay', '3a'), ('hits_first', ''), ('hit_limit', '14'), ('threshold', '14'), ('voids', '14a'), ('passing', '12'),
          ('standing', '12'), ('living', '12'), ('fixed_gain', '12'), ('edge', '12'), ('remaining', '12a'), ('neighbours', '12b'),
          ('vote_limit', '12b'), ('looks', '12c'), ('has_stayed', '12c'), ('free_sum_limit', '12c'))
@@ -32,7 +32,7 @@ PAIRS = ('remaining neighbours', 'neighbours looks', 'neighbours standing', 'nei
 FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours', 'vote_limit', 'looks', 'has_stayed',
         'free_sum_limit', 'neighbours looks')
 LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'free_sum_limit')  # on longer drives
-LEAST_CHANGE = 0.3  # that a table of rules has [percentage points]
+LEAST_CHANGE = 0.3  # that a table of rules lists [percentage points]
 SHAKEN = ('--pose-noise', '0.05,0.3')
 
 
@@ -156,7 +156,8 @@ def table_of_settings(runs, sequences):
 
 
 def change(without, every):
-    """What a figure that is not the same without a rule has more or less than with every rule; '' if it is hardly anything."""
+    """By how much a figure is higher or lower without a rule [percentage points]; '' if by less than LEAST_CHANGE, or if one of
+    the two is missing."""
     if not (without and every):
         return ''
     more = float(without) - float(every)

@@ -1,12 +1,13 @@
 // Maps a labelled sequence and measures the quality of the map: static and moving objects, classes,
 // calibration.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <sstream>
 
 #include "bki_mapping/core/named_parameter.h"
 #include "bki_mapping/mapping/semantic_mapper.h"
-#include "bki_mapping/rules/voxel_state.h"
 #include "bki_mapping/sequence/sequence.h"
 #include "core/atomic_file.h"
 #include "core/counted.h"

@@ -20,6 +20,7 @@ void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::
   constexpr std::size_t kCells = kBeamRows * kBeamColumns;
   const auto count = static_cast<std::uint32_t>(cells.size());
   order.resize(count);
+  if (count == 0) return begin_.assign(kCells + 1, 0);
   begin_.resize(kCells + 1);
   // Lidars have beams in a part of the rows only: above and below them, nothing is counted.
   std::uint32_t low = kCells, high = 0;
@@ -27,9 +28,8 @@ void BeamTable::build(const std::vector<std::uint32_t>& cells, std::vector<std::
     low = std::min(low, cell);
     high = std::max(high, cell + 1);
   }
-  std::fill(begin_.begin(), begin_.begin() + std::max(low, high) + 1, 0u);
-  std::fill(begin_.begin() + std::max(low, high) + 1, begin_.end(), count);
-  if (count == 0) return;
+  std::fill(begin_.begin(), begin_.begin() + high + 1, 0u);
+  std::fill(begin_.begin() + high + 1, begin_.end(), count);
   for (const std::uint32_t cell : cells) ++begin_[cell + 1];
   groupBy(high - low, begin_.data() + low, [&](auto&& positionOf) {
     for (std::uint32_t b = 0; b < count; ++b) order[positionOf(cells[b] - low)] = b;

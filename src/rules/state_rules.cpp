@@ -36,6 +36,8 @@ constexpr double kRatioOfUnknown = 0.3, kGainOfUnknown = 20.0, kUnknownStandsAft
 /// What passes is in a voxel for a time that grows with the voxel's edge; far away, what is parked is hit in
 /// a share of the scans that grows with the edge, too. Half a hit may be missing.
 double evidenceToStand(const RulesConfig& config, double scans, double resolution) {
+  if (!config.has(Rule::kPassing)) return 0.0;
+  if (!config.has(Rule::kStanding)) return std::numeric_limits<double>::infinity();
   constexpr double kUsual = 0.3;    // [m]
   constexpr double kGrowth = 1.25;  // with 1.5, too little of what is parked stands in voxels of 0.6 m
   const double growth = config.has(Rule::kEdge) ? std::pow(resolution / kUsual, kGrowth) : 1.0;
@@ -57,9 +59,9 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
   const bool says_what_moves = classes.saysWhatMoves();
   const int reach =
       static_cast<int>(std::lround(std::clamp(config.together / resolution, 1.0, 1.0 * kMostReach)));
-  const double ratio = !(config.together > 0.0) ? 0.0
-                       : says_what_moves        ? kNeighbourhoodRatio
-                                                : kRatioOfUnknown;
+  const double ratio = !(config.together > 0.0) || !config.has(Rule::kNeighbours) ? 0.0
+                       : says_what_moves                                          ? kNeighbourhoodRatio
+                                                                                  : kRatioOfUnknown;
   *this = withHitOfScan(RulesConfig::kHit)
               .withRemaining(config.has(Rule::kRemaining) ? kRemaining : 0.0, fixedClasses(classes))
               // Where floors ask, too, they would keep whatever moves on them: the layers below are left out.
@@ -70,14 +72,14 @@ StateRules::StateRules(const RulesConfig& config, const ClassTable& classes, dou
       *this = withFreeGain(c.id, *c.free_gain);
     } else if (c.dynamic || (!says_what_moves && !c.unlabelled)) {
       const double scans = !says_what_moves ? std::min(kUnknownStandsAfter, config.stands_after)
-                           : c.living       ? config.living_stands_after
-                                            : config.stands_after;
+                           : c.living && config.has(Rule::kLiving) ? config.living_stands_after
+                                                                   : config.stands_after;
       *this = withFreeGain(c.id, says_what_moves ? kGainOfPassing : kGainOfUnknown,
                            evidenceToStand(config, scans, resolution));
     } else if (!c.unlabelled) {
       *this = withFreeGain(c.id, config.has(Rule::kFixedGain) ? kGainOfFixed : 1.0);
       const double confirmed = config.fixed_stands_after;  // half a hit may be missing
-      if (confirmed > 1.0 && !c.ground)
+      if (confirmed > 1.0 && !c.ground && config.has(Rule::kFixedGain))
         *this = withConfirmation(c.id, kGainOfUnconfirmed, (confirmed - 0.5) * RulesConfig::kHit);
     }
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -217,8 +218,10 @@ TEST(BeamTable, CountsTheBeamsBeforeEachBin) {
       const auto before = std::lower_bound(sorted_cells.begin(), sorted_cells.end(), bin);
       ASSERT_EQ(table.begin()[bin], before - sorted_cells.begin()) << bin;
     }
-    ASSERT_EQ(order.size(), cells.size());
-    for (std::size_t n = 0; n < order.size(); ++n) EXPECT_EQ(cells[order[n]], sorted_cells[n]);
+    std::vector<std::uint32_t> beams(cells.size());
+    std::iota(beams.begin(), beams.end(), 0u);
+    std::stable_sort(beams.begin(), beams.end(), [&](auto a, auto b) { return cells[a] < cells[b]; });
+    EXPECT_EQ(order, beams);
   }
 }
 

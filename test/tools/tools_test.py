@@ -278,7 +278,8 @@ class Tools(ProgramTest):
             return {name: value for name, value in figures.items() if not name.endswith('_ms')}
         every = self.evaluation(*given)
         without = self.evaluation(*given, more=('--without', 'looks', '--without', 'voids'))
-        self.assertEqual(unlike(without), unlike(self.evaluation('rules/enabled=true', 'rules/latest=false', 'rules/void_outweighs=0')))
+        settings = ('rules/enabled=true', 'rules/latest=false', 'rules/void_outweighs=0')
+        self.assertEqual(unlike(without), unlike(self.evaluation(*settings)))
         self.assertNotEqual(unlike(without), unlike(every))
         self.fails("there is no rule 'void' to leave out; known: hits_stay, ", 'evaluate_map', '--sequence', self.drive,
                    '--set', 'rules/enabled=true', '--without', 'void')

@@ -8,19 +8,24 @@
 
 namespace bki_mapping {
 
-/// Rules that no parameter switches off. Leaving one out shows what it gives.
+/// Rules that can be left out, to measure what each gives.
 enum class Rule : std::uint8_t {
   kHitsStay,      ///< (3a): hits of static classes stay in their voxel
   kHitsFirst,     ///< hits before misses
   kHitLimit,      ///< (14): of the hits of a scan
   kThreshold,     ///< (14): T_f
+  kPassing,       ///< (12): without it, all that can move stands from its first hit on
+  kStanding,      ///< (12): without it, nothing that can move stands
+  kLiving,        ///< (12): without it, people stand after as many scans as cars
   kFixedGain,     ///< (12): 0 for what cannot move; without it, 1
   kEdge,          ///< (12): E grows with the voxel's edge
   kRemaining,     ///< (12a)
+  kNeighbours,    ///< (12b)
   kVoteLimit,     ///< (12b): the 16 L_h of a vote
   kHasStayed,     ///< (12c): what has stayed is occupied
   kFreeSumLimit,  ///< (12c): the 300 L_h of the evidence for `free`
 };
+constexpr std::size_t kRules = static_cast<std::size_t>(Rule::kFreeSumLimit) + 1;
 
 /// With `enabled`, a scan counts once in a voxel, however many of its points and beams there are, and the
 /// rules of docs/method.md, "Ours", apply. By default none applies: the map is the paper's.
@@ -36,7 +41,7 @@ struct RulesConfig {
   double particles_within = 0.0;
   bool latest = true;  ///< whether what the latest scans saw of a voxel comes first
   /// Rules to leave out, by their position; evaluate_map sets this, no parameter does, and no file keeps it.
-  std::bitset<10> without;
+  std::bitset<kRules> without;
   bool has(Rule rule) const { return !without[static_cast<std::size_t>(rule)]; }
 
   // Evidence of a scan. Only ratios matter. The kernel's peak is far above what a scan may add, so that

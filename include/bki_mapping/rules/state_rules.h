@@ -85,7 +85,7 @@ class StateRules {
     return config_.has(Rule::kHasStayed) ? kStaysAfter / kMostVotes * evidenceOfVotes() : kMostUnits;
   }
   static constexpr int kStaysAfter = 160;  ///< 16 s at 10 Hz
-  /// The same for a voxel that an earlier visit saw, but did not hit [units].
+  /// The same as staysFrom() for a voxel that an earlier visit saw free [units].
   EvidenceUnits arrivedStaysFrom() const {
     return config_.has(Rule::kHasStayed) ? (evidenceOfVotes() + 1) / 2 : kMostUnits;
   }
@@ -104,7 +104,7 @@ class StateRules {
   bool decidesAs(const StateRules& other) const;
 
  private:
-  /// Of the hits of kMostVotes scans [units].
+  /// The evidence of the hits of kMostVotes scans [units].
   EvidenceUnits evidenceOfVotes() const {
     if (!(hit_of_scan_ > 0.0f)) return kMostVote;
     return std::max(unitsOf(std::min(kMostVotes * hit_of_scan_, kMostVote * kEvidenceUnit)), 1);
