@@ -25,10 +25,11 @@ inline std::vector<NamedParameter<RulesConfig>> rulesParameters() {
           "crossings count."),
       realParameter(
           "void_margin", &C::void_margin, NumberRange::atLeast(0.0).upTo(2.0), "m", Changes::kWhileMapping,
-          "Up to which distance from a hit of what can move no voxel counts as void, because errors in "
-          "the poses displace hits. It is rounded down to whole voxels, at most seven; a single one "
-          "hardly makes a difference. Set it to 0.2 with voxels of 0.1 m if parked cars vanish where poses "
-          "are noisy. It leaves trails of what creeps in queues and crowds."),
+          "Distance from a hit of what can move within which no voxel counts as void, because errors in the "
+          "poses displace hits. It is rounded down to whole voxels, at most seven; a single one hardly makes "
+          "a "
+          "difference. With voxels of 0.1 m, set it to 0.2 if parked cars vanish where poses are noisy. The "
+          "price: trails of what creeps in queues and crowds."),
       realParameter(
           "stands_after", &C::stands_after, NumberRange::atLeast(0.0).upTo(1000.0), "scans",
           Changes::kWhileMapping,
