@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The cases that scripts/test chooses for the thread sanitizer exist, and their tests heed the choice."""
+"""The cases that scripts/test chooses for the sanitizers exist, and their tests heed the choice."""
 import fnmatch
 import os
 import re
@@ -46,9 +46,13 @@ class Cases(unittest.TestCase):
         self.assertFalse(has & self.joined, f'{pattern}: give its test a call of bki_mapping_unit_tests in cmake/tests.cmake')
 
     def test_left_out(self):
-        (left_out, names), = re.findall(r"GTEST_FILTER=-(\S+) \\\n *run_ctest \S+ -R '\^\(([\w|]+)\)_test\$'", self.script)
+        (left_out, names), = re.findall(r"GTEST_FILTER=-(\S+) \\\n *run_ctest \S+tsan\S+ -R '\^\(([\w|]+)\)_test\$'", self.script)
         for case in left_out.split(':'):
             self.expect_heeded(case, [name + '_test' for name in names.split('|')])
+        left_out, = re.findall(r'GTEST_FILTER=-(\S+) \\\n *run_ctest \S+asan', self.script)
+        lists = ' '.join(re.findall(r'^(?:core|file|store)_tests=\(([^)]+)\)', self.script, re.MULTILINE))
+        for case in left_out.split(':'):
+            self.expect_heeded(case, set(lists.split()) & self.cases.keys())
 
     def test_chosen(self):
         runs = re.findall(r"bki_mapping/(\w+_test)\" --gtest_filter='([^']+)'", self.script)

@@ -35,7 +35,8 @@ std::vector<VoxelIndex> voxelsOf(const DistanceField& field) {
 }
 
 double squaredDistance(const GridIndex& a, const GridIndex& b) {
-  return std::pow(a.x - b.x, 2) + std::pow(a.y - b.y, 2) + std::pow(a.z - b.z, 2);
+  const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;  // std::pow would take most of the test's time
+  return x * x + y * y + z * z;
 }
 
 /// Every distance from every obstacle and every other voxel, one by one.
