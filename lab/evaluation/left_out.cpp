@@ -33,6 +33,7 @@ constexpr NamedRule kNamedRules[] = {
     {"vote_limit", without<Rule::kVoteLimit>},
     {"looks", [](RulesConfig& rules) { rules.latest = false; }},
     {"has_stayed", without<Rule::kHasStayed>},
+    {"hidden", without<Rule::kHidden>},
     {"free_sum_limit", without<Rule::kFreeSumLimit>},
 };
 

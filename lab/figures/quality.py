@@ -26,12 +26,13 @@ FURNITURE = {'tables': 51, 'chairs': 71, 'thin things': 80, 'small things': 81} 
 # Rules of evaluate_map --without, and where in docs/method.md they are; some together, and some at 0.1 m.
 RULES = (('hits_stay', '3a'), ('hits_first', ''), ('hit_limit', '14'), ('threshold', '14'), ('voids', '14a'), ('passing', '12'),
          ('standing', '12'), ('living', '12'), ('fixed_gain', '12'), ('edge', '12'), ('remaining', '12a'), ('neighbours', '12b'),
-         ('vote_limit', '12b'), ('looks', '12c'), ('has_stayed', '12c'), ('free_sum_limit', '12c'))
+         ('vote_limit', '12b'), ('looks', '12c'), ('has_stayed', '12c'), ('hidden', '12c'),
+         ('free_sum_limit', '12c'))
 PAIRS = ('remaining neighbours', 'neighbours looks', 'neighbours standing', 'neighbours passing', 'voids neighbours',
          'voids looks', 'threshold looks', 'hits_first neighbours', 'hits_first looks')
 FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours', 'vote_limit', 'looks', 'has_stayed',
-        'free_sum_limit', 'neighbours looks')
-LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'free_sum_limit')  # on longer drives
+        'hidden', 'free_sum_limit', 'neighbours looks')
+LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'hidden', 'free_sum_limit')  # on longer drives
 LEAST_CHANGE = 0.3  # that a table of rules lists [percentage points]
 SHAKEN = ('--pose-noise', '0.05,0.3')
 

@@ -32,4 +32,15 @@ inline VoxelMask maskOf(const LayerBits& bits) {
   return mask;
 }
 
+/// visit(offset) for each voxel of the mask, by rising offset.
+template <typename Visit>
+void forEachVoxelOf(const VoxelMask& mask, const Visit& visit) {
+  const LayerBits bits = bitsOf(mask);
+  for (std::size_t layer = 0; layer < bits.size(); ++layer) {
+    for (std::uint64_t left = bits[layer]; left != 0; left &= left - 1) {
+      visit(64 * layer + static_cast<std::size_t>(__builtin_ctzll(left)));
+    }
+  }
+}
+
 }  // namespace bki_mapping

@@ -26,6 +26,30 @@ bool wasFreeBefore(Looks::Iterator hit, Looks::Iterator end, std::size_t offset)
   });
 }
 
+/// A voxel since it was last hit.
+struct SinceLastHit {
+  Fate fate;
+  Looks::Iterator hit;        ///< the look, or the end
+  std::uint64_t crossed = 0;  ///< at most [ticks]
+};
+SinceLastHit sinceLastHit(const Looks& looks, std::size_t offset) {
+  SinceLastHit since{Fate::kUnclear, looks.begin()};
+  int voids = 0;
+  for (; since.hit != looks.end(); ++since.hit) {
+    const Sight sight = since.hit->at(offset);
+    if (sight == Sight::kHit) break;
+    if (sight != Sight::kNothing) since.crossed += since.hit->length();
+    voids += sight == Sight::kVoid;
+  }
+  if (since.hit == looks.end()) return since;
+  if (since.crossed == 0) {
+    since.fate = since.hit->level() == 0 ? Fate::kHere : Fate::kHidden;
+  } else if (voids >= kVoidsToClear) {
+    since.fate = Fate::kLeft;
+  }
+  return since;
+}
+
 /// The class with the most evidence in a voxel, of equal ones that with the smallest id, and its evidence.
 std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t offset) {
   std::pair<ClassId, EvidenceUnits> likeliest{kFreeClass, 0};
@@ -40,38 +64,41 @@ std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t
 
 }  // namespace
 
-std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave) {
-  const Looks::Iterator end = looks.end();
-  std::uint64_t crossed = 0;  // since the last hit, at most [ticks]
-  int voids = 0;
-  Looks::Iterator look = looks.begin();
-  for (; look != end; ++look) {
-    const Sight sight = look->at(offset);
-    if (sight == Sight::kHit) break;
-    if (sight != Sight::kNothing) crossed += look->length();
-    voids += sight == Sight::kVoid;
-  }
-  if (look == end) return kNotOverruled;
-  if (crossed == 0) {
-    const bool has_stayed = stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(look, end, offset));
-    return look->level() == 0 || has_stayed ? kKept : kNotOverruled;
-  }
-  if (voids >= kVoidsToClear) return kCleared;
-  if (can_leave && crossed >= kCrossedToClear && visitBefore(looks.begin(), end) <= look) return kCleared;
-  return kNotOverruled;
+Fate fateOf(const Looks& looks, std::size_t offset) {
+  return sinceLastHit(looks, offset).fate;
 }
 
-bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled) {
-  const Looks& looks = block.looks();
+std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave) {
+  const Looks::Iterator end = looks.end();
+  const SinceLastHit since = sinceLastHit(looks, offset);
+  switch (since.fate) {
+    case Fate::kHere:
+      return kKept;
+    case Fate::kLeft:
+      return kCleared;
+    case Fate::kHidden: {
+      const bool has_stayed =
+          stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(since.hit, end, offset));
+      return has_stayed ? kKept : kNotOverruled;
+    }
+    case Fate::kUnclear:
+      break;
+  }
+  const bool is_of_earlier_visit = since.hit != end && visitBefore(looks.begin(), end) <= since.hit;
+  return can_leave && is_of_earlier_visit && since.crossed >= kCrossedToClear ? kCleared : kNotOverruled;
+}
+
+Fates fatesOf(const Looks& looks) {
+  static_assert(kVoidsToClear == 2 && kCrossedToClear == 2, "twice is enough");
   const Looks::Iterator end = looks.end(), visit_before = visitBefore(looks.begin(), end);
   Look::Voxels hit, crossed, crossed_twice, voids, voids_twice;  // in the looks so far, up to the last hit
-  Look::Voxels kept, cleared, may_have_stayed, may_leave;
+  Fates fates;
   for (Looks::Iterator at = looks.begin(); at != end; ++at) {
     const Look look = (*at).unpacked();
-    const Look::Voxels last_hit = look.hit() & ~hit, never_crossed = last_hit & ~crossed;
-    (look.level() == 0 ? kept : may_have_stayed) |= never_crossed;
-    cleared |= last_hit & voids_twice;
-    if (visit_before <= at) may_leave |= last_hit & crossed_twice & ~voids_twice;
+    const Look::Voxels last_hit = look.hit() & ~hit;
+    (look.level() == 0 ? fates.here : fates.hidden) |= last_hit & ~crossed;
+    fates.left |= last_hit & voids_twice;
+    if (visit_before <= at) fates.crossed |= last_hit & crossed_twice & ~voids_twice;
     hit |= last_hit;
     const Look::Voxels seen = look.seen() & ~hit, is_void = look.voids() & ~hit;
     crossed_twice |= look.length() >= kCrossedToClear ? seen : crossed & seen;
@@ -79,28 +106,23 @@ bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& ove
     voids_twice |= voids & is_void;
     voids |= is_void;
   }
-  static_assert(kVoidsToClear == 2 && kCrossedToClear == 2, "twice is enough");
-  const auto forEachOf = [](const Look::Voxels& voxels, const auto& visit) {
-    const LayerBits bits = bitsOf(voxels);
-    for (std::size_t layer = 0; layer < bits.size(); ++layer) {
-      for (std::uint64_t left = bits[layer]; left != 0; left &= left - 1) {
-        visit(64 * layer + static_cast<std::size_t>(__builtin_ctzll(left)));
-      }
-    }
-  };
-  forEachOf(kept, [&](std::size_t v) { overruled[v] = kKept; });
-  forEachOf(cleared, [&](std::size_t v) { overruled[v] = kCleared; });
-  bool decides = kept.any() || cleared.any();
+  return fates;
+}
+
+bool overruleByLooks(const Block& block, const StateRules& rules, const Fates& fates, Overruled& overruled) {
+  forEachVoxelOf(fates.here, [&](std::size_t v) { overruled[v] = kKept; });
+  forEachVoxelOf(fates.left, [&](std::size_t v) { overruled[v] = kCleared; });
+  bool decides = fates.here.any() || fates.left.any();
   const auto overrule = [&](std::size_t v, std::int32_t verdict) {
     overruled[v] = verdict;
     decides = true;
   };
-  forEachOf(may_have_stayed, [&](std::size_t v) {
+  forEachVoxelOf(fates.hidden, [&](std::size_t v) {
     const Stay stay = stayOf(likeliestClass(block, v).second, rules);
-    if (stay == Stay::kLong || (stay == Stay::kSome && verdictOf(looks, v, stay, false) == kKept))
+    if (stay == Stay::kLong || (stay == Stay::kSome && verdictOf(block.looks(), v, stay, false) == kKept))
       overrule(v, kKept);
   });
-  forEachOf(may_leave, [&](std::size_t v) {
+  forEachVoxelOf(fates.crossed, [&](std::size_t v) {
     if (rules.canLeave(likeliestClass(block, v).first)) overrule(v, kCleared);
   });
   return decides;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "bki_mapping/map/block.h"
 #include "bki_mapping/rules/state_rules.h"
@@ -18,6 +19,23 @@ constexpr int kVoidsToClear = 2;
 constexpr unsigned kVisitLevel = 10, kVisitLevels = 3;
 /// Ticks for which beams must have crossed what can move and was last hit in an earlier visit, to clear it.
 constexpr std::uint64_t kCrossedToClear = 2;
+
+/// What has become of what was last hit in a voxel, by the looks since.
+enum class Fate : std::uint8_t {
+  kUnclear,  ///< it was never hit, or was seen since, but was not void in two intervals
+  kHere,     ///< hit in one of the two latest ticks of its block, and not seen since
+  kHidden,   ///< hit before them, and not seen since
+  kLeft,     ///< it was void in two intervals since
+};
+Fate fateOf(const Looks& looks, std::size_t offset);
+
+/// The voxels of a block by their fates.
+struct Fates {
+  Look::Voxels here, hidden, left;
+  Look::Voxels
+      crossed;  ///< of the unclear ones, those last hit in an earlier visit and crossed for kCrossedToClear
+};
+Fates fatesOf(const Looks& looks);
 
 /// How long a voxel has been hit, by the evidence of its likeliest class.
 enum class Stay : std::uint8_t {
@@ -36,7 +54,7 @@ inline Stay stayOf(EvidenceUnits best, const StateRules& rules) {
 std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool can_leave);
 
 /// The same for all voxels of a block: where looks decide, overwrites what the voxels around say.
-/// @return whether they decide anywhere.
-bool overruleByLooks(const Block& block, const StateRules& rules, Overruled& overruled);
+/// @param fates of the block's looks. @return whether they decide anywhere.
+bool overruleByLooks(const Block& block, const StateRules& rules, const Fates& fates, Overruled& overruled);
 
 }  // namespace bki_mapping

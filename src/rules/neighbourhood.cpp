@@ -5,6 +5,8 @@
 #include <numeric>
 
 #include "bki_mapping/core/grid_table.h"
+#include "map/voxel_mask.h"
+#include "rules/latest_looks.h"
 
 namespace bki_mapping {
 namespace {
@@ -95,6 +97,123 @@ void sumWindows(const Votes& votes, int reach, bool has_below,
   slideWindow(layers.data() + skipped * kLayer, kLayer, window - skipped, kLayer, sums.data());
 }
 
+/// Voxels of a block, by the box around them.
+struct Extent {
+  std::array<int, 3> least, most;
+
+  /// Whether neighbourhoods of such a reach reach into the block that lies `step` beside along an axis.
+  bool reaches(std::size_t axis, int step, int reach) const {
+    return step == 0 || (step < 0 ? least[axis] < reach : most[axis] + reach >= kBlockEdge);
+  }
+  void include(std::size_t offset) {
+    const int at[] = {static_cast<int>(offset) % kBlockEdge,
+                      static_cast<int>(offset) / kBlockEdge % kBlockEdge,
+                      static_cast<int>(offset) / (kBlockEdge * kBlockEdge)};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      least[axis] = std::min(least[axis], at[axis]);
+      most[axis] = std::max(most[axis], at[axis]);
+    }
+  }
+  /// Those for which isIn(offset).
+  template <typename IsIn>
+  static Extent of(const IsIn& isIn) {
+    Extent extent{{kBlockEdge, kBlockEdge, kBlockEdge}, {-1, -1, -1}};
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      if (isIn(v)) extent.include(v);
+    }
+    return extent;
+  }
+  bool isEmpty() const { return most[0] < 0; }
+};
+
+/// Visits the votes of the blocks beside one that may ask: visit(block, votes, x, y, z), with where it lies.
+/// @param of the voxels whose neighbourhoods are needed. @param around says which layers are needed.
+template <typename Visit>
+void forEachBeside(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
+                   const BlockIndex& index, const Extent& of, const Votes& around, const Visit& visit) {
+  const int reach = rules.neighbourhoodReach();
+  BlockVotes votes{};  // only some layers are set
+  for (int z = rules.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        if ((x == 0 && y == 0 && z == 0) || !of.reaches(0, x, reach) || !of.reaches(1, y, reach) ||
+            !of.reaches(2, z, reach))
+          continue;
+        const Block* const beside = map.find({{index.x + x, index.y + y, index.z + z}});
+        if (beside && mayAskNeighbourhood(rules, *beside) &&
+            kernels.votes(planesOf(map, rules, *beside), around.layersOf(z), votes))
+          visit(*beside, votes, x, y, z);
+      }
+    }
+  }
+}
+
+/// Finds what the voxels around clear or restore (12b). @param own votes of the block.
+void decideTogether(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
+                    const BlockIndex& index, const Block& block, const BlockVotes& own,
+                    Overruled& overruled) {
+  const Extent asking = Extent::of([&](std::size_t v) { return own.kept[v] > 0 || own.doubtful[v] > 0; });
+  if (asking.isEmpty()) return;
+  const int reach = rules.neighbourhoodReach();
+  Votes kept(reach), cleared(reach), keeping(reach);
+  const auto take = [&](const Block&, const BlockVotes& votes, int x, int y, int z) {
+    kept.copy(votes.kept, x, y, z);
+    cleared.copy(votes.cleared, x, y, z);
+    keeping.copy(votes.is_kept, x, y, z);
+  };
+  take(block, own, 0, 0, 0);
+  forEachBeside(kernels, map, rules, index, asking, kept, take);
+  std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums, keeping_sums;
+  sumWindows(kept, reach, rules.neighbourhoodIsBelow(), kept_sums);
+  sumWindows(cleared, reach, rules.neighbourhoodIsBelow(), cleared_sums);
+  sumWindows(keeping, reach, rules.neighbourhoodIsBelow(), keeping_sums);
+  for (std::size_t v = 0; v < overruled.size(); ++v) {
+    const VoteSums sums{kept_sums[v], cleared_sums[v], keeping_sums[v]};
+    if (own.kept[v] > 0 && !areKept(rules, sums)) overruled[v] = kCleared;
+    if (own.doubtful[v] > 0 && isRestored(rules, own.doubtful[v], sums)) overruled[v] = kKept;
+  }
+}
+
+/// Lets looks decide before the sum. What is hidden does not vote.
+void voteByLooks(const Looks& looks, BlockVotes& votes) {
+  if (looks.empty()) return;
+  const Fates fates = fatesOf(looks);
+  forEachVoxelOf(fates.here, [&](std::size_t v) {
+    votes.kept[v] += votes.cleared[v];
+    votes.cleared[v] = 0;
+  });
+  forEachVoxelOf(fates.left, [&](std::size_t v) {
+    votes.cleared[v] += votes.kept[v];
+    votes.kept[v] = 0;
+  });
+  forEachVoxelOf(fates.hidden, [&](std::size_t v) { votes.kept[v] = votes.cleared[v] = 0; });
+}
+
+/// Finds what is kept of what is hidden and cleared by its own evidence.
+void keepHidden(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
+                const BlockIndex& index, const Block& block, const Look::Voxels& hidden,
+                const BlockVotes& own, Overruled& overruled) {
+  const auto asks = [&](std::size_t v) { return hidden[v] && own.cleared[v] > 0; };
+  const Extent asking = Extent::of(asks);
+  if (asking.isEmpty()) return;
+  const int reach = rules.neighbourhoodReach();
+  Votes here(reach), left(reach);
+  const auto take = [&](const Block& from, BlockVotes& votes, int x, int y, int z) {
+    voteByLooks(from.looks(), votes);
+    here.copy(votes.kept, x, y, z);
+    left.copy(votes.cleared, x, y, z);
+  };
+  BlockVotes votes = own;
+  take(block, votes, 0, 0, 0);
+  forEachBeside(kernels, map, rules, index, asking, here, take);
+  std::array<EvidenceUnits, kBlockVoxels> here_sums, left_sums;
+  sumWindows(here, reach, true, here_sums);
+  sumWindows(left, reach, true, left_sums);
+  for (std::size_t v = 0; v < overruled.size(); ++v) {
+    if (asks(v) && isStillThere(rules, {here_sums[v], left_sums[v]})) overruled[v] = kKept;
+  }
+}
+
 }  // namespace
 
 bool mayAskNeighbourhood(const StateRules& rules, const Block& block) {
@@ -104,40 +223,15 @@ bool mayAskNeighbourhood(const StateRules& rules, const Block& block) {
 }
 
 bool findOverruled(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
-                   const BlockIndex& index, const Block& block, Overruled& overruled) {
+                   const BlockIndex& index, const Block& block, const Look::Voxels& hidden,
+                   Overruled& overruled) {
   if (!mayAskNeighbourhood(rules, block)) return false;
   BlockVotes own;
   if (!kernels.votes(planesOf(map, rules, block), {}, own)) return false;
-  const int reach = rules.neighbourhoodReach();
-  Votes kept(reach), cleared(reach), keeping(reach);
-  BlockVotes beside;
-  for (int z = rules.neighbourhoodIsBelow() ? -1 : 0; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        const BlockVotes* votes = &own;
-        if (x != 0 || y != 0 || z != 0) {
-          const Block* const neighbour = map.find({{index.x + x, index.y + y, index.z + z}});
-          if (!neighbour || !mayAskNeighbourhood(rules, *neighbour) ||
-              !kernels.votes(planesOf(map, rules, *neighbour), kept.layersOf(z), beside))
-            continue;
-          votes = &beside;
-        }
-        kept.copy(votes->kept, x, y, z);
-        cleared.copy(votes->cleared, x, y, z);
-        keeping.copy(votes->is_kept, x, y, z);
-      }
-    }
-  }
-  std::array<EvidenceUnits, kBlockVoxels> kept_sums, cleared_sums, keeping_sums;
-  sumWindows(kept, reach, rules.neighbourhoodIsBelow(), kept_sums);
-  sumWindows(cleared, reach, rules.neighbourhoodIsBelow(), cleared_sums);
-  sumWindows(keeping, reach, rules.neighbourhoodIsBelow(), keeping_sums);
-  for (std::size_t v = 0; v < overruled.size(); ++v) {
-    const VoteSums sums{kept_sums[v], cleared_sums[v], keeping_sums[v]};
-    overruled[v] = kNotOverruled;
-    if (own.kept[v] > 0 && !areKept(rules, sums)) overruled[v] = kCleared;
-    if (own.doubtful[v] > 0 && isRestored(rules, own.doubtful[v], sums)) overruled[v] = kKept;
-  }
+  overruled.fill(kNotOverruled);
+  decideTogether(kernels, map, rules, index, block, own, overruled);
+  if (rules.hiddenAsk() && hidden.any())
+    keepHidden(kernels, map, rules, index, block, hidden, own, overruled);
   return true;
 }
 

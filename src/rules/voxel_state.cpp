@@ -62,8 +62,10 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
   return own;
 }
 
-/// Equation 12b: what the voxels around say of one that asks them.
-VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel) {
+/// Equation 12b: what the voxels around say of one that asks them. @param looks_first whether looks decide
+/// before the sum, and what is hidden does not vote.
+VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel,
+                     bool looks_first) {
   const int reach = rules.neighbourhoodReach();
   const BlockIndex first = GridGeometry::blockOf({{voxel.x - reach, voxel.y - reach, voxel.z - reach}});
   static_assert(2 * StateRules::kMostReach < 2 * kBlockEdge,
@@ -84,8 +86,13 @@ VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const Voxe
         const int n = index.x - first.x + kAlong * (index.y - first.y + kAlong * (index.z - first.z));
         const Block* const block = blocks[static_cast<std::size_t>(n)];
         if (!block) continue;
-        const OwnEvidence own = ownEvidence(rules, *block, GridGeometry::offsetInBlock(at));
+        const int offset = GridGeometry::offsetInBlock(at);
+        OwnEvidence own = ownEvidence(rules, *block, offset);
         if (own.best == 0 || !rules.asksNeighbourhood(own.label)) continue;
+        const Fate fate =
+            looks_first ? fateOf(block->looks(), static_cast<std::size_t>(offset)) : Fate::kUnclear;
+        if (fate == Fate::kHidden) continue;
+        if (fate != Fate::kUnclear) own.holds = fate == Fate::kHere;
         (own.holds ? sums.kept : sums.cleared) += std::min(own.best, most);
         sums.keeping += own.holds;
       }
@@ -154,10 +161,12 @@ void readBlock(const StateKernels& kernels, const SemanticMap& map, const StateR
                                                             : kernels.all;
   BlockPlanes planes = planesOf(map, rules, block);
   Overruled overruled;
-  bool overrules = findOverruled(kernels, map, rules, index, block, overruled);
-  if (rules.latestDecides() && !block.looks().empty()) {
+  const bool looks_decide = rules.latestDecides() && !block.looks().empty();
+  const Fates fates = looks_decide ? fatesOf(block.looks()) : Fates();
+  bool overrules = findOverruled(kernels, map, rules, index, block, fates.hidden, overruled);
+  if (looks_decide) {
     if (!overrules) overruled.fill(kNotOverruled);
-    overrules |= overruleByLooks(block, rules, overruled);
+    overrules |= overruleByLooks(block, rules, fates, overruled);
   }
   if (overrules) planes.overruled = &overruled;
   read(planes, view);
@@ -179,10 +188,14 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
   OwnEvidence own = ownEvidence(rules, block, offset);
   bool holds = own.holds, restored = false, has_left = false;
   if (rules.neighbourhoodRatio() > 0.0f && own.best > 0 && rules.asksNeighbourhood(own.label)) {
-    const VoteSums sums = votesAround(map, rules, GridGeometry::voxelOf(index, offset));
+    const VoxelIndex voxel = GridGeometry::voxelOf(index, offset);
+    const VoteSums sums = votesAround(map, rules, voxel, false);
     const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
     holds = own.holds ? areKept(rules, sums)
                       : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
+    if (!own.holds && !holds && rules.hiddenAsk() &&
+        fateOf(block.looks(), static_cast<std::size_t>(offset)) == Fate::kHidden)
+      holds = isStillThere(rules, votesAround(map, rules, voxel, true));
     restored = holds && !own.holds;
     has_left = !holds && own.holds;
   }

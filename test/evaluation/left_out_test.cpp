@@ -73,6 +73,7 @@ std::map<std::string, double> saidBy(const MapperConfig& config) {
       {"looks", state.latestDecides()},
       {"has_stayed", state.staysFrom()},
       {"arrived stays", state.arrivedStaysFrom()},
+      {"hidden", state.hiddenAsk()},
       {"free_sum_limit", state.mostFree()},
   };
 }
@@ -92,7 +93,8 @@ TEST(LeftOut, IsMissing) {
     std::set<std::string> expected = {name};
     // All or nothing stands, whether it lives or not, in voxels of any size.
     if (name == "passing" || name == "standing") expected.insert({"living", "edge"});
-    if (name == "looks") expected.insert("free_sum_limit");
+    if (name == "looks") expected.insert({"hidden", "free_sum_limit"});
+    if (name == "neighbours") expected.insert("hidden");
     if (name == "has_stayed") expected.insert("arrived stays");
     EXPECT_EQ(changed, expected);
   }

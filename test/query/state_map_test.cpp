@@ -99,6 +99,7 @@ class RandomChanges {
         break;
       case 4:
         rules_ = rules_.withHitOfScan(draw(2) == 0 ? 0.0 : 3.0 * unit());
+        rules_ = rules_.withLatest(draw(2) == 0);
         rules_ = rules_.withRemaining(draw(2) == 0 ? 0.0 : unit(), draw(2) == 0 ? 0b1001 : 0b11001000);
         rules_ = rules_.withNeighbourhood(draw(3) == 0 ? 0.0 : 3.0 * unit(), draw(3) == 0 ? 0b1000 : 0b1001);
         break;
@@ -138,6 +139,12 @@ class RandomChanges {
       }
       map.getOrAllocate(index).add(id, plane.data());
     }
+    Look::Voxels seen[3];
+    for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+      const std::size_t sight = draw(8);
+      if (sight < 3) seen[sight][v] = true;
+    }
+    map.getOrAllocate(index).looks().add(Look(1000 + draw(20), seen[0], seen[1], seen[2]));
   }
   void occlude(SemanticMap& map, const BlockIndex& index) {
     if (!map.find(index)) return;

@@ -161,7 +161,7 @@ TEST(LatestLooks, AreReadForAWholeBlockAsVoxelByVoxel) {
     ASSERT_EQ(rules.mostVote(), kMost);
     Overruled overruled;
     overruled.fill(kNotOverruled);
-    const bool any = overruleByLooks(block, rules, overruled);
+    const bool any = overruleByLooks(block, rules, fatesOf(block.looks()), overruled);
     bool expected_any = false;
     for (std::size_t v = 0; v < kBlockVoxels; ++v) {
       const EvidenceUnits best = std::max(block.evidence(3)[v], block.evidence(7)[v]);

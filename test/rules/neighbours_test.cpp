@@ -134,6 +134,100 @@ TEST(Neighbours, DecideAsByLookingAtEachOfThem) {
   EXPECT_GT(cleared, 500u);
 }
 
+/// A map as randomMap() with looks, most of which end with hits.
+SemanticMap lookedAtMap(unsigned seed) {
+  std::mt19937 random(seed);
+  SemanticMap map = randomMap(seed);
+  for (const auto& [index, block] : map.entries()) {
+    if (random() % 8 == 0) continue;
+    Looks& looks = map.getOrAllocate(index).looks();
+    for (std::uint64_t tick = 1000, end = 1001 + random() % 12; tick < end; ++tick) {
+      Look::Voxels seen[3];
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+        const std::size_t sight = random() % 12;
+        if (sight < 4) seen[sight == 3 ? 1 : sight][v] = true;
+      }
+      looks.add(Look(tick, seen[0], seen[1], seen[2]));
+    }
+  }
+  return map;
+}
+
+/// From the definition: here, left, hidden or unclear, in this order.
+enum class SlowFate { kHere, kLeft, kHidden, kUnclear };
+SlowFate slowFate(const SemanticMap& map, const VoxelIndex& voxel) {
+  const Block* const block = map.find(GridGeometry::blockOf(voxel));
+  const auto v = static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel));
+  const std::vector<Look> looks = block ? block->looks().all() : std::vector<Look>();
+  int seen = 0, voids = 0;
+  for (auto look = looks.rbegin(); look != looks.rend(); ++look) {
+    if (look->at(v) == Sight::kHit) {
+      if (seen == 0) return look->length() == 1 ? SlowFate::kHere : SlowFate::kHidden;
+      return voids >= 2 ? SlowFate::kLeft : SlowFate::kUnclear;
+    }
+    seen += look->at(v) != Sight::kNothing;
+    voids += look->at(v) == Sight::kVoid;
+  }
+  return SlowFate::kUnclear;
+}
+
+/// Whether what is around a hidden voxel is there, from the definition.
+bool slowIsStillThere(const SemanticMap& map, const VoxelIndex& voxel, int reach) {
+  double here = 0.0, left = 0.0;
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
+        const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
+        const ClassId id = likeliest(map, at);
+        const SlowFate fate = slowFate(map, at);
+        if (!asks(id) || fate == SlowFate::kHidden) continue;
+        const bool is_here = fate == SlowFate::kHere || (fate == SlowFate::kUnclear && holds(map, at, id));
+        (is_here ? here : left) += std::min(evidenceFor(map, at, id), kMost);
+      }
+    }
+  }
+  return here > 0.0 && here >= kRatio * left;
+}
+
+TEST(Neighbours, DecideWhetherWhatIsHiddenIsStillThere) {
+  std::size_t kept = 0, not_kept = 0, elsewhere = 0;
+  for (const unsigned seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
+    const SemanticMap map = lookedAtMap(seed);
+    const int reach = seed == 8 ? 7 : 1 + static_cast<int>(seed % 2);
+    const StateRules rules = rulesOfAll(true, reach).withLatest(true);
+    const StateRules floors_ask = rulesOfAll(false, reach).withLatest(true);
+    EXPECT_FALSE(floors_ask.hiddenAsk());
+    BlockView view;
+    for (const auto& [index, block] : map.entries()) {
+      readBlock(map, rules, index, *block, BlockFields::kStates, view);
+      for (int v = 0; v < kBlockVoxels; ++v) {
+        const VoxelIndex voxel = GridGeometry::voxelOf(index, v);
+        const ClassId id = likeliest(map, voxel);
+        const bool is_occupied = view.at(v).state == VoxelState::kOccupied;
+        ASSERT_EQ(viewWithoutEntropy(map, rules, voxel).state, view.at(v).state);
+        if (!asks(id) || evidenceFor(map, voxel, id) == 0.0 || slowFate(map, voxel) != SlowFate::kHidden ||
+            holds(map, voxel, id)) {
+          ++elsewhere;
+        } else if (slowIsStillThere(map, voxel, reach)) {
+          ASSERT_TRUE(is_occupied) << seed << ", block " << index.x << ' ' << index.y << ' ' << index.z
+                                   << ", voxel " << v;
+          EXPECT_EQ(view.at(v).label, id);
+          ++kept;
+        } else {
+          // Otherwise it is as without the looks, unless it has stayed.
+          const ClassId expected = slowLabel(map, voxel, true, reach);
+          const bool has_stayed = evidenceFor(map, voxel, id) >= 10.0 * kMost - 1e-6;
+          ASSERT_EQ(view.at(v).label, has_stayed ? id : expected);
+          ++not_kept;
+        }
+      }
+    }
+  }
+  EXPECT_GT(kept, 100u);
+  EXPECT_GT(not_kept, 40u);
+  EXPECT_GT(elsewhere, 1000u);
+}
+
 /// A row of voxels along x from (0, 0, 0), each with evidence for the car and for `free`.
 SemanticMap rowOfCar(const std::vector<std::pair<double, double>>& evidence) {
   SemanticMap map(GridGeometry(0.3), kPrior, 3);
@@ -157,6 +251,35 @@ StateRules rulesOfCars() {
 
 VoxelView viewAt(const SemanticMap& map, int x, const StateRules& rules = rulesOfCars()) {
   return viewWithoutEntropy(map, rules, VoxelIndex{{x, 0, 0}});
+}
+
+TEST(Neighbours, KeepWhatIsHiddenWhereTheyAreHere) {
+  // Both were free for long; only the first is hidden since it was hit.
+  SemanticMap map = rowOfCar({{0.3, 10.0}, {0.3, 10.0}});
+  const StateRules rules = rulesOfAll().withLatest(true);
+  Block& block = map.getOrAllocate({{0, 0, 0}});
+  Look::Voxels none, first, second, elsewhere;
+  first[0] = second[1] = elsewhere[kBlockVoxels - 1] = true;
+  const auto state = [&] { return viewWithoutEntropy(map, rules, {{0, 0, 0}}).state; };
+  block.looks().add(Look(1000, none, none, first));
+  EXPECT_EQ(state(), VoxelState::kOccupied) << "hit now";
+  block.looks().add(Look(1010, elsewhere, none, none));
+  EXPECT_EQ(state(), VoxelState::kFree) << "the other was crossed";
+  block.looks().add(Look(1011, none, none, second));
+  EXPECT_EQ(state(), VoxelState::kOccupied) << "the car is here";
+  block.looks().add(Look(1012, none, second, none));
+  block.looks().add(Look(1013, none, second, none));
+  EXPECT_EQ(state(), VoxelState::kFree) << "it has left";
+}
+
+TEST(Neighbours, AreNeededToKeepWhatIsHidden) {
+  SemanticMap map = rowOfCar({{0.3, 10.0}});
+  Look::Voxels none, first, elsewhere;
+  first[0] = elsewhere[kBlockVoxels - 1] = true;
+  Block& block = map.getOrAllocate({{0, 0, 0}});
+  block.looks().add(Look(1000, none, none, first));
+  block.looks().add(Look(1010, elsewhere, none, none));
+  EXPECT_EQ(viewWithoutEntropy(map, rulesOfAll().withLatest(true), {{0, 0, 0}}).state, VoxelState::kFree);
 }
 
 TEST(Neighbours, ClearWhatIsLeftOfACar) {
@@ -241,8 +364,8 @@ TEST(Neighbours, OfOtherClassesAreNotAsked) {
 
 TEST(Neighbours, DependentsAreAllWhoseStatesChange) {
   std::mt19937 random(3);
-  SemanticMap map = randomMap(9);
-  const StateRules rules = rulesOfAll();
+  SemanticMap map = lookedAtMap(9);
+  const StateRules rules = rulesOfAll().withLatest(true);
   std::size_t elsewhere = 0;
   for (int round = 0; round < 20; ++round) {
     const SemanticMap before = map.snapshot();
@@ -251,7 +374,14 @@ TEST(Neighbours, DependentsAreAllWhoseStatesChange) {
       map.erase(changed);
     } else {
       std::vector<EvidenceUnits> plane(kBlockVoxels, unitsOf(0.3));
-      map.getOrAllocate(changed).add(random() % 2 == 0 ? kCar : kFreeClass, plane.data());
+      Block& block = map.getOrAllocate(changed);
+      if (round % 4 != 2) block.add(random() % 2 == 0 ? kCar : kFreeClass, plane.data());
+      Look::Voxels seen;
+      for (std::size_t v = 0; v < kBlockVoxels; ++v) seen[v] = random() % 3 == 0;
+      const Look::Voxels none;
+      const bool is_hit = random() % 2 == 0;
+      block.looks().add(
+          Look(1020 + static_cast<std::uint64_t>(round), none, is_hit ? none : seen, is_hit ? seen : none));
     }
     const std::vector<GridIndex> touched = {changed},
                                  all = withDependents(map, rules, {touched.data(), touched.size()});

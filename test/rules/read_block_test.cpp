@@ -78,13 +78,16 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
   }
   if (kind.neighbours && random() % 2 == 0) {
     rules = rules.withLatest(true);
-    for (std::uint64_t tick = 1000; tick < 1000 + random() % 40; tick += 1 + random() % 3) {
-      Look::Voxels seen[3];
-      for (std::size_t v = 0; v < kBlockVoxels; ++v) {
-        const std::size_t sight = random() % 5;
-        if (sight < 3) seen[sight][v] = true;
+    for (const auto& [index, at] : map.entries()) {
+      Looks& looks = map.getOrAllocate(index).looks();
+      for (std::uint64_t tick = 1000; tick < 1000 + random() % 40; tick += 1 + random() % 3) {
+        Look::Voxels seen[3];
+        for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+          const std::size_t sight = random() % 5;
+          if (sight < 3) seen[sight][v] = true;
+        }
+        looks.add(Look(tick, seen[0], seen[1], seen[2]));
       }
-      block.looks().add(Look(tick, seen[0], seen[1], seen[2]));
     }
   }
   if (kind.occlusion) {

@@ -66,7 +66,7 @@ class ColumnMap {
   }
   const ColumnRules& rules() const { return rules_; }
 
-  /// Recomputes the stacks that contain the given blocks, or others whose states depend on their evidence.
+  /// Recomputes the stacks that contain the given blocks, or others whose states depend on them.
   /// @param changed blocks that have changed, or were created or erased. @return those stacks; stacks without
   /// blocks are no longer in columns().
   std::set<StackIndex> update(const SemanticMap& map, const StateRules& rules, const ClassTable& classes,
