@@ -101,14 +101,14 @@ class Figures(unittest.TestCase):
         self.assertRegex(looks, r'PA −[1-9]')
         self.assertIn('| `voids`, `looks` |', both)
         with unittest.mock.patch.object(quality, 'LASTING', ('looks',)):
-            header = quality.rules_on_longer_drives(runs, self.programs, 2).splitlines()[0]
+            header = quality.rules_on_longer_drives(runs, self.programs, 1).splitlines()[0]
         self.assertTrue(header.startswith('| without | street, 64 rows | traffic, 64 rows |'), header)
         with self.assertRaisesRegex(SystemExit, 'known: ' + ', '.join(name for name, _ in quality.RULES) + '\n'):
             runs.report(self.drive, more=('--without', 'nothing'))
         header, _, row = quality.table_of_presence(runs, sequences).splitlines()
         self.assertEqual(row.count('|'), header.count('|'))
-        header, _, *rows_of_longer = quality.table_of_longer_drives(runs, self.programs, 2).splitlines()
-        self.assertEqual([row.split('|')[3].strip() for row in rows_of_longer], ['10', '7', '7', '7', '7', '7'])
+        header, _, *rows_of_longer = quality.table_of_longer_drives(runs, self.programs, 1).splitlines()
+        self.assertEqual([row.split('|')[3].strip() for row in rows_of_longer], ['5', '3', '3', '3', '3', '3'])
         self.assertEqual({row.count('|') for row in rows_of_longer}, {header.count('|')})
         with unittest.mock.patch.object(self.programs, 'evaluate', side_effect=AssertionError('measured twice')):
             self.assertEqual(quality.measured(runs, sequences, (0.2, 0.4)), rows)
