@@ -29,9 +29,9 @@ inline bool isRestored(const StateRules& rules, EvidenceUnits vote, const VoteSu
 }
 
 /// Whether they keep one that nobody has looked at since its last hit, although its own evidence does not.
-/// @param sums of what is here and of what has left, by the looks.
+/// @param sums of what is here and of what has left, by the looks: twice as much must be here.
 inline bool isStillThere(const StateRules& rules, const VoteSums& sums) {
-  return sums.kept > 0 && areKept(rules, sums);
+  return sums.kept > 0 && areKept(rules, {sums.kept, 2 * sums.cleared});
 }
 
 /// Whether any voxel of the block may ask its neighbourhood.

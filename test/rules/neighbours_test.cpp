@@ -186,7 +186,7 @@ bool slowIsStillThere(const SemanticMap& map, const VoxelIndex& voxel, int reach
       }
     }
   }
-  return here > 0.0 && here >= kRatio * left;
+  return here > 0.0 && here >= 2.0 * kRatio * left;
 }
 
 TEST(Neighbours, DecideWhetherWhatIsHiddenIsStillThere) {
