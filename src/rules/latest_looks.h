@@ -32,8 +32,8 @@ Fate fateOf(const Looks& looks, std::size_t offset);
 /// The voxels of a block by their fates.
 struct Fates {
   Look::Voxels here, hidden, left;
-  Look::Voxels
-      crossed;  ///< of the unclear ones, those last hit in an earlier visit and crossed for kCrossedToClear
+  /// Of the unclear ones, those last hit in an earlier visit, and crossed for kCrossedToClear since.
+  Look::Voxels crossed;
 };
 Fates fatesOf(const Looks& looks);
 
