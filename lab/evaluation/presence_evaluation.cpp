@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 namespace bki_mapping {
 namespace {
@@ -79,14 +78,16 @@ void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupa
     ClassId id;
   };
   std::vector<Hit> hits;
-  std::set<std::pair<std::uint32_t, ClassId>> classes_hit;  // in each voxel
+  std::vector<std::pair<std::uint32_t, ClassId>> classes_hit;  // in each voxel
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Eigen::Vector3d point = scan.origin + scan.points[i].cast<double>();
     const auto id = classes.classOf(scan.labels[i], labelValues(scan));
     if (!id || id == classes.unlabelled() || !geometry_.contains(point)) continue;
     hits.push_back({i, voxelAt(geometry_.voxelAt(point)), *id});
-    classes_hit.emplace(hits.back().voxel, *id);
+    const std::pair<std::uint32_t, ClassId> hit(hits.back().voxel, *id);
+    if (classes_hit.empty() || classes_hit.back() != hit) classes_hit.push_back(hit);
   }
+  std::sort(classes_hit.begin(), classes_hit.end());
   for (const auto& [i, n, id] : hits) {
     const bool moves = !scan.labels_are_ids && moving_.contains(scan.labels[i]);
     Voxel& voxel = voxels_[n];
@@ -105,7 +106,8 @@ void PresenceEvaluation::add(const Scan& scan, const ClassTable& classes, Occupa
       PresentPoints& points = (moves ? quality_.moving : quality_.standing)[bin];
       ++points.points;
       points.present += shown.has_value();
-      points.named += shown && classes_hit.count({n, *shown}) > 0;
+      points.named +=
+          shown && std::binary_search(classes_hit.begin(), classes_hit.end(), std::pair(n, *shown));
     }
   }
   follow(scan, time, map);

@@ -100,22 +100,37 @@ void TruthEvaluation::countGhosts(const SemanticMap& map, const StateRules& rule
   ++moments_;
 }
 
-TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& rules, double time) const {
+TruthQuality TruthEvaluation::compare(const SemanticMap& map, const StateRules& rules, double time) {
   TruthQuality quality = compare(MapOccupants(map, rules), time);
   quality.ghosts = ghosts(map, rules, time).size();
   quality.mean_ghosts = static_cast<double>(ghosts_) / static_cast<double>(moments_);
   return quality;
 }
 
-TruthQuality TruthEvaluation::compare(const Occupants& map, double time) const {
+TruthEvaluation::Known& TruthEvaluation::known(const VoxelIndex& index, double time) {
+  if (time != known_at_) {
+    known_index_.clear();
+    known_.clear();
+    known_at_ = time;
+  }
+  const auto fresh = static_cast<std::uint32_t>(known_.size());
+  const std::uint32_t n = known_index_.insert(index, fresh);
+  if (n == fresh) {
+    known_.push_back({truth_.contentAt(index, time), static_cast<std::uint8_t>(distanceBin(index)), {}});
+  }
+  return known_[n];
+}
+
+TruthQuality TruthEvaluation::compare(const Occupants& map, double time) {
   TruthQuality quality;
   const auto add = [&](Proportion SpaceQuality::*figure, std::size_t bin, bool correct) {
     (quality.all.*figure).add(correct);
     (quality.by_distance[bin].*figure).add(correct);
   };
   for (const Seen& voxel : voxels_) {
-    const std::size_t bin = distanceBin(voxel.index);
-    const ClassId truth = classOf(truth_.contentAt(voxel.index, time));
+    const Known& known_here = known(voxel.index, time);
+    const std::size_t bin = known_here.bin;
+    const ClassId truth = classOf(known_here.content);
     const Occupant occupant = map.occupantOf(voxel.index);
     quality.voxels.add(truth, occupant.label);
     if (occupant.occupancy) quality.occupancy.add(*occupant.occupancy, 1, truth == kFreeClass ? 0 : 1);
@@ -128,15 +143,17 @@ TruthQuality TruthEvaluation::compare(const Occupants& map, double time) const {
   }
   map.forEachKnown([&](const VoxelIndex& index, const Occupant& occupant) {
     if (occupant.state != VoxelState::kFree && occupant.state != VoxelState::kOccupied) return;
-    const std::size_t bin = distanceBin(index);
-    const simulation::VoxelContent content = truth_.contentAt(index, time);
+    Known& known_here = known(index, time);
+    const std::size_t bin = known_here.bin;
+    const simulation::VoxelContent& content = known_here.content;
     const ClassId truth = classOf(content);
     if (occupant.state == VoxelState::kFree) {
       add(&SpaceQuality::free_precision, bin, content.filled < kMostlyEmpty);
       return add(&SpaceQuality::free_empty, bin, !content.label);
     }
     add(&SpaceQuality::occupied_precision, bin, truth != kFreeClass);
-    add(&SpaceQuality::occupied_near, bin, truth_.isNearAnything(index, time, geometry_.resolution()));
+    if (!known_here.close) known_here.close = truth_.isNearAnything(index, time, geometry_.resolution());
+    add(&SpaceQuality::occupied_near, bin, *known_here.close);
     if (index_of_.find(index) == kNoPosition) quality.voxels.add(truth, occupant.label);
     quality.movable += occupant.label != kFreeClass && classes_.find(occupant.label)->dynamic;
   });

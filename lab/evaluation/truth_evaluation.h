@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 
 #include "bki_mapping/core/class_table.h"
 #include "bki_mapping/core/scan.h"
@@ -67,9 +69,9 @@ class TruthEvaluation {
   void add(const Scan& scan);
   /// Counts the ghosts in the map at a time. @param time since the start of the drive [s].
   void countGhosts(const SemanticMap& map, const StateRules& rules, double time);
-  TruthQuality compare(const SemanticMap& map, const StateRules& rules, double time) const;
+  TruthQuality compare(const SemanticMap& map, const StateRules& rules, double time);
   /// The same without ghosts, of a map of any kind. Without classes, `voxels` and `movable` mean nothing.
-  TruthQuality compare(const Occupants& map, double time) const;
+  TruthQuality compare(const Occupants& map, double time);
   /// The voxels occupied in the map by a class that can move, although nothing of such a class has been near
   /// for 0.5 s.
   std::vector<VoxelIndex> ghosts(const SemanticMap& map, const StateRules& rules, double time) const;
@@ -80,7 +82,16 @@ class TruthEvaluation {
     bool hit = false, crossed = false;
   };
 
+  /// What the scene has in a voxel at the time known_at_.
+  struct Known {
+    simulation::VoxelContent content;
+    std::uint8_t bin = 0;       ///< of its distance
+    std::optional<bool> close;  ///< whether anything is within one voxel's edge, once that was asked
+  };
+
   Seen& seen(const VoxelIndex& index);
+  /// Keeps the answers, since maps of the same scans have the same voxels.
+  Known& known(const VoxelIndex& index, double time);
   std::size_t distanceBin(const VoxelIndex& index) const;
   bool isMovable(std::uint32_t raw_label) const;
   bool isGhost(const VoxelIndex& index, double time) const;
@@ -94,6 +105,9 @@ class TruthEvaluation {
   GridTable index_of_;
   std::vector<Seen> voxels_;
   std::size_t ghosts_ = 0, moments_ = 0;
+  double known_at_ = 0.0;  ///< [s]
+  GridTable known_index_;
+  std::vector<Known> known_;
 };
 
 }  // namespace bki_mapping

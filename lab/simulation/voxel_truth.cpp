@@ -41,10 +41,14 @@ VoxelContent VoxelTruth::contentAt(const VoxelIndex& voxel, double time) const {
   std::map<std::uint32_t, int> votes;
   double inside = 0.0;
   anyPoint(voxel, [&](const Eigen::Vector3d& point) {
-    const auto label = near.labelAt(point, time);
-    if (label) ++votes[*label];
-    const bool in_shape = near.shapeLabelAt(point, time).has_value();
-    inside += in_shape ? 1.0 : std::clamp(0.5 - heightOver(point) / height, 0.0, 1.0);
+    if (const auto of_shape = near.shapeLabelAt(point, time)) {
+      ++votes[*of_shape];
+      inside += 1.0;
+      return false;
+    }
+    const double above = heightOver(point);
+    if (above <= 0.0) ++votes[near.ground.labelAt(point.x(), point.y())];
+    inside += std::clamp(0.5 - above / height, 0.0, 1.0);
     return false;
   });
   VoxelContent content;

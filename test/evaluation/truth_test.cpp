@@ -68,7 +68,7 @@ TEST_F(Truth, AFreeVoxelIsRightIfItIsMostlyEmpty) {
   EXPECT_NEAR(truth().contentAt(voxel(3, 0, -3), 0.0).filled, 0.3, 1e-12) << "between sample points";
   EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, -4), 0.0).filled, 1.0);
   EXPECT_DOUBLE_EQ(truth().contentAt(voxel(3, 0, 0), 0.0).filled, 0.0);
-  const TruthEvaluation evaluation(truth(), classes_);
+  TruthEvaluation evaluation(truth(), classes_);
   SemanticMap map = emptyMap();
   for (const int z : {-4, -3, 0}) add(map, voxel(3, 0, z), kFreeClass);
   const SpaceQuality space = evaluation.compare(map, StateRules(), 0.0).all;
