@@ -26,6 +26,12 @@ void TracesEvaluation::add(const Scan& scan, Occupants& map) {
   images.add(scan, map);
 }
 
+OtherRun::OtherRun(std::string given, const MapperConfig& config, std::shared_ptr<const ClassTable> classes,
+                   const KittiLabels& moving)
+    : settings(std::move(given)),
+      mapper(config, std::move(classes)),
+      presence(mapper.map().geometry(), moving) {}
+
 OctomapRun::OctomapRun(const std::string& given, const GridGeometry& geometry, const KittiLabels& moving)
     : settings(given),
       mapper(geometry.resolution(), octomapSettings(given)),
@@ -74,6 +80,7 @@ void MapEvaluation::tellTruth() {
     return truth->isTaken(voxel, time - 1e-9 * static_cast<double>(Sequence::kFirstStamp));
   };
   presence.setTruth(is_taken);
+  for (OtherRun& other : others) other.presence.setTruth(is_taken);
   for (OctomapRun& octomap : octomaps) octomap.presence.setTruth(is_taken);
 }
 
@@ -90,6 +97,14 @@ MapQuality MapEvaluation::compare(const SemanticMapper& mapper) {
   quality.semantics = semantics.compare(map, rules, still_there);
   quality.occupancy = occupancy.compare(map, rules, left);
   if (truth) quality.truth = truth->compare(map, rules, end);
+  for (const OtherRun& other : others) {
+    MapOccupants its(other.mapper.map(), other.mapper.rules());
+    std::optional<TruthQuality> space;
+    if (truth) space = truth->compare(its, end);
+    quality.others.push_back({other.settings,
+                              dynamics.compare(other.mapper.map(), other.mapper.rules(), taken()),
+                              other.presence.quality(its), space, other.mapper.map().bytes()});
+  }
   for (OctomapRun& octomap : octomaps) {
     std::optional<TruthQuality> space;
     if (truth) space = truth->compare(octomap.mapper, end);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,15 @@ struct TracesEvaluation {
   void add(const Scan& scan, Occupants& map);
   TracesOfKinds quality(Occupants& map) const { return {particles.quality(map), images.quality(map)}; }
   TraceEvaluation particles, images;
+};
+
+/// Another map of the same scans, in a grid of the same kind, and what only it has.
+struct OtherRun {
+  OtherRun(std::string given, const MapperConfig& config, std::shared_ptr<const ClassTable> classes,
+           const KittiLabels& moving);
+  std::string settings;  ///< as given
+  SemanticMapper mapper;
+  PresenceEvaluation presence;
 };
 
 /// An OctoMap of the same scans, and what only it has.
@@ -55,6 +65,7 @@ struct MapEvaluation {
   std::optional<TruthEvaluation> truth;
   std::optional<TracesEvaluation> traces;  ///< of a simulated drive
   std::optional<CloudEvaluation> cloud;
+  std::list<OtherRun> others;
   std::list<OctomapRun> octomaps;
   double end = 0.0;  ///< time of the last scan since the start of the drive [s]
   std::size_t labels = 0, unknown_labels = 0;
@@ -66,7 +77,7 @@ struct MapEvaluation {
   void addUnlabelled(const Scan& scan, const ClassTable& classes);
   /// Whether a voxel contains an object that can move at the end of the drive, if the truth is known.
   DynamicsEvaluation::Taken taken() const;
-  /// Call once `truth` and `octomaps` are there.
+  /// Call once `truth`, `others` and `octomaps` are there.
   void tellTruth();
   MapQuality compare(const SemanticMapper& mapper);
   /// One row per voxel with points: its centre and its outcome.

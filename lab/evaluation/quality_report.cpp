@@ -154,6 +154,15 @@ Json octomapJson(const OctomapQuality& octomap) {
   return figures;
 }
 
+Json otherJson(const OtherMap& other) {
+  Json figures = dynamicsJson(other.dynamics);
+  figures["settings"] = other.settings;
+  figures["presence"] = presenceJson(other.presence);
+  if (other.truth) figures["truth"] = trueSpaceJson(*other.truth);
+  figures["map_bytes"] = other.bytes;
+  return figures;
+}
+
 /// One decimal; "-" for a fraction of nothing.
 std::string figureText(double figure) {
   if (!std::isfinite(figure)) return "-";
@@ -232,16 +241,20 @@ void addTraces(const std::optional<TracesOfKinds>& traces, Table& table) {
   if (traces->images.points > 0) table.text(tracesText(traces->images, "images in panes"));
 }
 
-void addOctomap(const OctomapQuality& octomap, Table& table) {
-  const DynamicsQuality& d = octomap.dynamics;
+std::string accuraciesText(const DynamicsQuality& quality) {
   const auto percent = [](double fraction) { return figureText(100.0 * fraction); };
-  table.text("OctoMap of the same scans, " + octomap.settings + ": SA " + percent(d.staticAccuracy()) +
-             ", standing " + percent(d.standingAccuracy()) + ", holes " + percent(d.holes()) + ", DA " +
-             percent(d.dynamicAccuracy()) + ", AA " + percent(d.accuracy()) + ", PA moving within 50 m " +
-             percent(octomap.presence.moving.back().accuracy()) + ", PA stayed " +
-             percent(octomap.presence.stayedShare()) + "; to appear: " + delayText(octomap.presence.appear) +
-             "; to clear: " + delayText(octomap.presence.clear) + "; ECE occupancy " +
-             percent(octomap.occupancy.error()) +
+  return "SA " + percent(quality.staticAccuracy()) + ", standing " + percent(quality.standingAccuracy()) +
+         ", holes " + percent(quality.holes()) + ", DA " + percent(quality.dynamicAccuracy()) + ", AA " +
+         percent(quality.accuracy());
+}
+
+void addOctomap(const OctomapQuality& octomap, Table& table) {
+  const auto percent = [](double fraction) { return figureText(100.0 * fraction); };
+  table.text("OctoMap of the same scans, " + octomap.settings + ": " + accuraciesText(octomap.dynamics) +
+             ", PA moving within 50 m " + percent(octomap.presence.moving.back().accuracy()) +
+             ", PA stayed " + percent(octomap.presence.stayedShare()) + "; to appear: " +
+             delayText(octomap.presence.appear) + "; to clear: " + delayText(octomap.presence.clear) +
+             "; ECE occupancy " + percent(octomap.occupancy.error()) +
              (octomap.truth ? "; free_precision " + percent(octomap.truth->all.free_precision.fraction()) +
                                   ", free_recall " + percent(octomap.truth->all.free_recall.fraction())
                             : "") +
@@ -342,12 +355,11 @@ std::string qualityTable(const MapQuality& quality, const ClassTable& classes) {
              " of moving objects; " + std::to_string(quality.bytes) + " bytes; median " +
              figureText(quality.median.wall) + " ms a scan");
   for (const OctomapQuality& octomap : quality.octomaps) addOctomap(octomap, table);
-  for (const JudgedMap& judged : quality.judged) {
-    const DynamicsQuality& with = judged.dynamics;
-    table.text("with " + judged.settings + ": SA " + figureText(100.0 * with.staticAccuracy()) +
-               ", standing " + figureText(100.0 * with.standingAccuracy()) + ", holes " +
-               figureText(100.0 * with.holes()) + ", DA " + figureText(100.0 * with.dynamicAccuracy()) +
-               ", AA " + figureText(100.0 * with.accuracy()));
+  for (const JudgedMap& judged : quality.judged)
+    table.text("with " + judged.settings + ": " + accuraciesText(judged.dynamics));
+  for (const OtherMap& other : quality.others) {
+    table.text("also mapped with " + other.settings + ": " + accuraciesText(other.dynamics) +
+               ", PA moving within 50 m " + figureText(100.0 * other.presence.moving.back().accuracy()));
   }
   if (quality.labels_are_ids) {
     table.text("class ids do not say what moves, so DA and AA are unknown and all points count as static");
@@ -403,6 +415,7 @@ std::string qualityJson(const MapQuality& quality, const ClassTable& classes) {
     figures["judged"].push_back(dynamicsJson(judged.dynamics));
     figures["judged"].back()["settings"] = judged.settings;
   }
+  for (const OtherMap& other : quality.others) figures["also"].push_back(otherJson(other));
   for (const OctomapQuality& octomap : quality.octomaps) figures["octomap"].push_back(octomapJson(octomap));
   if (quality.cloud) figures["cloud"] = cloudJson(*quality.cloud);
   if (quality.truth) figures["truth"] = truthJson(*quality.truth, classes);

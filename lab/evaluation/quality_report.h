@@ -22,6 +22,15 @@ struct JudgedMap {
   DynamicsQuality dynamics;
 };
 
+/// The same scans in a map with other settings or rules.
+struct OtherMap {
+  std::string settings;  ///< as given
+  DynamicsQuality dynamics;
+  PresenceQuality presence;
+  std::optional<TruthQuality> truth;  ///< without ghosts
+  std::size_t bytes = 0;              ///< of memory
+};
+
 /// What a simulated drive leaves of what is not there.
 struct TracesOfKinds {
   TraceQuality particles, images;
@@ -42,6 +51,7 @@ struct OctomapQuality {
 struct MapQuality {
   DynamicsQuality dynamics;
   std::vector<JudgedMap> judged;
+  std::vector<OtherMap> others;
   PresenceQuality presence;
   SemanticQuality semantics;
   Reliability occupancy;              ///< by the points, see OccupancyEvaluation

@@ -81,6 +81,8 @@ po::options_description options() {
       "octomap", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
       "also map the same points with OctoMap, with these settings or the default ones of octomap_server, "
       "called default, and measure that map; repeatable")(
+      "also", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
+      "also map the same scans with these settings, or without=RULE, and measure that map; repeatable")(
       "judge", po::value<std::vector<std::string>>()->composing()->value_name("NAME=VALUE,..."),
       judge.c_str())("without", po::value<std::vector<std::string>>()->composing()->value_name("RULE"),
                      without.c_str())(
@@ -179,6 +181,32 @@ Scan asKept(const Scan& scan, const SequenceFrame& frame, const po::variables_ma
   return place(rounded.scan, rounded.T_map_sensor);
 }
 
+/// Settings of another map of the same scans.
+/// @param settings NAME=VALUE,..., of which without=RULE leaves out a rule.
+/// @throws std::invalid_argument if its grid would be another one, or settings are wrong.
+MapperConfig otherConfig(const MapperConfig& config, const std::string& settings) {
+  const std::string kWithout = "without=";
+  std::string values;
+  std::vector<std::string> rules;
+  std::istringstream in(settings);
+  for (std::string each; std::getline(in, each, ',');) {
+    if (each.rfind(kWithout, 0) == 0) {
+      rules.push_back(each.substr(kWithout.size()));
+    } else {
+      values += (values.empty() ? "" : ",") + each;
+    }
+  }
+  MapperConfig other = tools::withSettings(config, "--also", values);
+  if (other.resolution != config.resolution || other.label_values != config.label_values) {
+    throw std::invalid_argument(
+        "--also " + settings +
+        " changes resolution or label_values, by which the map is measured; measure such "
+        "a map in a run of its own");
+  }
+  for (const std::string& rule : rules) other = withoutRule(other, rule);
+  return other;
+}
+
 MapperConfig configOf(const po::variables_map& given) {
   MapperConfig config = tools::mapperConfig(given);
   if (!given.count("without")) return config;
@@ -223,6 +251,12 @@ int evaluate(const po::variables_map& given) {
     for (const std::string& settings : given["octomap"].as<std::vector<std::string>>())
       evaluation.octomaps.emplace_back(settings, geometry, moving);
   }
+  if (given.count("also")) {
+    for (const std::string& settings : given["also"].as<std::vector<std::string>>()) {
+      evaluation.others.emplace_back(settings, otherConfig(mapper.config(), settings),
+                                     tools::classTable(given), moving);
+    }
+  }
   std::optional<simulation::Drive> drive;
   const auto config = simulation::readDriveFile(given["sequence"].as<std::string>());
   if (config) evaluation.traces.emplace(geometry);
@@ -248,15 +282,16 @@ int evaluate(const po::variables_map& given) {
     if (predictions) input.labels = predictions->read(i).labels;
     input.labels = withLabelNoise(input, mapper.classes(), label_noise);
     if (label_writer) label_writer->write(sequence.name(i), input.labels);
+    const Scan mapped = given.count("journal") ? asKept(input, frame, given, mapper) : input;
     ScanTimer timer;
-    const ScanStats stats =
-        mapper.integrate(given.count("journal") ? asKept(input, frame, given, mapper) : input);
+    const ScanStats stats = mapper.integrate(mapped);
     times.add({stats.totalMs(), timer.elapsed().processor});
     ++done;
     if (evaluation.traces) {
       MapOccupants occupants(mapper.map(), mapper.rules());
       evaluation.traces->add(scan, occupants);
     }
+    for (OtherRun& other : evaluation.others) other.mapper.integrate(mapped);
     for (OctomapRun& octomap : evaluation.octomaps) {
       octomap.times.add(octomap.mapper.integrate(input));
       if (evaluation.traces) octomap.traces.add(scan, octomap.mapper);
@@ -271,6 +306,10 @@ int evaluate(const po::variables_map& given) {
       evaluation.add(scan, predicted, mapper.classes());
       MapOccupants occupants(mapper.map(), mapper.rules());
       evaluation.presence.add(scan, mapper.classes(), occupants);
+      for (OtherRun& other : evaluation.others) {
+        MapOccupants its(other.mapper.map(), other.mapper.rules());
+        other.presence.add(scan, mapper.classes(), its);
+      }
     } else {
       evaluation.addUnlabelled(scan, mapper.classes());
     }

@@ -281,8 +281,25 @@ class Tools(ProgramTest):
         settings = ('rules/enabled=true', 'rules/latest=false', 'rules/void_outweighs=0')
         self.assertEqual(unlike(without), unlike(self.evaluation(*settings)))
         self.assertNotEqual(unlike(without), unlike(every))
+        others = {'without=looks,without=voids': without,
+                  'rules/void_outweighs=3,without=looks': self.evaluation(*given, 'rules/void_outweighs=3', more=('--without', 'looks'))}
+        beside = self.evaluation(*given, more=[word for each in others for word in ('--also', each)])
+        also = beside.pop('also')
+        self.assertEqual(unlike(beside), unlike(every))
+        self.assertEqual([each.pop('settings') for each in also], list(others))
+        for figures, (other, alone) in zip(also, others.items()):
+            self.assertIn(f'also mapped with {other}: SA ', self.table)
+            in_the_scene = figures.pop('truth')
+            self.assertEqual(in_the_scene, {name: alone['truth'][name] for name in in_the_scene})
+            self.assertIn('presence', figures)
+            self.assertEqual(figures, {name: alone[name] for name in figures})
+        self.assertNotEqual(also[0]['presence'], every['presence'])
+        self.assertNotEqual(also[0]['da'], every['da'])
         self.fails("there is no rule 'void' to leave out; known: hits_stay, ", 'evaluate_map', '--sequence', self.drive,
                    '--set', 'rules/enabled=true', '--without', 'void')
+        self.fails('--also resolution=0.2 changes resolution or label_values', 'evaluate_map', '--sequence', self.drive,
+                   '--also', 'resolution=0.2')
+        self.fails("no rule 'void'", 'evaluate_map', '--sequence', self.drive, '--set', 'rules/enabled=true', '--also', 'without=void')
         self.fails('rules/enabled is false', 'evaluate_map', '--sequence', self.drive, '--without', 'voids')
 
     def cloud_figures(self, drive, *more):
