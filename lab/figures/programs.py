@@ -2,6 +2,8 @@
 import json
 import os
 import subprocess
+import tempfile
+import threading
 import time
 
 import numpy as np
@@ -30,6 +32,7 @@ class Programs:
 
     def __init__(self, folder, scratch):
         self.folder, self.scratch = folder, scratch
+        self._simulating = threading.Lock()
         os.makedirs(scratch, exist_ok=True)
 
     def run(self, name, *arguments):
@@ -41,11 +44,12 @@ class Programs:
         print(f'    {name} {" ".join(arguments)}: {time.monotonic() - start:.1f} s', flush=True)
 
     def _with(self, name, option, sequence, settings, more):
-        path = os.path.join(self.scratch, 'figures.json')
         words = [word for key, value in settings.items() for word in ('--set', f'{key}={value}')]
-        self.run(name, '--sequence', sequence, option, path, *words, *more)
-        with open(path) as file:
-            return json.load(file)
+        with tempfile.TemporaryDirectory(dir=self.scratch) as folder:
+            path = os.path.join(folder, 'figures.json')
+            self.run(name, '--sequence', sequence, option, path, *words, *more)
+            with open(path) as file:
+                return json.load(file)
 
     def map(self, sequence, settings, states=None, more=()):
         """Maps a sequence; returns the report of map_sequence and, if states are given, the voxels in these states."""
@@ -63,9 +67,10 @@ class Programs:
     def simulate(self, name, **options):
         """Simulates a drive unless it exists; returns its folder."""
         folder = os.path.join(self.scratch, name)
-        if not os.path.isdir(folder):
-            words = [word for key, value in options.items() for word in ('--' + key.replace('_', '-'), str(value))]
-            self.run('simulate_drive', '--output', folder, *words)
+        with self._simulating:
+            if not os.path.isdir(folder):
+                words = [word for key, value in options.items() for word in ('--' + key.replace('_', '-'), str(value))]
+                self.run('simulate_drive', '--output', folder, *words)
         return folder
 
 

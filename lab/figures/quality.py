@@ -4,9 +4,11 @@ A table replaces what the document has between its two marker lines; it says the
 --scans scans, in rooms five times as many, because the robot there is slow. scripts/reproduce --quality calls this.
 """
 import argparse
+import concurrent.futures
 import datetime
 import os
 import re
+import threading
 
 from .programs import ROOT, Programs, commit
 from .tables import markdown
@@ -34,6 +36,7 @@ FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours',
         'hidden', 'free_sum_limit', 'neighbours looks')
 LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'hidden', 'free_sum_limit')  # on longer drives
 LEAST_CHANGE = 0.3  # that a table of rules lists [percentage points]
+MOST_OTHERS = 13  # maps beside another in one run, for the sake of memory
 SHAKEN = ('--pose-noise', '0.05,0.3')
 
 
@@ -74,19 +77,38 @@ STAYED = ('stayed', lambda r: share(r, 'presence', 'stayed_present'))
 
 
 class Runs:
-    """The reports of evaluate_map; none is measured twice."""
+    """The reports of evaluate_map; none is measured twice. Several threads may ask at the same time."""
 
-    def __init__(self, programs, presets=f'{ROOT}/config/presets', preset='robot', classes='semantic_kitti', threads=0):
+    def __init__(self, programs, presets=f'{ROOT}/config/presets', preset='robot', classes='semantic_kitti', threads=1):
         self._programs, self._presets, self._preset, self._classes = programs, presets, preset, classes
-        self._threads, self._reports = ['--threads', str(threads)], {}
+        self._threads, self._reports, self._stopped = ['--threads', str(threads)], {}, False
+        self._guard, self._locks = threading.Lock(), {}
 
     def report(self, sequence, settings=(), more=(), preset=None, classes=None):
         """settings: text such as 'resolution=0.1'."""
         key = sequence, tuple(settings), tuple(more), preset or self._preset, classes or self._classes
-        if key not in self._reports:
-            words = ['--config', os.path.join(self._presets, key[3] + '.yaml'), '--classes', key[4], *self._threads, *more]
-            self._reports[key] = self._programs.evaluate(sequence, dict(each.split('=') for each in settings), words)
-        return self._reports[key]
+        with self._guard:
+            lock = self._locks.setdefault(key, threading.Lock())
+        with lock:
+            if self._stopped:
+                raise SystemExit('stopped')
+            if key not in self._reports:
+                words = ['--config', os.path.join(self._presets, key[3] + '.yaml'), '--classes', key[4], *self._threads, *more]
+                self._reports[key] = self._programs.evaluate(sequence, dict(each.split('=') for each in settings), words)
+            return self._reports[key]
+
+    def with_others(self, sequence, others, settings=(), more=()):
+        """The reports of one map, and of further ones of the same scans. others: as --also of evaluate_map takes them."""
+        reports = []
+        for first in range(0, len(others), MOST_OTHERS):
+            also = [word for each in others[first:first + MOST_OTHERS] for word in ('--also', each)]
+            report = self.report(sequence, settings, [*more, *also])
+            reports += ([] if reports else [report]) + report['also']
+        return reports
+
+    def stop(self):
+        """Makes all threads that ask fail."""
+        self._stopped = True
 
 
 def by_drive(runs, sequences, variants):
@@ -146,14 +168,13 @@ def table_of_settings(runs, sequences):
 
     def cell(figures):
         return f"{share(figures, 'sa_standing')}, {share(figures, 'da')}"
-    rows = [['`robot`'] + [cell(runs.report(sequence, more=judge)) for sequence in drives.values()]]
-    for n, each in enumerate(JUDGED):
-        rows.append([f"`rules/{each.replace('=', '` ')}"]
-                    + [cell(runs.report(sequence, more=judge)['judged'][n]) for sequence in drives.values()])
-    for each in MEASURED:
-        rows.append([f"`rules/{each.replace('=', '` ')}"]
-                    + [cell(runs.report(sequence, ['rules/' + each])) for sequence in drives.values()])
-    return markdown(['setting', *drives], rows)
+
+    def reports_of(sequence):
+        report, *measured_ones = runs.with_others(sequence, ['rules/' + each for each in MEASURED], more=judge)
+        return [report, *report['judged'], *measured_ones]
+    names = ['`robot`'] + [f"`rules/{each.replace('=', '` ')}" for each in JUDGED + MEASURED]
+    columns = [[cell(report) for report in reports_of(sequence)] for sequence in drives.values()]
+    return markdown(['setting', *drives], [[name, *cells] for name, *cells in zip(names, *columns)])
 
 
 def change(without, every):
@@ -169,16 +190,16 @@ def table_of_rules(runs, sequences, drives, rules, settings=()):
     """For each rule that is left out, or several, and each drive: all figures that change."""
     columns = (SA, PARKED, HOLES, DA, ('PA', PA50[1]), STAYED, ('empty', EMPTY[1]))
     measured_on = {drive: sequences[drive] for drive in drives if drive in sequences}
+    others = [','.join(f'without={name}' for name in left_out.split()) for left_out in rules]
     rows = []
     for left_out in rules:
-        names, equation = left_out.split(), dict(RULES).get(left_out)
-        row = [', '.join(f'`{name}`' for name in names) + (f' ({equation})' if equation else '')]
-        more = [word for name in names for word in ('--without', name)]
-        for sequence in measured_on.values():
-            with_all, without = runs.report(sequence, settings), runs.report(sequence, settings, more)
-            changes = ((title, change(of(without), of(with_all))) for title, of in columns)
+        equation = dict(RULES).get(left_out)
+        rows.append([', '.join(f'`{name}`' for name in left_out.split()) + (f' ({equation})' if equation else '')])
+    for sequence in measured_on.values():
+        with_all, *without = runs.with_others(sequence, others, settings)
+        for row, report in zip(rows, without):
+            changes = ((title, change(of(report), of(with_all))) for title, of in columns)
             row.append(', '.join(f'{title} {value}' for title, value in changes if value))
-        rows.append(row)
     return markdown(['without', *measured_on], rows)
 
 
@@ -294,7 +315,9 @@ def main():
                         help='number of scans of each simulated drive; in rooms, five times as many')
     parser.add_argument('--resolution', type=float, nargs='+', default=RESOLUTIONS,
                         help='edges of voxels in the table named quality [m]')
-    parser.add_argument('--threads', type=int, default=0, help='threads of the mapper; 0: all cores')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count(),
+                        help='number of tables to measure at the same time; default: that of all cores')
+    parser.add_argument('--threads', type=int, default=1, help='threads of each mapper; 0: all cores')
     parser.add_argument('--commit', help='commit of the programs; default: that of this tree')
     parser.add_argument('--sequence', action='append', default=[],
                         help="further sequence in SemanticKITTI's layout; repeatable")
@@ -313,8 +336,8 @@ def main():
     for scene, times in SCENES.items():
         sequences[scene] = programs.simulate(f'{scene}{times * given.scans}', scene=scene, scans=times * given.scans)
     source = f'Measured on {datetime.date.today()}, commit {given.commit or commit()}'
-    for name in names:
-        rows = tables[name]()
+
+    def write(name, rows):
         scans = '' if 'longer' in name else f', {given.scans} scans of each simulated drive'
         if scans and re.search(r'\| rooms\b', rows):
             scans += f", in rooms {SCENES['rooms'] * given.scans}"
@@ -324,6 +347,15 @@ def main():
         with open(given.document, 'w') as file:
             file.write(replaced(text, name, table))
         print(f'    {given.document}: {name}', flush=True)
+
+    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+        # Those of rules take longest.
+        measuring = {pool.submit(tables[name]): name for name in sorted(names, key=lambda name: 'rules' not in name)}
+        try:
+            for done in concurrent.futures.as_completed(measuring):
+                write(measuring[done], done.result())
+        finally:
+            runs.stop()
 
 
 if __name__ == '__main__':
