@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <ostream>
 #include <random>
+#include <vector>
 
 #include "bki_mapping/rules/map_snapshot.h"
 #include "rules/state_kernels.h"
@@ -115,14 +117,33 @@ MapSnapshot randomMap(const Kind& kind, std::mt19937& random) {
   return {std::move(map), rules};
 }
 
-void expectNear(float value, float expected, const char* field, const std::string& where) {
+constexpr BlockIndex kOrigin{{0, 0, 0}};
+
+/// Of a voxel, for messages.
+struct Where {
+  const std::string& set;
+  const std::string& what;
+  int offset;
+};
+std::ostream& operator<<(std::ostream& out, const Where& where) {
+  return out << where.set << ", " << where.what << ", voxel " << where.offset;
+}
+
+void expectNear(float value, float expected, const char* field, const Where& where) {
   ASSERT_NEAR(value, expected, kError * std::abs(expected)) << field << ", " << where;
 }
 
-/// Compares every voxel of the map's block with viewVoxel.
-void compare(const SemanticMap& map, const StateRules& rules, const std::string& set,
-             const std::string& what) {
-  constexpr BlockIndex kOrigin{{0, 0, 0}};
+/// The voxels of the map's block, one by one.
+std::vector<VoxelView> oneByOne(const SemanticMap& map, const StateRules& rules) {
+  std::vector<VoxelView> views;
+  for (int offset = 0; offset < kBlockVoxels; ++offset)
+    views.push_back(viewVoxel(map, rules, kOrigin, *map.find(kOrigin), offset));
+  return views;
+}
+
+/// Compares every voxel of the map's block, read at once, with what is expected.
+void compare(const SemanticMap& map, const StateRules& rules, const std::vector<VoxelView>& expected_views,
+             const std::string& set, const std::string& what) {
   const Block& block = *map.find(kOrigin);
   BlockView view, states, posterior;
   std::memset(static_cast<void*>(&view), 0x55, sizeof(view));
@@ -136,8 +157,8 @@ void compare(const SemanticMap& map, const StateRules& rules, const std::string&
   posterior.entropy = view.entropy;
   EXPECT_EQ(std::memcmp(&posterior, &view, sizeof(view)), 0) << set << ", " << what;
   for (int offset = 0; offset < kBlockVoxels; ++offset) {
-    const VoxelView got = view.at(offset), expected = viewVoxel(map, rules, kOrigin, block, offset);
-    const std::string where = set + ", " + what + ", voxel " + std::to_string(offset);
+    const VoxelView got = view.at(offset), &expected = expected_views[static_cast<std::size_t>(offset)];
+    const Where where{set, what, offset};
     ASSERT_EQ(got.state, expected.state) << where;
     ASSERT_EQ(got.label, expected.label) << where;
     expectNear(got.probability, expected.probability, "probability", where);
@@ -177,8 +198,9 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOne) {
             const Kind kind{
                 static_cast<std::size_t>(classes), planes, prior, evidence, gains, stays, n % 2 == 0};
             const MapSnapshot made = randomMap(kind, random);
+            const std::vector<VoxelView> expected = oneByOne(made.map, made.rules);
             for (const std::string& set : instructionSets())
-              compare(made.map, made.rules, set, "map " + std::to_string(n));
+              compare(made.map, made.rules, expected, set, "map " + std::to_string(n));
             if (HasFatalFailure()) return;
             ++n;
           }
@@ -198,8 +220,9 @@ TEST(ReadBlock, EqualsItsVoxelsOneByOneAmongOtherBlocks) {
           const Kind kind{
               static_cast<std::size_t>(classes), planes, prior, evidence, true, stays, n % 2 == 0, true};
           const MapSnapshot made = randomMap(kind, random);
+          const std::vector<VoxelView> expected = oneByOne(made.map, made.rules);
           for (const std::string& set : instructionSets())
-            compare(made.map, made.rules, set, "map " + std::to_string(n));
+            compare(made.map, made.rules, expected, set, "map " + std::to_string(n));
           if (HasFatalFailure()) return;
           ++n;
         }
@@ -228,7 +251,7 @@ TEST(ReadBlock, DecidesByTheLastUnit) {
         block.add(kFreeClass, free.data());
         for (EvidenceUnits& units : hits) ++units;
         if (remains) block.add(0, hits.data());
-        compare(map, rules, set, "gain " + std::to_string(gain));
+        compare(map, rules, oneByOne(map, rules), set, "gain " + std::to_string(gain));
       }
     }
   }
