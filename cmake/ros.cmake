@@ -48,11 +48,13 @@ bki_mapping_uses_ros(mapping_node)
 
 add_executable(map_bag src/tools/map_bag.cpp src/tools/bag_reading.cpp)
 bki_mapping_tool(map_bag bki_mapping_ros bki_mapping_export nlohmann_json::nlohmann_json)
+bki_mapping_join(map_bag)
 add_executable(play_sequence src/tools/play_sequence.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(play_sequence bki_mapping_ros)
 bki_mapping_join(play_sequence)
 add_executable(sequence_to_bag src/tools/sequence_to_bag.cpp src/tools/sequence_messages.cpp)
 bki_mapping_tool(sequence_to_bag bki_mapping_ros)
+bki_mapping_join(sequence_to_bag)
 add_executable(print_parameters src/tools/print_parameters.cpp)
 bki_mapping_tool(print_parameters bki_mapping_ros nlohmann_json::nlohmann_json)
 
