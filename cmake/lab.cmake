@@ -2,7 +2,7 @@
 find_package(PCL QUIET REQUIRED COMPONENTS common filters io kdtree)
 bki_mapping_room(evaluation FOLDER lab/evaluation SOURCES
     cloud_evaluation.cpp dynamics_evaluation.cpp left_out.cpp map_evaluation.cpp noise.cpp occupancy_evaluation.cpp occupants.cpp
-    octomap_mapper.cpp presence_evaluation.cpp quality_report.cpp semantic_evaluation.cpp trace_evaluation.cpp truth_evaluation.cpp
+    octomap_mapper.cpp presence_evaluation.cpp quality_json.cpp quality_table.cpp semantic_evaluation.cpp trace_evaluation.cpp truth_evaluation.cpp
   LINK bki_mapping_simulation bki_mapping_beams)
 target_link_libraries(bki_mapping_evaluation PRIVATE nlohmann_json::nlohmann_json pcl_common pcl_kdtree ${OCTOMAP_LIBRARIES})
 target_include_directories(bki_mapping_evaluation SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
