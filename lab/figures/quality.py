@@ -8,9 +8,9 @@ import concurrent.futures
 import datetime
 import os
 import re
-import threading
 
 from .programs import ROOT, Programs, commit
+from .runs import Runs
 from .tables import markdown
 
 SCENES = {'street': 1, 'crowd': 1, 'traffic': 1, 'arrivals': 1, 'queue': 1, 'rooms': 5}  # by how much each drive is longer
@@ -36,7 +36,6 @@ FINE = ('hits_first', 'passing', 'standing', 'fixed_gain', 'edge', 'neighbours',
         'hidden', 'free_sum_limit', 'neighbours looks')
 LASTING = ('living', 'neighbours', 'vote_limit', 'looks', 'has_stayed', 'hidden', 'free_sum_limit')  # on longer drives
 LEAST_CHANGE = 0.3  # that a table of rules lists [percentage points]
-MOST_OTHERS = 13  # maps beside another in one run, for the sake of memory
 SHAKEN = ('--pose-noise', '0.05,0.3')
 
 
@@ -74,41 +73,6 @@ MIOU, INPUT = ('mIoU', lambda r: share(r, 'miou_map_present')), ('input', lambda
 APPEAR, CLEAR = (('appear [s]', lambda r: delay(r, 'appear')), ('clear [s]', lambda r: delay(r, 'clear')))
 NAMED = ('named', lambda r: share(r, 'presence', 'by_distance', 1, 'moving_named'))
 STAYED = ('stayed', lambda r: share(r, 'presence', 'stayed_present'))
-
-
-class Runs:
-    """The reports of evaluate_map; none is measured twice. Several threads may ask at the same time."""
-
-    def __init__(self, programs, presets=f'{ROOT}/config/presets', preset='robot', classes='semantic_kitti', threads=1):
-        self._programs, self._presets, self._preset, self._classes = programs, presets, preset, classes
-        self._threads, self._reports, self._stopped = ['--threads', str(threads)], {}, False
-        self._guard, self._locks = threading.Lock(), {}
-
-    def report(self, sequence, settings=(), more=(), preset=None, classes=None):
-        """settings: text such as 'resolution=0.1'."""
-        key = sequence, tuple(settings), tuple(more), preset or self._preset, classes or self._classes
-        with self._guard:
-            lock = self._locks.setdefault(key, threading.Lock())
-        with lock:
-            if self._stopped:
-                raise SystemExit('stopped')
-            if key not in self._reports:
-                words = ['--config', os.path.join(self._presets, key[3] + '.yaml'), '--classes', key[4], *self._threads, *more]
-                self._reports[key] = self._programs.evaluate(sequence, dict(each.split('=') for each in settings), words)
-            return self._reports[key]
-
-    def with_others(self, sequence, others, settings=(), more=()):
-        """The reports of one map, and of further ones of the same scans. others: as --also of evaluate_map takes them."""
-        reports = []
-        for first in range(0, len(others), MOST_OTHERS):
-            also = [word for each in others[first:first + MOST_OTHERS] for word in ('--also', each)]
-            report = self.report(sequence, settings, [*more, *also])
-            reports += ([] if reports else [report]) + report['also']
-        return reports
-
-    def stop(self):
-        """Makes all threads that ask fail."""
-        self._stopped = True
 
 
 def by_drive(runs, sequences, variants):

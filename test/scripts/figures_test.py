@@ -18,6 +18,7 @@ import matplotlib.image  # noqa: E402
 
 from figures import complexity, frontier, leave_one_out, method, plane, quality, tradeoff  # noqa: E402
 from figures.programs import Programs  # noqa: E402
+from figures.runs import Runs  # noqa: E402
 
 
 def ink(path):
@@ -82,7 +83,7 @@ class Figures(unittest.TestCase):
             self.assertGreater(figures['drive']['sa'], 0.5)
 
     def test_the_tables_of_quality(self):
-        runs, sequences = quality.Runs(self.programs), {'drive': self.drive}
+        runs, sequences = Runs(self.programs), {'drive': self.drive}
         rows = quality.measured(runs, sequences, (0.2, 0.4))
         self.assertEqual([row[:2] for row in rows], [['drive', '0.2'], ['drive', '0.4']])
         for row in rows:
@@ -131,6 +132,25 @@ class Figures(unittest.TestCase):
             text = file.read()
         for name in quality.tables_of(None, None, given, {}):
             quality.replaced(text, name, '')
+
+    def test_tables_of_quality_are_the_same_measured_side_by_side(self):
+        def written(jobs, *more):
+            document = os.path.join(self.output, 'tables.md')
+            with open(document, 'w') as file:
+                file.write(''.join('text\n'.join(quality.marks(name)) for name in ('settings', 'errors', 'calibration')))
+            words = ['quality', '--programs', self.programs.folder, '--scratch', self.programs.scratch, '--document', document,
+                     '--scans', '1', '--commit', 'abc', '--table', 'settings', '--table', 'errors', '--jobs', str(jobs), *more]
+            with unittest.mock.patch.object(sys, 'argv', words):
+                quality.main()
+            with open(document) as file:
+                return file.read()
+        one_by_one = written(1)
+        self.assertIn('| `rules/void_outweighs` 60 |', one_by_one)
+        self.assertEqual(one_by_one.count('commit abc, 1 scans of each simulated drive:'), 2)
+        self.assertIn('text\n' + quality.marks('calibration')[1], one_by_one, 'not asked for')
+        self.assertEqual(written(2), one_by_one)
+        with self.assertRaisesRegex(SystemExit, 'missing.yaml'):
+            written(2, '--preset', 'missing')
 
     def test_tradeoff_and_views(self):
         modes = {name: points[:2] for name, points in tradeoff.MODES.items() if name in ('none', 'linear', 'line, bilinear')}
