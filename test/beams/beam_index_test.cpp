@@ -171,6 +171,35 @@ TEST(BeamTable, FindsAllBeamsOfEveryBox) {
   }
 }
 
+/// Boxes that a beam touches at one corner: in single precision, the corner may be in the bin beside that of
+/// the beam.
+TEST(BeamTable, FindsBeamsAtTheEdgesOfBins) {
+  constexpr int kBins = kBeamColumns / 4;  // of a quadrant
+  std::vector<Eigen::Vector3f> directions;
+  for (int bin = 1; bin < kBins; ++bin) {
+    const float y = static_cast<float>(bin) / kBins;
+    for (int ulps = -30; ulps <= 30; ++ulps) {
+      constexpr float kUlp = std::numeric_limits<float>::epsilon();
+      directions.emplace_back((1.0f - y) * (1.0f + static_cast<float>(ulps) * kUlp), y, 0.0f);
+    }
+  }
+  directions = sorted(directions);
+  const SortedTable sorted_table = sortedTable(directions);
+  for (const double range : {1.0, 0.3, 3.7, 7.3, 11.1, 47.9}) {
+    for (std::uint32_t b = 0; b < directions.size(); ++b) {
+      const Eigen::Vector3d end = range * directions[b].cast<double>();
+      const Eigen::AlignedBox3d right(end - Eigen::Vector3d(0.001, 0.0, 0.001),
+                                      end + Eigen::Vector3d(0.0, 0.001, 0.001)),
+          left(end - Eigen::Vector3d(0.0, 0.001, 0.001), end + Eigen::Vector3d(0.001, 0.0, 0.001));
+      for (const Eigen::AlignedBox3d& box : {right, left}) {
+        const std::vector<std::uint32_t> beams = query(*sorted_table.table, box);
+        ASSERT_EQ(std::count(beams.begin(), beams.end(), b), 1)
+            << "beam " << directions[b].transpose() << " at " << range << " m";
+      }
+    }
+  }
+}
+
 /// A ball around the box finds more than half as many again.
 TEST(BeamTable, FindsFewOtherBeamsOfABox) {
   std::mt19937 random(3);
