@@ -1,7 +1,6 @@
 #include "rules/latest_looks.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "map/voxel_mask.h"
 
@@ -34,23 +33,27 @@ struct SinceLastHit {
 };
 SinceLastHit sinceLastHit(const Looks& looks, std::size_t offset) {
   SinceLastHit since{Fate::kUnclear, looks.begin()};
-  int voids = 0;
+  int seen = 0, voids = 0;
   for (; since.hit != looks.end(); ++since.hit) {
     const Sight sight = since.hit->at(offset);
     if (sight == Sight::kHit) break;
     if (sight != Sight::kNothing) since.crossed += since.hit->length();
+    seen += sight != Sight::kNothing;
     voids += sight == Sight::kVoid;
   }
   if (since.hit == looks.end()) return since;
-  if (since.crossed == 0) {
+  if (seen == 0) {
     since.fate = since.hit->level() == 0 ? Fate::kHere : Fate::kHidden;
   } else if (voids >= kVoidsToClear) {
     since.fate = Fate::kLeft;
+  } else if (voids == 0 && seen <= kMostGrazed) {
+    since.fate = Fate::kGrazed;
   }
   return since;
 }
 
-/// The class with the most evidence in a voxel, of equal ones that with the smallest id, and its evidence.
+}  // namespace
+
 std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t offset) {
   std::pair<ClassId, EvidenceUnits> likeliest{kFreeClass, 0};
   for (std::size_t p = 0; p < block.classes().size(); ++p) {
@@ -61,8 +64,6 @@ std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t
   }
   return likeliest;
 }
-
-}  // namespace
 
 Fate fateOf(const Looks& looks, std::size_t offset) {
   return sinceLastHit(looks, offset).fate;
@@ -81,6 +82,7 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool c
           stay == Stay::kLong || (stay == Stay::kSome && wasFreeBefore(since.hit, end, offset));
       return has_stayed ? kKept : kNotOverruled;
     }
+    case Fate::kGrazed:
     case Fate::kUnclear:
       break;
   }
@@ -89,19 +91,23 @@ std::int32_t verdictOf(const Looks& looks, std::size_t offset, Stay stay, bool c
 }
 
 Fates fatesOf(const Looks& looks) {
-  static_assert(kVoidsToClear == 2 && kCrossedToClear == 2, "twice is enough");
+  static_assert(kVoidsToClear == 2 && kCrossedToClear == 2 && kMostGrazed == 2, "twice is enough");
   const Looks::Iterator end = looks.end(), visit_before = visitBefore(looks.begin(), end);
-  Look::Voxels hit, crossed, crossed_twice, voids, voids_twice;  // in the looks so far, up to the last hit
+  // In the looks so far, up to the last hit:
+  Look::Voxels hit, crossed, crossed_twice, seen_twice, seen_thrice, voids, voids_twice;
   Fates fates;
   for (Looks::Iterator at = looks.begin(); at != end; ++at) {
     const Look look = (*at).unpacked();
     const Look::Voxels last_hit = look.hit() & ~hit;
     (look.level() == 0 ? fates.here : fates.hidden) |= last_hit & ~crossed;
+    fates.grazed |= last_hit & crossed & ~seen_thrice & ~voids;
     fates.left |= last_hit & voids_twice;
     if (visit_before <= at) fates.crossed |= last_hit & crossed_twice & ~voids_twice;
     hit |= last_hit;
     const Look::Voxels seen = look.seen() & ~hit, is_void = look.voids() & ~hit;
     crossed_twice |= look.length() >= kCrossedToClear ? seen : crossed & seen;
+    seen_thrice |= seen_twice & seen;
+    seen_twice |= crossed & seen;
     crossed |= seen;
     voids_twice |= voids & is_void;
     voids |= is_void;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "bki_mapping/map/block.h"
 #include "bki_mapping/rules/state_rules.h"
@@ -13,6 +14,9 @@ namespace bki_mapping {
 
 /// Number of intervals since the last hit in which a voxel was seen void, from which on it is free.
 constexpr int kVoidsToClear = 2;
+/// The same in which beams may have crossed it at most, if what is around it shall say whether it is still
+/// occupied.
+constexpr int kMostGrazed = 2;
 /// A visit ends where the level of an interval is at least kVisitLevel, and at least kVisitLevels above that
 /// of the next one of its block: then nobody looked at the block in between for 2^(kVisitLevel - 2) ticks, 69
 /// s, or longer.
@@ -22,20 +26,24 @@ constexpr std::uint64_t kCrossedToClear = 2;
 
 /// What has become of what was last hit in a voxel, by the looks since.
 enum class Fate : std::uint8_t {
-  kUnclear,  ///< it was never hit, or was seen since, but was not void in two intervals
+  kUnclear,  ///< it was never hit, or none of the others
   kHere,     ///< hit in one of the two latest ticks of its block, and not seen since
   kHidden,   ///< hit before them, and not seen since
+  kGrazed,   ///< crossed in one or two intervals since, and void in none
   kLeft,     ///< it was void in two intervals since
 };
 Fate fateOf(const Looks& looks, std::size_t offset);
 
 /// The voxels of a block by their fates.
 struct Fates {
-  Look::Voxels here, hidden, left;
-  /// Of the unclear ones, those last hit in an earlier visit, and crossed for kCrossedToClear since.
+  Look::Voxels here, hidden, grazed, left;
+  /// Of the unclear and grazed ones, those last hit in an earlier visit, and crossed for kCrossedToClear since.
   Look::Voxels crossed;
 };
 Fates fatesOf(const Looks& looks);
+
+/// The class with the most evidence in a voxel, of equal ones that with the smallest id, and its evidence.
+std::pair<ClassId, EvidenceUnits> likeliestClass(const Block& block, std::size_t offset);
 
 /// How long a voxel has been hit, by the evidence of its likeliest class.
 enum class Stay : std::uint8_t {

@@ -174,32 +174,37 @@ void decideTogether(const StateKernels& kernels, const SemanticMap& map, const S
   }
 }
 
-/// Lets looks decide before the sum. What is hidden does not vote.
-void voteByLooks(const Looks& looks, BlockVotes& votes) {
-  if (looks.empty()) return;
-  const Fates fates = fatesOf(looks);
-  forEachVoxelOf(fates.here, [&](std::size_t v) {
+/// Lets looks decide before the sum. What is hidden votes only where it was hit for long.
+void voteByLooks(const StateRules& rules, const Block& block, BlockVotes& votes) {
+  if (block.looks().empty()) return;
+  const Fates fates = fatesOf(block.looks());
+  const auto keep = [&](std::size_t v) {
     votes.kept[v] += votes.cleared[v];
     votes.cleared[v] = 0;
-  });
+  };
+  forEachVoxelOf(fates.here, keep);
   forEachVoxelOf(fates.left, [&](std::size_t v) {
     votes.cleared[v] += votes.kept[v];
     votes.kept[v] = 0;
   });
-  forEachVoxelOf(fates.hidden, [&](std::size_t v) { votes.kept[v] = votes.cleared[v] = 0; });
+  forEachVoxelOf(fates.hidden, [&](std::size_t v) {
+    if (votes.kept[v] == 0 && votes.cleared[v] == 0) return;
+    if (likeliestClass(block, v).second >= rules.hiddenVotesFrom()) return keep(v);
+    votes.kept[v] = votes.cleared[v] = 0;
+  });
 }
 
-/// Finds what is kept of what is hidden and cleared by its own evidence.
-void keepHidden(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
-                const BlockIndex& index, const Block& block, const Look::Voxels& hidden,
+/// Finds what is still there of what its own evidence clears. @param unsure hidden and grazed voxels.
+void keepUnsure(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
+                const BlockIndex& index, const Block& block, const Look::Voxels& unsure,
                 const BlockVotes& own, Overruled& overruled) {
-  const auto asks = [&](std::size_t v) { return hidden[v] && own.cleared[v] > 0; };
+  const auto asks = [&](std::size_t v) { return unsure[v] && own.cleared[v] > 0; };
   const Extent asking = Extent::of(asks);
   if (asking.isEmpty()) return;
   const int reach = rules.neighbourhoodReach();
   Votes here(reach), left(reach);
   const auto take = [&](const Block& from, BlockVotes& votes, int x, int y, int z) {
-    voteByLooks(from.looks(), votes);
+    voteByLooks(rules, from, votes);
     here.copy(votes.kept, x, y, z);
     left.copy(votes.cleared, x, y, z);
   };
@@ -223,15 +228,15 @@ bool mayAskNeighbourhood(const StateRules& rules, const Block& block) {
 }
 
 bool findOverruled(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
-                   const BlockIndex& index, const Block& block, const Look::Voxels& hidden,
+                   const BlockIndex& index, const Block& block, const Look::Voxels& unsure,
                    Overruled& overruled) {
   if (!mayAskNeighbourhood(rules, block)) return false;
   BlockVotes own;
   if (!kernels.votes(planesOf(map, rules, block), {}, own)) return false;
   overruled.fill(kNotOverruled);
   decideTogether(kernels, map, rules, index, block, own, overruled);
-  if (rules.hiddenAsk() && hidden.any())
-    keepHidden(kernels, map, rules, index, block, hidden, own, overruled);
+  if (rules.hiddenAsk() && unsure.any())
+    keepUnsure(kernels, map, rules, index, block, unsure, own, overruled);
   return true;
 }
 

@@ -28,8 +28,8 @@ inline bool isRestored(const StateRules& rules, EvidenceUnits vote, const VoteSu
   return areKept(rules, sums) && kShare * vote * sums.keeping >= sums.kept;
 }
 
-/// Whether they keep one that nobody has looked at since its last hit, although its own evidence does not.
-/// @param sums of what is here and of what has left, by the looks: twice as much must be here.
+/// Whether they keep one that is hidden or grazed (Fate), although its own evidence does not. @param sums of
+/// what is here and of what has left, by the looks: twice as much must be here.
 inline bool isStillThere(const StateRules& rules, const VoteSums& sums) {
   return sums.kept > 0 && areKept(rules, {sums.kept, 2 * sums.cleared});
 }
@@ -37,10 +37,10 @@ inline bool isStillThere(const StateRules& rules, const VoteSums& sums) {
 /// Whether any voxel of the block may ask its neighbourhood.
 bool mayAskNeighbourhood(const StateRules& rules, const Block& block);
 
-/// Finds the voxels of a block that are overruled. @param hidden voxels (Fate), which may ask whether what is
-/// around is still there. @return false if none asks its neighbourhood.
+/// Finds the voxels of a block that are overruled. @param unsure hidden and grazed voxels (Fate), which may
+/// ask whether what is around is still there. @return false if none asks its neighbourhood.
 bool findOverruled(const StateKernels& kernels, const SemanticMap& map, const StateRules& rules,
-                   const BlockIndex& index, const Block& block, const Look::Voxels& hidden,
+                   const BlockIndex& index, const Block& block, const Look::Voxels& unsure,
                    Overruled& overruled);
 
 /// The blocks, and all others of the map whose states depend on them. @param blocks that have

@@ -63,7 +63,7 @@ OwnEvidence ownEvidence(const StateRules& rules, const Block& block, int offset)
 }
 
 /// Equation 12b: what the voxels around say of one that asks them. @param looks_first whether looks decide
-/// before the sum, and what is hidden does not vote.
+/// before the sum, and what is hidden votes only where it was hit for long.
 VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const VoxelIndex& voxel,
                      bool looks_first) {
   const int reach = rules.neighbourhoodReach();
@@ -91,8 +91,9 @@ VoteSums votesAround(const SemanticMap& map, const StateRules& rules, const Voxe
         if (own.best == 0 || !rules.asksNeighbourhood(own.label)) continue;
         const Fate fate =
             looks_first ? fateOf(block->looks(), static_cast<std::size_t>(offset)) : Fate::kUnclear;
-        if (fate == Fate::kHidden) continue;
-        if (fate != Fate::kUnclear) own.holds = fate == Fate::kHere;
+        if (fate == Fate::kHidden && own.best < rules.hiddenVotesFrom()) continue;
+        if (fate == Fate::kHere || fate == Fate::kHidden) own.holds = true;
+        if (fate == Fate::kLeft) own.holds = false;
         (own.holds ? sums.kept : sums.cleared) += std::min(own.best, most);
         sums.keeping += own.holds;
       }
@@ -163,7 +164,7 @@ void readBlock(const StateKernels& kernels, const SemanticMap& map, const StateR
   Overruled overruled;
   const bool looks_decide = rules.latestDecides() && !block.looks().empty();
   const Fates fates = looks_decide ? fatesOf(block.looks()) : Fates();
-  bool overrules = findOverruled(kernels, map, rules, index, block, fates.hidden, overruled);
+  bool overrules = findOverruled(kernels, map, rules, index, block, fates.hidden | fates.grazed, overruled);
   if (looks_decide) {
     if (!overrules) overruled.fill(kNotOverruled);
     overrules |= overruleByLooks(block, rules, fates, overruled);
@@ -193,9 +194,11 @@ VoxelView viewWithoutEntropy(const SemanticMap& map, const StateRules& rules, co
     const bool is_doubtful = std::int64_t{kFreeOfOneHit} * own.best >= own.free;
     holds = own.holds ? areKept(rules, sums)
                       : is_doubtful && isRestored(rules, std::min(own.best, rules.mostVote()), sums);
-    if (!own.holds && !holds && rules.hiddenAsk() &&
-        fateOf(block.looks(), static_cast<std::size_t>(offset)) == Fate::kHidden)
-      holds = isStillThere(rules, votesAround(map, rules, voxel, true));
+    if (!own.holds && !holds && rules.hiddenAsk()) {
+      const Fate fate = fateOf(block.looks(), static_cast<std::size_t>(offset));
+      if (fate == Fate::kHidden || fate == Fate::kGrazed)
+        holds = isStillThere(rules, votesAround(map, rules, voxel, true));
+    }
     restored = holds && !own.holds;
     has_left = !holds && own.holds;
   }

@@ -153,8 +153,8 @@ SemanticMap lookedAtMap(unsigned seed) {
   return map;
 }
 
-/// From the definition: here, left, hidden or unclear, in this order.
-enum class SlowFate { kHere, kLeft, kHidden, kUnclear };
+/// From the definition: here, left, hidden, grazed or unclear.
+enum class SlowFate { kHere, kLeft, kHidden, kGrazed, kUnclear };
 SlowFate slowFate(const SemanticMap& map, const VoxelIndex& voxel) {
   const Block* const block = map.find(GridGeometry::blockOf(voxel));
   const auto v = static_cast<std::size_t>(GridGeometry::offsetInBlock(voxel));
@@ -163,6 +163,7 @@ SlowFate slowFate(const SemanticMap& map, const VoxelIndex& voxel) {
   for (auto look = looks.rbegin(); look != looks.rend(); ++look) {
     if (look->at(v) == Sight::kHit) {
       if (seen == 0) return look->length() == 1 ? SlowFate::kHere : SlowFate::kHidden;
+      if (voids == 0 && seen <= 2) return SlowFate::kGrazed;
       return voids >= 2 ? SlowFate::kLeft : SlowFate::kUnclear;
     }
     seen += look->at(v) != Sight::kNothing;
@@ -171,7 +172,7 @@ SlowFate slowFate(const SemanticMap& map, const VoxelIndex& voxel) {
   return SlowFate::kUnclear;
 }
 
-/// Whether what is around a hidden voxel is there, from the definition.
+/// Whether what is around a hidden or grazed voxel is there, from the definition.
 bool slowIsStillThere(const SemanticMap& map, const VoxelIndex& voxel, int reach) {
   double here = 0.0, left = 0.0;
   for (int z = -reach; z <= reach; ++z) {
@@ -180,8 +181,10 @@ bool slowIsStillThere(const SemanticMap& map, const VoxelIndex& voxel, int reach
         const VoxelIndex at{{voxel.x + x, voxel.y + y, voxel.z + z}};
         const ClassId id = likeliest(map, at);
         const SlowFate fate = slowFate(map, at);
-        if (!asks(id) || fate == SlowFate::kHidden) continue;
-        const bool is_here = fate == SlowFate::kHere || (fate == SlowFate::kUnclear && holds(map, at, id));
+        const bool is_hidden = fate == SlowFate::kHidden;
+        if (!asks(id) || (is_hidden && evidenceFor(map, at, id) < 4.0 * kMost - 1e-6)) continue;
+        const bool is_here =
+            fate == SlowFate::kHere || is_hidden || (fate != SlowFate::kLeft && holds(map, at, id));
         (is_here ? here : left) += std::min(evidenceFor(map, at, id), kMost);
       }
     }
@@ -189,8 +192,8 @@ bool slowIsStillThere(const SemanticMap& map, const VoxelIndex& voxel, int reach
   return here > 0.0 && here >= 2.0 * kRatio * left;
 }
 
-TEST(Neighbours, DecideWhetherWhatIsHiddenIsStillThere) {
-  std::size_t kept = 0, not_kept = 0, elsewhere = 0;
+TEST(Neighbours, DecideWhetherWhatIsHiddenOrGrazedIsStillThere) {
+  std::size_t kept_hidden = 0, kept_grazed = 0, not_kept = 0, elsewhere = 0;
   for (const unsigned seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
     const SemanticMap map = lookedAtMap(seed);
     const int reach = seed == 8 ? 7 : 1 + static_cast<int>(seed % 2);
@@ -205,25 +208,28 @@ TEST(Neighbours, DecideWhetherWhatIsHiddenIsStillThere) {
         const ClassId id = likeliest(map, voxel);
         const bool is_occupied = view.at(v).state == VoxelState::kOccupied;
         ASSERT_EQ(viewWithoutEntropy(map, rules, voxel).state, view.at(v).state);
-        if (!asks(id) || evidenceFor(map, voxel, id) == 0.0 || slowFate(map, voxel) != SlowFate::kHidden ||
+        const SlowFate fate = slowFate(map, voxel);
+        const bool is_hidden = fate == SlowFate::kHidden;
+        if (!asks(id) || evidenceFor(map, voxel, id) == 0.0 || (!is_hidden && fate != SlowFate::kGrazed) ||
             holds(map, voxel, id)) {
           ++elsewhere;
         } else if (slowIsStillThere(map, voxel, reach)) {
           ASSERT_TRUE(is_occupied) << seed << ", block " << index.x << ' ' << index.y << ' ' << index.z
                                    << ", voxel " << v;
           EXPECT_EQ(view.at(v).label, id);
-          ++kept;
+          ++(is_hidden ? kept_hidden : kept_grazed);
         } else {
-          // Otherwise it is as without the looks, unless it has stayed.
+          // Otherwise it is as without the looks, unless it is hidden and has stayed.
           const ClassId expected = slowLabel(map, voxel, true, reach);
-          const bool has_stayed = evidenceFor(map, voxel, id) >= 10.0 * kMost - 1e-6;
+          const bool has_stayed = is_hidden && evidenceFor(map, voxel, id) >= 10.0 * kMost - 1e-6;
           ASSERT_EQ(view.at(v).label, has_stayed ? id : expected);
           ++not_kept;
         }
       }
     }
   }
-  EXPECT_GT(kept, 100u);
+  EXPECT_GT(kept_hidden, 100u);
+  EXPECT_GT(kept_grazed, 100u);
   EXPECT_GT(not_kept, 40u);
   EXPECT_GT(elsewhere, 1000u);
 }
@@ -270,6 +276,40 @@ TEST(Neighbours, KeepWhatIsHiddenWhereTheyAreHere) {
   block.looks().add(Look(1012, none, second, none));
   block.looks().add(Look(1013, none, second, none));
   EXPECT_EQ(state(), VoxelState::kFree) << "it has left";
+}
+
+TEST(Neighbours, VoteWhileTheyAreHiddenOnceTheyWereHitForLong) {
+  // All were free for long, and have been hidden since they were hit, the second one in 63 or 64 scans.
+  for (const double of_second : {63.0 / 16.0 * kMost, 4.0 * kMost}) {
+    SemanticMap map = rowOfCar({{0.3, 10.0}, {of_second, 1000.0}});
+    Block& block = map.getOrAllocate({{0, 0, 0}});
+    Look::Voxels none, both, elsewhere;
+    both[0] = both[1] = elsewhere[kBlockVoxels - 1] = true;
+    block.looks().add(Look(1000, none, none, both));
+    block.looks().add(Look(1010, elsewhere, none, none));
+    const VoxelState state = viewWithoutEntropy(map, rulesOfAll().withLatest(true), {{0, 0, 0}}).state;
+    EXPECT_EQ(state, of_second < 4.0 * kMost ? VoxelState::kFree : VoxelState::kOccupied);
+  }
+}
+
+TEST(Neighbours, KeepWhatTwoIntervalsGrazeWhereTheyAreHere) {
+  SemanticMap map = rowOfCar({{0.3, 10.0}, {4.0, 100.0}});
+  const StateRules rules = rulesOfAll().withLatest(true);
+  Block& block = map.getOrAllocate({{0, 0, 0}});
+  Look::Voxels none, first, second;
+  first[0] = second[1] = true;
+  const auto state = [&] { return viewWithoutEntropy(map, rules, {{0, 0, 0}}).state; };
+  block.looks().add(Look(1000, none, none, first));
+  block.looks().add(Look(1010, first, none, second));
+  EXPECT_EQ(state(), VoxelState::kOccupied);
+  block.looks().add(Look(1020, first, none, second));
+  EXPECT_EQ(state(), VoxelState::kOccupied);
+  const Looks grazed_twice = block.looks();
+  block.looks().add(Look(1030, first, none, second));
+  EXPECT_EQ(state(), VoxelState::kFree) << "crossed in three intervals";
+  block.looks() = grazed_twice;
+  block.looks().add(Look(1020, none, first, second));
+  EXPECT_EQ(state(), VoxelState::kFree) << "void in one";
 }
 
 TEST(Neighbours, AreNeededToKeepWhatIsHidden) {

@@ -90,12 +90,21 @@ class StateRules {
     return config_.has(Rule::kHasStayed) ? (evidenceOfVotes() + 1) / 2 : kMostUnits;
   }
 
-  /// Whether voxels that nobody has looked at since their last hit ask the voxels around whether what was hit
-  /// is still there (Equation 12c). Not where floors ask, too: they always are.
+  /// Whether voxels that nobody has looked at since their last hit, or that beams have hardly crossed, ask
+  /// the voxels around whether what was hit is still there (Equation 12c). Not where floors ask, too: they
+  /// always are.
   bool hiddenAsk() const {
     return latest_decides_ && neighbourhood_ratio_ > 0.0f && neighbourhood_is_below_ &&
            config_.has(Rule::kHidden);
   }
+
+  /// Evidence of the likeliest class from which on such a voxel, hidden since its last hit, votes for what is
+  /// still there [units]: fewer hits may be of what passed.
+  EvidenceUnits hiddenVotesFrom() const {
+    static_assert(kHiddenVotesAfter % kMostVotes == 0);
+    return kHiddenVotesAfter / kMostVotes * evidenceOfVotes();
+  }
+  static constexpr int kHiddenVotesAfter = 64;  ///< 6.4 s at 10 Hz
 
   /// The most that evidence for `free` counts for [units]: where the latest looks decide, the hits of
   /// kMostFree scans. What has been hit in more stands until it is seen void, however long space was free
