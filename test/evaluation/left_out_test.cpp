@@ -74,6 +74,7 @@ std::map<std::string, double> saidBy(const MapperConfig& config) {
       {"has_stayed", state.staysFrom()},
       {"arrived stays", state.arrivedStaysFrom()},
       {"hidden", state.hiddenAsk()},
+      {"what is hidden votes", state.hiddenVotesFrom()},
       {"free_sum_limit", state.mostFree()},
   };
 }
@@ -98,7 +99,7 @@ TEST(LeftOut, IsMissing) {
     if (name == "has_stayed") expected.insert("arrived stays");
     EXPECT_EQ(changed, expected);
   }
-  EXPECT_EQ(count + 1, with.size());
+  EXPECT_EQ(count + 2, with.size());
 }
 
 TEST(LeftOut, RefusesWhatIsNoRule) {
