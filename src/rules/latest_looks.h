@@ -14,8 +14,8 @@ namespace bki_mapping {
 
 /// Number of intervals since the last hit in which a voxel was seen void, from which on it is free.
 constexpr int kVoidsToClear = 2;
-/// The same in which beams may have crossed it at most, if what is around it shall say whether it is still
-/// occupied.
+/// The most intervals since the last hit in which beams may have crossed a voxel, none of them void, for it
+/// to ask what is around it.
 constexpr int kMostGrazed = 2;
 /// A visit ends where the level of an interval is at least kVisitLevel, and at least kVisitLevels above that
 /// of the next one of its block: then nobody looked at the block in between for 2^(kVisitLevel - 2) ticks, 69
@@ -26,7 +26,7 @@ constexpr std::uint64_t kCrossedToClear = 2;
 
 /// What has become of what was last hit in a voxel, by the looks since.
 enum class Fate : std::uint8_t {
-  kUnclear,  ///< it was never hit, or none of the others
+  kUnclear,  ///< it was never hit, or none of the others applies
   kHere,     ///< hit in one of the two latest ticks of its block, and not seen since
   kHidden,   ///< hit before them, and not seen since
   kGrazed,   ///< crossed in one or two intervals since, and void in none
@@ -37,7 +37,8 @@ Fate fateOf(const Looks& looks, std::size_t offset);
 /// The voxels of a block by their fates.
 struct Fates {
   Look::Voxels here, hidden, grazed, left;
-  /// Of the unclear and grazed ones, those last hit in an earlier visit, and crossed for kCrossedToClear since.
+  /// Of the unclear and grazed ones, those last hit in an earlier visit, and crossed for kCrossedToClear
+  /// since.
   Look::Voxels crossed;
 };
 Fates fatesOf(const Looks& looks);

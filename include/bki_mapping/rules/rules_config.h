@@ -23,7 +23,7 @@ enum class Rule : std::uint8_t {
   kNeighbours,    ///< (12b)
   kVoteLimit,     ///< (12b): the 16 L_h of a vote
   kHasStayed,     ///< (12c): what has stayed is occupied
-  kHidden,        ///< (12c): what is around decides where hardly anybody has looked since
+  kHidden,        ///< (12c): what is around decides where beams have hardly been since
   kFreeSumLimit,  ///< (12c): the 300 L_h of the evidence for `free`
 };
 constexpr std::size_t kRules = static_cast<std::size_t>(Rule::kFreeSumLimit) + 1;

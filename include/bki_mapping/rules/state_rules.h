@@ -90,7 +90,7 @@ class StateRules {
     return config_.has(Rule::kHasStayed) ? (evidenceOfVotes() + 1) / 2 : kMostUnits;
   }
 
-  /// Whether voxels that nobody has looked at since their last hit, or that beams have hardly crossed, ask
+  /// Whether voxels that no beam, or hardly any, has crossed since their last hit ask
   /// the voxels around whether what was hit is still there (Equation 12c). Not where floors ask, too: they
   /// always are.
   bool hiddenAsk() const {
@@ -98,8 +98,8 @@ class StateRules {
            config_.has(Rule::kHidden);
   }
 
-  /// Evidence of the likeliest class from which on such a voxel, hidden since its last hit, votes for what is
-  /// still there [units]: fewer hits may be of what passed.
+  /// Evidence of the likeliest class from which on a voxel that is hidden since its last hit votes for what
+  /// is still there [units]: fewer hits may be of what passed.
   EvidenceUnits hiddenVotesFrom() const {
     static_assert(kHiddenVotesAfter % kMostVotes == 0);
     return kHiddenVotesAfter / kMostVotes * evidenceOfVotes();
