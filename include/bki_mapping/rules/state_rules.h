@@ -90,9 +90,8 @@ class StateRules {
     return config_.has(Rule::kHasStayed) ? (evidenceOfVotes() + 1) / 2 : kMostUnits;
   }
 
-  /// Whether voxels that no beam, or hardly any, has crossed since their last hit ask
-  /// the voxels around whether what was hit is still there (Equation 12c). Not where floors ask, too: they
-  /// always are.
+  /// Whether voxels that no beam, or hardly any, has crossed since their last hit ask the voxels around
+  /// whether what was hit is still there (Equation 12c). Not where floors ask, too: they always are.
   bool hiddenAsk() const {
     return latest_decides_ && neighbourhood_ratio_ > 0.0f && neighbourhood_is_below_ &&
            config_.has(Rule::kHidden);
